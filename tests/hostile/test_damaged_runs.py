@@ -25,25 +25,20 @@ def good(tmp_path_factory):
     return written(folder / "c.h5", rig), written(folder / "csv", rig, "csv")
 
 
-def no_file(path, run):
-    (path / "runs" / f"{run}.csv").unlink()
+def in_file(change):
+    """A CSV run whose bytes are changed; None: that is not there."""
+
+    def damage(path, run):
+        file = path / "runs" / f"{run}.csv"
+        data = change(file.read_bytes())
+        file.unlink() if data is None else file.write_bytes(data)
+
+    return damage
 
 
-def empty_file(path, run):
-    (path / "runs" / f"{run}.csv").write_bytes(b"")
-
-
-def cut_off(path, run):
-    """Most of the record lost, in the middle of a line."""
-    file = path / "runs" / f"{run}.csv"
-    file.write_bytes(file.read_bytes()[:400])
-
-
-def garbage(path, run):
-    file = path / "runs" / f"{run}.csv"
-    data = file.read_bytes()
+def garbage(data):
     half = len(data) // 2
-    file.write_bytes(data[:half] + np.random.default_rng(1).bytes(3000) + data[half:])
+    return data[:half] + np.random.default_rng(1).bytes(3000) + data[half:]
 
 
 def torn_chunk(path, run):
@@ -70,7 +65,12 @@ def constant(channel, value):
     return damage
 
 
-CSV = {"missing file": no_file, "empty file": empty_file, "cut off": cut_off, "garbage": garbage}
+CSV = {
+    "missing file": in_file(lambda data: None),
+    "empty file": in_file(lambda data: b""),
+    "cut off": in_file(lambda data: data[:400]),  # in the middle of a line
+    "garbage": in_file(garbage),
+}
 HDF5 = {
     "torn chunk": torn_chunk,
     "missing group": no_group,

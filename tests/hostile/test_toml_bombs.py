@@ -7,13 +7,14 @@ import time
 import pytest
 
 from model.bearing import BearingError
-from model.bearing_file import load_bearing, parse_bearing
+from model.bearing_file import parse_bearing
 from model.effects import EffectError, load_effects
 from model.pivots import load_pivots
 from model.toml_text import MAX_DEPTH, parse_toml
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from rigdata.units import UnitError, parse_quantity
+from tests.manifests import PROBE, SWEEP, manifest
 from tpjb_ident.cli.inputs import parse_values
 from tpjb_ident.errors import BadInputError
 
@@ -71,36 +72,40 @@ def test_what_only_looks_deep_is_taken(text):
     assert isinstance(parse_toml(text), dict)
 
 
-def test_numbers_beyond_floats_are_named(rocker_file, tmp_path):
-    huge = "9" * 400
+HUGE = "9" * 400
+PIVOTS = 'schema = "tpjb-pivots/1"\n[[pads]]\npad = 1\nforce_N = [{}]\ndeflection_m = [{}]\nvalid_to_N = {}\n'
+
+
+@pytest.mark.parametrize(
+    ("loads", "points", "end", "says"),
+    [
+        (f"0.0, 1.0, {HUGE}", "0.0, 1e-6, 2e-6", "2.0", "pad 1"),
+        ("0.0, 1.0, 2.0", f"0.0, 1e-6, {HUGE}", "2.0", "pad 1"),
+        ("0.0, 1.0, 2.0", "0.0, 1e-6, 2e-6", HUGE, "pad 1"),
+        ("0.0, 1e-310, 2.0", "0.0, 1.0, 2.0", "2.0", "slopes that are numbers"),  # found by long fuzzing
+        ("0.0, 1.0, 2.0", "0.0, 1e-320, 1e-6", "2.0", "slopes that are numbers"),
+    ],
+)
+def test_curves_beyond_floats_are_named(tmp_path, loads, points, end, says):
+    (tmp_path / "p.toml").write_text(PIVOTS.format(loads, points, end))
+    with pytest.raises(BearingError, match=says):
+        load_pivots(tmp_path / "p.toml")
+
+
+def test_numbers_beyond_floats_and_what_long_fuzzing_found_are_refused_in_words(rocker_file, tmp_path):
     text = rocker_file.read_text("utf-8")
-    with pytest.raises(ValueError, match="hundreds of digits"):
-        load_bearing(text.replace("poissons_ratio = ", f"poissons_ratio = {huge} #", 1))
-    (tmp_path / "e.toml").write_text(f'[[effects]]\nname = "soft_pivot"\npad = 5\nstiffness_factor = {huge}\n')
+    for old, new, says in (
+        ("poissons_ratio = ", f"poissons_ratio = {HUGE} #", "hundreds of digits"),
+        ("pivot_angles = [", 'pivot_angles = [["1 deg"], ', "got an array"),
+    ):
+        with pytest.raises(BearingError, match=says):
+            parse_bearing(text.replace(old, new, 1), "b.toml")
+    (tmp_path / "e.toml").write_text(f'[[effects]]\nname = "soft_pivot"\npad = 5\nstiffness_factor = {HUGE}\n')
     with pytest.raises(EffectError, match="outside any physical range"):
         load_effects(tmp_path / "e.toml")
-    for key in ("force_N", "deflection_m", "valid_to_N"):
-        pad = {"force_N": "[0.0, 1.0, 2.0]", "deflection_m": "[0.0, 1e-6, 2e-6]", "valid_to_N": "2.0"}
-        pad[key] = pad[key].replace("2.0", huge).replace("2e-6", huge)
-        lines = "\n".join(f"{k} = {v}" for k, v in pad.items())
-        (tmp_path / "p.toml").write_text(f'schema = "tpjb-pivots/1"\n[[pads]]\npad = 1\n{lines}\n')
-        with pytest.raises(BearingError, match="pad 1"):
-            load_pivots(tmp_path / "p.toml")
-
-
-def test_what_long_fuzzing_found_is_refused_in_words(rocker_file, tmp_path):
-    """A list of lists of angles; a sensitivity below the smallest float; a pivot curve with slopes beyond floats."""
-    text = rocker_file.read_text("utf-8")
-    with pytest.raises(BearingError, match="got an array"):
-        parse_bearing(text.replace("pivot_angles = [", 'pivot_angles = [["1 deg"], ', 1), "b.toml")
-    channel = '[channels.A]\nquantity = "displacement"\naxis = "0 deg"\nunit = "V"\nsensitivity = "1e-320 uV/Mm"\n'
+    channel = PROBE | {"unit": "V", "sensitivity": "1e-320 uV/Mm"}
     with pytest.raises(RigDataError, match="must be above zero"):
-        parse_manifest('schema = "tpjb-rig/1"\nid = "x"\nbearing = "b.toml"\n' + channel)
-    for loads, points in (("0.0, 1e-310, 2.0", "0.0, 1.0, 2.0"), ("0.0, 1.0, 2.0", "0.0, 1e-320, 1e-6")):
-        curve = f"force_N = [{loads}]\ndeflection_m = [{points}]\n"
-        (tmp_path / "p.toml").write_text(f'schema = "tpjb-pivots/1"\n[[pads]]\npad = 1\n{curve}')
-        with pytest.raises(BearingError, match="slopes that are numbers"):
-            load_pivots(tmp_path / "p.toml")
+        parse_manifest(manifest({"A": channel}, SWEEP))
 
 
 def test_a_number_of_thousands_of_digits_costs_no_time():

@@ -177,11 +177,12 @@ def test_loads_in_names_of_files_have_any_unit_of_force(stem, newtons, text, sou
     assert (entry.number, written, entry.source) == (pytest.approx(newtons, nan_ok=True), text, source)
 
 
-def test_units_are_spelt_as_a_manifest_spells_them():
-    assert usable_unit("µm") == "um"
-    assert usable_unit("U/min") == "rpm"
-    assert (usable_unit("Volts"), usable_unit("Newtons"), usable_unit("mils")) == ("V", "N", "mil")
-    assert usable_unit("g/no") == ""
+@pytest.mark.parametrize(
+    ("label", "unit"),
+    [("µm", "um"), ("U/min", "rpm"), ("Volts", "V"), ("Newtons", "N"), ("mils", "mil"), ("g/no", "")],
+)
+def test_units_are_spelt_as_a_manifest_spells_them(label, unit):
+    assert usable_unit(label) == unit
 
 
 @pytest.mark.parametrize(
@@ -199,15 +200,12 @@ def test_the_head_of_an_unknown_text_file_is_found(tmp_path, text, names, units,
     assert (head.names, head.units, head.decimal) == (names, units, decimal)
 
 
-def test_a_text_without_numbers_is_no_record(tmp_path):
+def test_a_text_without_numbers_is_no_record_and_a_folder_without_records_says_what_would_be(tmp_path):
+    with pytest.raises(RigDataError, match=r"holds no records.*\.csv.*\.tdms"):
+        record_files(tmp_path)
     (tmp_path / "a.txt").write_text("Dear Sir,\nplease find\n", encoding="utf-8")
     with pytest.raises(RigDataError, match="no table of numbers"):
         find_head(RecordFile(tmp_path / "a.txt", "a.txt"))
-
-
-def test_a_folder_without_records_says_what_would_be_one(tmp_path):
-    with pytest.raises(RigDataError, match=r"holds no records.*\.csv.*\.tdms"):
-        record_files(tmp_path)
 
 
 def test_movement_beats_a_misleading_name():
@@ -232,36 +230,37 @@ def test_a_look_finds_lines_and_dead_channels():
     assert look_at(rng.standard_normal(2000), RATE).lines == ()
 
 
-def export_of(name, forces, speed=None):
-    """Half-swinging horizontal and vertical force, and a tachometer in rpm where asked for."""
-    time = np.arange(2000) / RATE
-    series = [Series(n, "N", f + 0.0 * time, time) for n, f in zip(("Fx", "Fy"), forces, strict=True)]
-    if speed is not None:
-        series.append(Series("tach", "rpm", np.full(2000, speed), time))
-    return Export(name, tuple(series))
+TIME = np.arange(4000) / RATE
+SWING = 500.0 * np.sin(2 * np.pi * 25.0 * TIME)
+
+
+def guessed(*records):
+    """Guesses of runs from their names, and their channels' unit and values."""
+    series = [[Series(name, unit, v + 0.0 * TIME, TIME) for name, (unit, v) in of.items()] for _, of in records]
+    return survey([Export(name, tuple(of)) for (name, _), of in zip(records, series, strict=True)]).runs
+
+
+def pulled(degrees):
+    return {"Fx": ("N", 1e3 * math.cos(math.radians(degrees))), "Fy": ("N", 1e3 * math.sin(math.radians(degrees)))}
 
 
 def test_directions_a_degree_apart_are_one():
     angles = (-89.0, -91.0, -90.0, -18.4, 54.0)
-    made = [export_of(f"l-{i}.csv", 1000.0 * np.array([math.cos(math.radians(a)), math.sin(math.radians(a))]))
-            for i, a in enumerate(angles)]  # fmt: skip
-    found = survey(made)
-    assert [run.direction.value for run in found.runs] == [-90.0, -90.0, -90.0, -18.0, 54.0]
+    runs = guessed(*((f"l-{i}.csv", pulled(angle)) for i, angle in enumerate(angles)))
+    assert [run.direction.value for run in runs] == [-90.0, -90.0, -90.0, -18.0, 54.0]
 
 
 def test_speed_comes_from_the_tachometer_before_the_name_before_the_lines():
-    forces = np.array([0.0, -1000.0])
-    first, second = survey([export_of("run-900rpm.csv", forces, 1320.0), export_of("run-900rpm.csv", forces)]).runs
+    first, second = guessed(
+        ("run-900rpm.csv", pulled(-90.0) | {"tach": ("rpm", 1320.0)}), ("run-900rpm.csv", pulled(-90.0))
+    )
     assert first.speed.value == pytest.approx(22.0)
     assert "by tach" in first.speed.reason
     assert second.speed.value == pytest.approx(15.0)
 
 
 def test_units_in_names_are_understood():
-    time = np.arange(4000) / RATE
-    swing = 500.0 * np.sin(2 * np.pi * 25.0 * time)
-    one = Export("dyn_5kN_-90deg_1320rpm_25Hz.csv", (Series("Force", "N", swing, time),))
-    run = survey([one]).runs[0]
+    (run,) = guessed(("dyn_5kN_-90deg_1320rpm_25Hz.csv", {"Force": ("N", SWING)}))
     assert (run.load.value, run.direction.value, run.excitation.value) == (5000.0, -90.0, 25.0)
     assert run.speed.value == pytest.approx(22.0)
 
@@ -277,9 +276,7 @@ def test_units_in_names_are_understood():
     ],
 )
 def test_a_load_by_a_file_s_name_is_held_against_the_cells(name, load, kept, source, reason):
-    time = np.arange(4000) / RATE
-    swing = 500.0 * np.sin(2 * np.pi * 25.0 * time)
-    (run,) = survey([Export(name, (Series("LC_H", "N", swing, time), Series("LC_V", "N", swing - load, time)))]).runs
+    (run,) = guessed((name, {"LC_H": ("N", SWING), "LC_V": ("N", SWING - load)}))
     assert run.load.value == pytest.approx(kept, rel=1e-3)
     assert (run.load.source, run.load.reason) == (source, reason)
 

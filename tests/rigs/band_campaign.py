@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from tests.manifests import manifest
 from tests.rigs.band_rig import CHANNELS, BandPlan, BandRig, record
 
 BEARING = Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml"
@@ -31,26 +32,18 @@ def write_band_campaign(path: Path, rig: BandRig, plans: Sequence[BandPlan], see
 
 def band_manifest(rig: BandRig, plans: Sequence[BandPlan]) -> str:
     """The campaign's manifest."""
-    lines = [
-        'schema = "tpjb-rig/1"',
-        'id = "band"',
-        'bearing = "rocker.toml"',
-        "[housing]",
-        f'mass = "{rig.housing_mass} kg"',
-    ]
-    lines += ["[acquisition]", f'sample_rate = "{rig.rate} Hz"']
-    lines += [f'mains = "{rig.mains} Hz"'] if rig.mains else []
+    channels: dict[str, dict[str, str]] = {}
     for name, (quantity, axis) in CHANNELS.items():
-        lines += [f"[channels.{name}]", f'quantity = "{quantity}"', f'axis = "{axis} deg"']
-        lines += [f'unit = "{UNITS[quantity][0]}"', 'uncertainty = "0 %"']
+        channels[name] = {"quantity": quantity, "axis": f"{axis} deg", "unit": UNITS[quantity][0], "uncertainty": "0 %"}
     for k in range(rig.command):
-        angle = plans[0].direction + 90.0 * k
-        lines += [f"[channels.C{k + 1}]", 'quantity = "command"', f'axis = "{angle} deg"']
+        channels[f"C{k + 1}"] = {"quantity": "command", "axis": f"{plans[0].direction + 90.0 * k} deg"}
+    shared = {"kind": "dynamic", "shaft_speed": f"{rig.shaft} Hz", "static_load_direction": "-90 deg"}
+    shared |= {"excitation": STATED.get(rig.kind, rig.kind)}
+    shared |= {"excitation_band": f"{rig.band[0]:g}..{rig.band[1]:g} Hz"}
+    runs = []
     for plan in plans:
-        lines += ["[[runs]]", f'id = "{plan.id}"', 'kind = "dynamic"', f'shaft_speed = "{rig.shaft} Hz"']
-        lines += [f'static_load = "{plan.load} N"', 'static_load_direction = "-90 deg"']
-        lines += [f'excitation = "{STATED.get(rig.kind, rig.kind)}"']
-        lines += [f'excitation_band = "{rig.band[0]:g}..{rig.band[1]:g} Hz"']
-        if rig.command != 2:
-            lines += [f'excitation_direction = "{plan.direction} deg"']
-    return "\n".join(lines) + "\n"
+        along = {"excitation_direction": f"{plan.direction} deg"} if rig.command != 2 else {}
+        runs.append({"id": plan.id, "static_load": f"{plan.load} N"} | shared | along)
+    acquisition = {"sample_rate": f"{rig.rate} Hz"} | ({"mains": f"{rig.mains} Hz"} if rig.mains else {})
+    tables = {"housing": {"mass": f"{rig.housing_mass} kg"}, "acquisition": acquisition}
+    return manifest(channels, *runs, head={"id": "band", "bearing": "rocker.toml"}, **tables)

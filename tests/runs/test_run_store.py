@@ -11,11 +11,13 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import write_campaign
+from tests.command_line import tpjb
 from tests.good_campaigns import directions, written
 from tests.identification.test_identify import rig
 from tpjb_ident.cli.commands.identify import KEPT
@@ -76,15 +78,15 @@ def stop_after(count):
 
 
 def same(first, second) -> bool:
+    """Whether all that was read of the runs is alike, bit for bit."""
     for (a, of_a), (b, of_b) in zip(first, second, strict=True):
-        pairs = [(getattr(a, n), getattr(b, n)) for n in ("displacement", "cell_force", "acceleration")]
-        blocks = [(getattr(x, n), getattr(y, n)) for x, y in pairs for n in ("phasors", "mean", "lost")]
-        blocks += [(a.start, b.start), (a.speeds, b.speeds)]
-        if of_a.mains is not None:
-            blocks.append((of_a.mains, of_b.mains))
-        if not all(np.array_equal(x, y, equal_nan=True) for x, y in blocks):
-            return False
-        if (of_a.mains is None) != (of_b.mains is None) or (of_a.temperatures, a.lines) != (of_b.temperatures, b.lines):
+        blocks = [(a.start, b.start), (a.speeds, b.speeds), (of_a.mains, of_b.mains)]
+        for quantity in ("displacement", "cell_force", "acceleration"):
+            blocks += [(getattr(getattr(x, quantity), name) for x in (a, b)) for name in ("phasors", "mean", "lost")]
+        for x, y in blocks:
+            if (x is None) != (y is None) or (x is not None and not np.array_equal(x, y, equal_nan=True)):
+                return False
+        if (of_a.temperatures, a.lines) != (of_b.temperatures, b.lines):
             return False
         if [c.sentence() for c in a.conditions] != [c.sentence() for c in b.conditions]:
             return False
@@ -120,8 +122,6 @@ def test_a_run_that_another_command_has_cleared_is_done_again(path, whole, tmp_p
 
 @pytest.mark.slow
 def test_what_has_changed_is_done_again(path, tmp_path, counted):
-    import h5py
-
     copy = tmp_path / "copy.h5"
     shutil.copy(path, copy)
     store, settings = RunStore(tmp_path / "kept"), PhasorSettings()
@@ -200,39 +200,27 @@ def test_a_killed_command_goes_on_and_ends_with_the_same_tables(tmp_path):
 
 
 def test_an_error_leaves_nothing_behind(path, tmp_path):
-    import h5py
-
     copy = tmp_path / "copy.h5"
     shutil.copy(path, copy)
     with h5py.File(copy, "r+") as file:
         for run in file["runs"]:
             del file[f"runs/{run}/X1A"]
-    from tests.command_line import tpjb
-
     result = tpjb("identify", copy, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert "X1A" in result.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["copy.h5"]
 
 
-def without_mark(meta):
-    del meta["fingerprint"]
-
-
-def of_another_kind(meta):
-    meta["result"]["RunDigest"]["phasors"] = {"set": 5}
-
-
-def with_a_mark_that_is_none(meta):
-    meta["fingerprint"] = {"a": 1}
-
-
-def without_blocks(meta):
-    del meta["result"]["RunDigest"]["phasors"]
+DAMAGES = {
+    "without mark": lambda meta: meta.pop("fingerprint"),
+    "of another kind": lambda meta: meta["result"]["RunDigest"].update(phasors={"set": 5}),
+    "with a mark that is none": lambda meta: meta.update(fingerprint={"a": 1}),
+    "without blocks": lambda meta: meta["result"]["RunDigest"].pop("phasors"),
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damage", [without_mark, of_another_kind, with_a_mark_that_is_none, without_blocks])
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
 def test_an_entry_that_somebody_has_changed_is_done_again(path, whole, counted, tmp_path, damage):
     campaign, store = load_campaign(path), RunStore(tmp_path / "kept")
     all_runs(campaign, PhasorSettings(), silent, store=store)
@@ -242,6 +230,4 @@ def test_an_entry_that_somebody_has_changed_is_done_again(path, whole, counted, 
     meta = json.loads(str(arrays.pop("meta")))
     damage(meta)
     np.savez(first, meta=np.array(json.dumps(meta)), **arrays)
-    counted.clear()
-    again = all_runs(campaign, PhasorSettings(), silent, store=store)
-    assert same(again, whole)
+    assert same(all_runs(campaign, PhasorSettings(), silent, store=store), whole)

@@ -119,15 +119,20 @@ def test_one_column_one_name(tmp_path, head, message):
         read_table(saved(tmp_path, f"{GOOD},", head=head))
 
 
-def test_missing_names_other_encodings_and_nothing_at_all_are_refused(tmp_path):
-    with pytest.raises(BadInputError, match="column excitation_Hz is missing"):
-        read_table(saved(tmp_path, GOOD), ("excitation_Hz",))
-    with pytest.raises(BadInputError, match="utf-8"):
-        read_table(saved(tmp_path, GOOD.replace("ok", "Öl"), encoding="cp1252"))
-    with pytest.raises(BadInputError, match="is empty"):
-        read_table(saved(tmp_path, head=""))
-    with pytest.raises(BadInputError, match="No such file"):
-        read_table(tmp_path / "none.csv")
+@pytest.mark.parametrize(
+    ("line", "changes", "message"),
+    [
+        (GOOD, {"needed": ("excitation_Hz",)}, "column excitation_Hz is missing"),
+        (GOOD.replace("ok", "Öl"), {"encoding": "cp1252"}, "utf-8"),
+        ("", {"head": ""}, "is empty"),
+        (None, {}, "No such file"),
+    ],
+)
+def test_missing_names_other_encodings_and_nothing_at_all_are_refused(tmp_path, line, changes, message):
+    needed = changes.pop("needed", ())
+    path = tmp_path / "none.csv" if line is None else saved(tmp_path, line, **changes)
+    with pytest.raises(BadInputError, match=message):
+        read_table(path, needed)
 
 
 def test_a_column_is_found_with_its_ending_in_its_table_first():
@@ -144,24 +149,19 @@ def test_what_was_written_is_read_back(tmp_path):
     pd.testing.assert_frame_equal(frame, pd.read_csv(path), check_dtype=False)
 
 
-def change(path):
-    path.write_text(path.read_text(encoding="utf-8").replace("20.0", "21.0"), encoding="utf-8")
+def rewrite(path, old="20.0", new="21.0"):
+    path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
 
 
-def unread(path):
-    (path.parent / "run.json").write_text("{", encoding="utf-8")
+DAMAGES = {
+    "changed": rewrite,
+    "unread": lambda path: (path.parent / "run.json").write_text("{", encoding="utf-8"),
+    "newer": lambda path: rewrite(path.parent / "run.json", schema("tpjb-run"), "tpjb-run/99"),
+    "half moved": lambda path: (path.parent / ".tpjb-moving-in").mkdir(),
+}
 
 
-def newer(path):
-    text = (path.parent / "run.json").read_text(encoding="utf-8")
-    (path.parent / "run.json").write_text(text.replace(schema("tpjb-run"), "tpjb-run/99"), encoding="utf-8")
-
-
-def half_moved(path):
-    (path.parent / ".tpjb-moving-in").mkdir()
-
-
-@pytest.mark.parametrize("damage", [change, unread, newer, half_moved])
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
 def test_what_the_record_contradicts_is_not_exported(tmp_path, damage):
     path = coefficients(tmp_path)
     assert contradiction(path) == ""
@@ -175,17 +175,12 @@ def test_what_the_record_contradicts_is_not_exported(tmp_path, damage):
         export(path, "csv", tmp_path / "o")
 
 
-def test_others_name_it_and_go_on(tmp_path, rocker_file):
+def test_others_name_it_and_go_on_and_a_table_alone_has_no_record_to_contradict(tmp_path, rocker_file):
     path = coefficients(tmp_path)
-    change(path)
+    rewrite(path)
     result = tpjb("compare", "--coefficients", path, "--bearing", rocker_file, "--out", tmp_path / "o")
     assert "is not what was computed" in " ".join(result.output.split())
-
-
-def test_a_table_alone_has_no_record_to_contradict(tmp_path):
-    path = coefficients(tmp_path)
     (path.parent / "run.json").unlink()
-    change(path)
     assert contradiction(path) == ""
 
 
@@ -199,13 +194,14 @@ def test_documents_that_are_none_are_refused(tmp_path, text):
         read_document(path, "tpjb-check")
 
 
-def test_every_version_so_far_is_read(tmp_path):
+@pytest.mark.parametrize(
+    ("version", "entry"),
+    [
+        ("tpjb-run/1", {"settings": {"a": 1, "bearing": "b.toml"}, "inputs_at": {}}),
+        ("tpjb-run/2", {"settings": {}, "options": {"a": 1}}),
+    ],
+)
+def test_every_version_so_far_is_read(tmp_path, version, entry):
     path = tmp_path / "run.json"
-    for version in ("tpjb-run/1", "tpjb-run/2"):
-        entry = (
-            {"settings": {"a": 1, "bearing": "b.toml"}, "inputs_at": {}}
-            if version.endswith("1")
-            else {"settings": {}, "options": {"a": 1}}
-        )
-        path.write_text(json.dumps({"schema": version, "commands": {"locus": entry}}), encoding="utf-8")
-        assert read_document(path, "tpjb-run")["commands"]["locus"]["options"] == {"a": 1}
+    path.write_text(json.dumps({"schema": version, "commands": {"locus": entry}}), encoding="utf-8")
+    assert read_document(path, "tpjb-run")["commands"]["locus"]["options"] == {"a": 1}
