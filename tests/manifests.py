@@ -41,7 +41,8 @@ def _value(value: object) -> str:
 
 def write_files(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None) -> Path:
     """Write a campaign of this manifest and these files into a folder; the folder."""
-    for name, content in {"campaign.toml": text, "b.toml": 'name = "b"\n', **(files or {})}.items():
+    bearing = {"b.toml": 'name = "b"\n'} if 'bearing = "b.toml"' in text else {}
+    for name, content in {"campaign.toml": text, **bearing, **(files or {})}.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))

@@ -13,7 +13,6 @@ import pytest
 
 from model.pad import store
 from tests.command_line import tpjb
-from tpjb_ident.watch.landing import NewFiles
 
 
 @pytest.fixture
@@ -34,22 +33,6 @@ def test_solutions_stored_while_the_clock_was_ahead_do_not_push_out_new_ones(tmp
         assert store.save_arrays(f"new{number}", {"a": np.full(1, float(number))})
     assert [store.load_arrays(f"new{number}", {"a": (1,)})["a"][0] for number in range(3)] == [0.0, 1.0, 2.0]
     assert len(list(tmp_path.iterdir())) == store._KEEP
-
-
-@pytest.mark.parametrize("steps", [[0.0, 3600.0, -86400.0, 5.0]])
-def test_a_file_that_is_being_written_is_left_alone_whatever_the_clock_says(tmp_path, steps):
-    path, day, steady = tmp_path / "a.csv", time.time(), itertools.count(0.0, 2.0)
-    watch = NewFiles(5.0, lambda: day, lambda: next(steady))
-    path.write_text("x", encoding="utf-8")
-    os.utime(path, (day, day))
-    for number, step in enumerate(steps):  # a line is written between two looks, and the clock jumps
-        stable, written = watch.look([path])
-        assert (stable, written) == ({}, [path])
-        day += step
-        path.write_text("x" * (number + 2), encoding="utf-8")
-        os.utime(path, (day, day))
-    looks = [bool(watch.look([path])[0]) for _ in range(4)]
-    assert looks == [False, False, False, True]  # 2 s apart, 5 s without a change
 
 
 @pytest.mark.slow

@@ -62,34 +62,29 @@ def test_good_probes_are_not_doubted(campaign, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("channel", "value", "says"),
-    [("X1A", 1.1, "X1A read 9"), ("X1B", 1.03, "X1A read 2.9 % (se 0."), ("X1A", 0.95, "less")],
+    ("command", "channel", "value", "code", "says"),
+    [
+        ("check", "X1A", 1.1, 0, "X1A read 9"),
+        ("check", "X1B", 1.03, 0, "X1A read 2.9 % (se 0."),
+        ("check", "X1A", 0.95, 0, "less"),
+        ("check", "X1*", 0.1, 2, "the bearing file says 80 µm"),
+        ("pivot", "X1A", 1.1, 0, "the sides stand as if X1A read 9"),
+    ],
 )
-def test_unequal_gains_show_in_the_angles_of_the_polygon(campaign, tmp_path, channel, value, says):
-    source = campaign(gain(channel, value), plan=SWEEP)
-    polygon = measure_run(source.of_kind("clearance")[0], ANGLES)
-    (told,) = (s.sentence() for s in polygon.status if s == "probe-gains-differ")
-    assert says in told
-    out = tpjb("check", source.path, "--out", tmp_path / "o")
-    assert out.exit_code == 0
-    assert "warning" in out.output
-    assert "X1A read" in " ".join(out.output.split())
-
-
-@pytest.mark.slow
-def test_the_pivot_command_says_that_its_probes_disagree(campaign, tmp_path):
-    source = campaign(gain("X1A", 1.1), plan=replace(SMALL_PLAN, dynamic=(), locus=()))
-    out = tpjb("pivot", source.path, "--out", tmp_path / "o")
-    assert out.exit_code == 0, out.output
-    assert "the sides stand as if X1A read 9" in " ".join(out.output.split())
-
-
-@pytest.mark.slow
-def test_a_clearance_of_a_tenth_of_the_drawing_s_is_an_error_of_the_check(campaign, tmp_path):
-    source = campaign(gain("X1*", 0.1), plan=SWEEP)
-    out = tpjb("check", source.path, "--out", tmp_path / "o")
-    assert out.exit_code == 2
-    assert "the bearing file says 80 µm" in " ".join(out.output.split())
+def test_unequal_gains_show_in_the_angles_of_the_polygon(campaign, tmp_path, command, channel, value, code, says):
+    plan = SWEEP if command == "check" else replace(SMALL_PLAN, dynamic=(), locus=())
+    source = campaign(gain(channel, value), plan=plan)
+    out = tpjb(command, source.path, "--out", tmp_path / "o")
+    told = " ".join(out.output.split())
+    assert out.exit_code == code, out.output
+    if code == 2 or command == "pivot":
+        assert says in told
+    else:
+        assert "warning" in told
+        assert "X1A read" in told
+        polygon = measure_run(source.of_kind("clearance")[0], ANGLES)
+        (sentence,) = (s.sentence() for s in polygon.status if s == "probe-gains-differ")
+        assert says in sentence
 
 
 @pytest.mark.parametrize("axes", [(np.pi / 4, 3 * np.pi / 4), (0.3, 1.2)])

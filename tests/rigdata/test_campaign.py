@@ -46,9 +46,7 @@ FILES = {"rocker.toml": 'name = "rocker"\n', "runs/l-1.csv": RECORD, "runs/p-1.c
 
 
 def write(folder: Path, text: str = MANIFEST) -> Path:
-    write_files(folder, text, FILES)
-    (folder / "b.toml").unlink()
-    return folder
+    return write_files(folder, text, FILES)
 
 
 @pytest.fixture

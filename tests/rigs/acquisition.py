@@ -6,6 +6,7 @@ functions of time; every channel samples them at its own times, with its own axi
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 from scipy.interpolate import CubicSpline
+
+from tests.manifests import write_files
 
 Array = np.ndarray
 #: Signal of a run: (quantity, times [s]) to (2, n), SI, in the frame x, y.
@@ -186,7 +189,8 @@ def write_campaign(folder: Path, campaign: Campaign, setup: Acquisition, seed: l
         text += ["[[runs]]", f'id = "{run.name}"', f'file = "runs/{run.name}.csv"', *run.lines]
     manifest, records = "\n".join(text) + "\n", readings(campaign, setup, seed)
     if setup.form == "csv":
-        return _write_csv(folder / "field", {"campaign.toml": manifest, "bearing.toml": campaign.bearing}, records)
+        tables = {f"runs/{name}.csv": _table(columns) for name, columns in records.items()}
+        return write_files(folder / "field", manifest, {"bearing.toml": campaign.bearing, **tables})
     with h5py.File(folder / "field.h5", "w") as file:
         file.attrs["manifest"], file.attrs["bearing"] = manifest, campaign.bearing
         for name, columns in records.items():
@@ -197,17 +201,8 @@ def write_campaign(folder: Path, campaign: Campaign, setup: Acquisition, seed: l
     return folder / "field.h5"
 
 
-def _write_csv(folder: Path, texts: dict[str, str], records: dict[str, dict[str, Array]]) -> Path:
-    """The same as csv files with decimal commas; shorter columns end in blanks."""
-    (folder / "runs").mkdir(parents=True)
-    for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    for name, columns in records.items():
-        length = max(map(len, columns.values()))
-        cells = []
-        for values in columns.values():
-            words = [f"{v:.8g}".replace(".", ",") for v in values]
-            cells.append(words + [""] * (length - len(words)))
-        lines = [";".join(columns), *map(";".join, zip(*cells)), ""]
-        (folder / "runs" / f"{name}.csv").write_text("\r\n".join(lines), encoding="cp1252")
-    return folder
+def _table(columns: dict[str, Array]) -> bytes:
+    """CSV with decimal commas; shorter columns end in blanks."""
+    cells = [[f"{v:.8g}".replace(".", ",") for v in values] for values in columns.values()]
+    lines = [";".join(columns), *map(";".join, itertools.zip_longest(*cells, fillvalue="")), ""]
+    return "\r\n".join(lines).encode("cp1252")

@@ -26,7 +26,7 @@ SOURCES = {
     "tests/a/test_string.py": 'CODE = "import rigdata.other"\n',
     "tests/a/test_registry.py": "import model.registry\n",
     "tests/a/test_alone.py": "import math\n",
-    "tests/structure/test_walls.py": "",
+    "tests/structure/test_rules.py": "",
 }
 
 
@@ -54,7 +54,7 @@ def small(tmp_path_factory):
     ],
 )
 def test_what_lies_above_a_change_is_run_and_nothing_else(small, changed, above):
-    expected = {f"tests/a/test_{name}.py" for name in above.split()} | {"tests/structure/test_walls.py"}
+    expected = {f"tests/a/test_{name}.py" for name in above.split()} | {"tests/structure/test_rules.py"}
     assert set(lying_above([changed], small)) == expected
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ast
 import functools
-import tomllib
 from collections import Counter
 from collections.abc import Iterator
 
@@ -149,16 +148,6 @@ def test_rooms_know_only_what_they_may():
 
 def test_rooms_that_may_import_each_other_make_no_circle():
     assert a_circle(MAY_IMPORT) == []
-
-
-def test_tests_and_studies_stay_out_of_the_wheel_and_of_the_product():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"] == ["rigdata", "model", "tpjb_ident"]
-    for path, tree in trees().items():
-        for node in statements(tree):
-            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
-            names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
-            assert not [n for n in names if n.split(".")[0] == "tests"], path
 
 
 def test_a_folder_shows_at_most_twenty_files():

@@ -8,66 +8,44 @@ import pytest
 
 from tpjb_ident.watch.landing import NewFiles
 
-
-class Clock:
-    def __init__(self, now: float) -> None:
-        self.now = now
-
-    def __call__(self) -> float:
-        return self.now
-
-
-def landings(settle: float = 5.0) -> tuple[NewFiles, Clock]:
-    clock = Clock(1_000_000.0)
-    return NewFiles(settle, clock, clock), clock
-
-
-def touched(path, text: str, at: float):
-    path.write_text(text)
-    os.utime(path, (at, at))
-    return path
+DAY = 1_000_000.0
+#: Age [s] and text of a file, then looks at it: how much later [s], by how much the clock of the day has jumped since,
+#: what the file holds by then, whether it counts as written; files settle for 5 s.
+LANDINGS = {
+    "nobody has changed it for a while": (0, "1", [(0, 0, "1", False), (4.9, 0, "1", False), (0.2, 0, "1", True)]),
+    "it grows and is waited for from its last change on": (
+        0, "1", [(0, 0, "1", False), (4, 0, "12", False), (4, 0, "12", False), (1.1, 0, "12", True)],
+    ),
+    "finished long ago": (3600, "1", [(0, 0, "1", True)]),
+    "only opened": (3600, "", [(0, 0, "", False)]),
+    "a clock that is ahead on the share": (-3600, "1", [(0, 0, "1", False), (5.1, 0, "1", True)]),
+    "being written under a clock that jumps": (
+        0, "x", [(0, 0, "x", False), (2, 3600, "xx", False), (2, -86400, "xxx", False), (2, 5, "xxxx", False),
+                 (2, 0, "xxxx", False), (2, 0, "xxxx", False), (2, 0, "xxxx", True)],
+    ),
+}  # fmt: skip
 
 
-def test_a_file_is_written_when_nobody_has_changed_it_for_a_while(tmp_path):
-    watch, clock = landings()
-    path = touched(tmp_path / "a.csv", "1", clock.now)
-    assert watch.look([path]) == ({}, [path])
-    clock.now += 4.9
-    assert watch.look([path]) == ({}, [path])
-    clock.now += 0.2
-    assert list(watch.look([path])[0]) == [path]
-
-
-def test_one_that_grows_is_waited_for_from_its_last_change_on(tmp_path):
-    watch, clock = landings()
-    path = touched(tmp_path / "a.csv", "1", clock.now)
-    watch.look([path])
-    clock.now += 4.0
-    touched(path, "12", clock.now)
-    assert watch.look([path])[1] == [path]
-    clock.now += 4.0
-    assert watch.look([path])[1] == [path]
-    clock.now += 1.1
-    assert list(watch.look([path])[0]) == [path]
-
-
-@pytest.mark.parametrize(("text", "landed"), [("1", True), ("", False)], ids=["finished long ago", "only opened"])
-def test_an_old_file_is_not_waited_for_unless_it_is_empty(tmp_path, text, landed):
-    watch, clock = landings()
-    path = touched(tmp_path / "a.csv", text, clock.now - 3600.0)
-    whole, waiting = watch.look([path])
-    assert (list(whole), waiting) == (([path], []) if landed else ([], [path]))
-
-
-def test_a_clock_that_is_ahead_on_the_share_makes_nobody_wait_for_ever(tmp_path):
-    watch, clock = landings()
-    path = touched(tmp_path / "a.csv", "1", clock.now + 3600.0)
-    assert watch.look([path])[1] == [path]
-    clock.now += 5.1
-    assert list(watch.look([path])[0]) == [path]
+@pytest.mark.parametrize("name", LANDINGS)
+def test_a_file_counts_as_written_once_it_has_settled(tmp_path, name):
+    age, held, looks = LANDINGS[name]
+    now = {"day": DAY, "steady": 0.0}
+    watch = NewFiles(5.0, lambda: now["day"], lambda: now["steady"])
+    path = tmp_path / "a.csv"
+    path.write_text(held)
+    os.utime(path, (DAY - age,) * 2)
+    for later, jump, text, landed in looks:
+        now["steady"] += later
+        now["day"] += later + jump
+        if text != held:
+            held = text
+            path.write_text(text)
+            os.utime(path, (now["day"],) * 2)
+        whole, waiting = watch.look([path])
+        assert (list(whole), waiting) == (([path], []) if landed else ([], [path]))
 
 
 def test_no_file_and_a_folder_of_its_name_are_neither(tmp_path):
-    watch, _ = landings()
     (tmp_path / "folder.csv").mkdir()
+    watch = NewFiles(5.0, lambda: DAY, lambda: 0.0)
     assert watch.look([tmp_path / "none.csv", tmp_path / "folder.csv"]) == ({}, [])
