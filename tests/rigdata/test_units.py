@@ -26,56 +26,37 @@ from rigdata.units import (
 TWO_PI = 2 * math.pi
 
 
-@pytest.mark.parametrize(
-    ("text", "dimension", "value"),
-    [
-        ("54 deg", "angle", math.radians(54)),
-        ("-90 deg", "angle", -math.pi / 2),
-        ("-90°", "angle", -math.pi / 2),
-        ("1.5 rad", "angle", 1.5),
-        ("22 Hz", "speed", 22 * TWO_PI),
-        ("1320 rpm", "speed", 22 * TWO_PI),
-        ("1320 1/min", "speed", 22 * TWO_PI),
-        ("22 1/s", "speed", 22 * TWO_PI),
-        ("138.23 rad/s", "speed", 138.23),
-        ("2 kHz", "frequency", 2000.0),
-        ("5 kN", "force", 5000.0),
-        ("5e3 N", "force", 5000.0),
-        ("30 kg", "mass", 30.0),
-        ("40 degC", "temperature", 313.15),
-        ("40 °C", "temperature", 313.15),
-        ("313.15 K", "temperature", 313.15),
-        ("104 degF", "temperature", 313.15),
-        ("1 %", "ratio", 0.01),
-        (0.01, "ratio", 0.01),
-        ("2.0 mV/V", "ratio", 0.002),
-        ("1 g", "acceleration", 9.80665),
-        ("9.8 m/s^2", "acceleration", 9.8),
-        ("9.8 m/s²", "acceleration", 9.8),
-        ("9.8 m/s2", "acceleration", 9.8),
-        ("80 µm", "length", 80e-6),
-        ("80 μm", "length", 80e-6),
-        ("3 bar", "pressure", 3e5),
-        ("20 ms", "time", 0.02),
-        (".5 V", "voltage", 0.5),
-        ("5. V", "voltage", 5.0),
-        ("12e-6 1/K", "per kelvin", 12e-6),
-        ("0.256e-3 kg m^2", "moment of inertia", 0.256e-3),
-        ("5 N/um", "stiffness", 5e6),
-        ("2 kN*s/m", "damping", 2e3),
-        ("3 mPa s", "viscosity", 3e-3),
-        ("50 W/m/K", "conductivity", 50.0),
-        ("210 GPa", "pressure", 2.1e11),
-        ("1000 N*m", "rotational stiffness", 1000.0),
-        ("1 kN*m", "rotational stiffness", 1000.0),
-        ("1 N*mm", "rotational stiffness", 1e-3),
-        ("1 N*m/deg", "rotational stiffness", 180 / math.pi),
-        ("0.2 mm/m", "angle", 2e-4),
-        ("2 N.s/m", "damping", 2.0),
-    ],
-)
-def test_values(text, dimension, value):
-    assert parse_quantity(text, dimension) == pytest.approx(value, rel=1e-12)
+#: Quantities by dimension, as text, with their value in SI.
+VALUES = {
+    "angle": {
+        "54 deg": math.radians(54), "-90 deg": -math.pi / 2, "-90°": -math.pi / 2, "1.5 rad": 1.5, "0.2 mm/m": 2e-4,
+    },
+    "speed": {
+        **dict.fromkeys(["22 Hz", "1320 rpm", "1320 1/min", "22 1/s"], 22 * TWO_PI), "138.23 rad/s": 138.23,
+    },
+    "frequency": {"2 kHz": 2000.0},
+    "force": {"5 kN": 5000.0, "5e3 N": 5000.0},
+    "mass": {"30 kg": 30.0},
+    "temperature": dict.fromkeys(["40 degC", "40 °C", "313.15 K", "104 degF"], 313.15),
+    "ratio": {"1 %": 0.01, 0.01: 0.01, "2.0 mV/V": 0.002},
+    "acceleration": {"1 g": 9.80665, **dict.fromkeys(["9.8 m/s^2", "9.8 m/s²", "9.8 m/s2"], 9.8)},
+    "length": {"80 µm": 80e-6, "80 μm": 80e-6},
+    "pressure": {"3 bar": 3e5, "210 GPa": 2.1e11},
+    "time": {"20 ms": 0.02},
+    "voltage": {".5 V": 0.5, "5. V": 5.0},
+    "per kelvin": {"12e-6 1/K": 12e-6},
+    "moment of inertia": {"0.256e-3 kg m^2": 0.256e-3},
+    "stiffness": {"5 N/um": 5e6},
+    "damping": {"2 kN*s/m": 2e3, "2 N.s/m": 2.0},
+    "viscosity": {"3 mPa s": 3e-3},
+    "conductivity": {"50 W/m/K": 50.0},
+    "rotational stiffness": {"1000 N*m": 1000.0, "1 kN*m": 1000.0, "1 N*mm": 1e-3, "1 N*m/deg": 180 / math.pi},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("dimension", "text"), [(dimension, text) for dimension, of in VALUES.items() for text in of])
+def test_values(dimension, text):
+    assert parse_quantity(text, dimension) == pytest.approx(VALUES[dimension][text], rel=1e-12)
 
 
 #: Unit names that bearing files and effects files have always been able to use, with their factors.
@@ -112,49 +93,36 @@ def test_units_of_bearing_files(dimension, unit):
     assert unit_factor(unit, dimension) == pytest.approx(factor, rel=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("text", "dimension", "says"),
-    [
-        ("5", "force", "no unit"),
-        (5, "force", "no unit"),
-        (5.0, "angle", "no unit"),
-        (True, "ratio", "expected a number"),
-        (None, "force", "expected a number"),
-        ([1], "force", "expected a number"),
-        ("7,78 kN", "force", "decimal point"),
-        ("kN", "force", "not a number"),
-        ("5 kN/m", "force", "not one of force"),
-        ("5 Hz", "angle", "not one of angle"),
-        ("54 %", "angle", "not one of angle"),
-        ("54 deg", "ratio", "not one of ratio"),
-        ("5 N*m", "force", "not one of force"),
-        ("5 N/m", "rotational stiffness", "not one of rotational stiffness"),
-        ("5 mm/s", "angle", "not one of angle"),
-        ("5 flurb", "force", "not known"),
-        ("1e400 N", "force", "finite"),
-        ("nan N", "force", "not a number"),
-        ("inf N", "force", "not a number"),
-        ("0x10 N", "force", "cannot be read"),
-        ("1_000 N", "force", "cannot be read|not known"),
-        ("٣ N", "force", "not a number"),
-        ("5 N**99999999", "force", "cannot be read"),
-        ("5 __import__('os')", "force", "cannot be read"),
-        ("5 N/", "force", "ends"),
-        ("5 /N", "force", "where a unit name"),
-        ("5 (N", "force", "parenthesis"),
-        ("5 N)", "force", "parenthesis"),
-        ("5 " + "N*" * 30 + "N", "force", "too long"),
-        ("5 " + "N*" * 100 + "N", "force", "a text of 203 characters"),
-        (float("nan"), "ratio", "finite"),
-        pytest.param(16**5000, "force", "no unit", id="5000 hexadecimal digits"),
-        ("five mm", "length", "not a number with a unit"),
-        ("5 mm; import os", "length", "cannot be read"),
-        ("9" * 300 + " N", "force", "302 characters"),
-    ],
-)
-def test_refusals(text, dimension, says):
-    with pytest.raises(UnitError, match=f"^gap: .*({says})"):
-        parse_quantity(text, dimension, "gap")
+#: What is said, and of which texts and numbers that are to be forces, or another dimension.
+REFUSALS = {
+    "no unit": ["5", 5, (5.0, "angle"), 16**5000],
+    "expected a number": [(True, "ratio"), None, [1]],
+    "decimal point": ["7,78 kN"],
+    "not a number": ["kN", "nan N", "inf N", "٣ N"],
+    "not a number with a unit": [("five mm", "length")],
+    "not one of force": ["5 kN/m", "5 N*m"],
+    "not one of angle": [("5 Hz", "angle"), ("54 %", "angle"), ("5 mm/s", "angle")],
+    "not one of ratio": [("54 deg", "ratio")],
+    "not one of rotational stiffness": [("5 N/m", "rotational stiffness")],
+    "not known": ["5 flurb"],
+    "finite": ["1e400 N", (float("nan"), "ratio")],
+    "cannot be read": ["0x10 N", "5 N**99999999", "5 __import__('os')", ("5 mm; import os", "length")],
+    "cannot be read|not known": ["1_000 N"],
+    "ends": ["5 N/"],
+    "where a unit name": ["5 /N"],
+    "parenthesis": ["5 (N", "5 N)"],
+    "too long": ["5 " + "N*" * 30 + "N"],
+    "a text of 203 characters": ["5 " + "N*" * 100 + "N"],
+    "302 characters": ["9" * 300 + " N"],
+}
+
+
+@pytest.mark.parametrize("says", REFUSALS)
+def test_refusals(says):
+    for case in REFUSALS[says]:
+        text, dimension = case if isinstance(case, tuple) else (case, "force")
+        with pytest.raises(UnitError, match=f"^gap: .*({says})"):
+            parse_quantity(text, dimension, "gap")
 
 
 @pytest.mark.parametrize(

@@ -8,16 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigdata.virtual_rig import (
-    ClearanceSweep,
-    DryImperfections,
-    DryTest,
-    Instruments,
-    Noise,
-    RigPlan,
-    RigTruth,
-    VirtualRig,
-)
+from rigdata import virtual_rig as vr
 from rigdata.virtual_rig.motion import held_back, load_history, swept_position
 
 HERTZ = 1.4e-8
@@ -28,15 +19,15 @@ def hertzian(pad: int, load: np.ndarray) -> np.ndarray:
 
 
 TRUTH = replace(
-    RigTruth.constant(np.diag([2e8, 4e8]), np.diag([4e5, 6e5])),
+    vr.RigTruth.constant(np.diag([2e8, 4e8]), np.diag([4e5, 6e5])),
     pivot_deflection=hertzian,
     clearance=(80e-6, 84e-6, 78e-6, 81e-6, 80e-6),
 )
 
 
-def dry_record(test: DryTest, flaws: DryImperfections | None = None, seed: int = 1):
-    noise = replace(Noise.none(), dry=flaws or DryImperfections())
-    rig = VirtualRig(TRUTH, RigPlan(dry=(test,)), Instruments.like_paper(), noise, seed=seed)
+def dry_record(test: vr.DryTest, flaws: vr.DryImperfections | None = None, seed: int = 1):
+    noise = replace(vr.Noise.none(), dry=flaws or vr.DryImperfections())
+    rig = vr.VirtualRig(TRUTH, vr.RigPlan(dry=(test,)), vr.Instruments.like_paper(), noise, seed=seed)
     record = rig.simulate(f"p-{test.pad}-{test.branch}")
     motion, time = record.motion, record.motion.time
     angle = TRUTH.pivot_angles[test.pad - 1]
@@ -45,7 +36,7 @@ def dry_record(test: DryTest, flaws: DryImperfections | None = None, seed: int =
 
 
 def test_default_steps_are_those_of_the_samples():
-    time, load = load_history(DryTest(1), 500.0)
+    time, load = load_history(vr.DryTest(1), 500.0)
     assert len(time) == 6500
     assert load[0] == 250.0
     for step in range(10):
@@ -54,10 +45,10 @@ def test_default_steps_are_those_of_the_samples():
 
 
 def test_down_and_cycle_branches():
-    _, down = load_history(DryTest(1, levels=(500.0, 1000.0, 2000.0), branch="down"), 500.0)
+    _, down = load_history(vr.DryTest(1, levels=(500.0, 1000.0, 2000.0), branch="down"), 500.0)
     assert (down[0], down[-1] < 300.0) == (2000.0, True)
     assert np.all(np.diff(down) <= 0)
-    _, cycle = load_history(DryTest(1, levels=(500.0, 1000.0, 2000.0), branch="cycle"), 500.0)
+    _, cycle = load_history(vr.DryTest(1, levels=(500.0, 1000.0, 2000.0), branch="cycle"), 500.0)
     top = np.argmax(cycle)
     assert np.all(np.diff(cycle[: top + 1]) >= 0)
     assert np.all(np.diff(cycle[top:]) <= 0)
@@ -67,7 +58,7 @@ def test_down_and_cycle_branches():
 
 
 def test_unequal_holds_overshoot_and_leakage():
-    test = DryTest(1, levels=(500.0, 1000.0), hold=(0.5, 2.0), ramp=0.1, overshoot=0.1, load_drift=-0.01)
+    test = vr.DryTest(1, levels=(500.0, 1000.0), hold=(0.5, 2.0), ramp=0.1, overshoot=0.1, load_drift=-0.01)
     time, load = load_history(test, 1000.0)
     assert time[-1] == pytest.approx(0.1 + 0.5 + 0.1 + 2.0, abs=2e-3)
     assert load[np.searchsorted(time, 0.1 + 1e-6)] == pytest.approx(500.0 + 25.0, rel=2e-3)
@@ -78,17 +69,17 @@ def test_unequal_holds_overshoot_and_leakage():
 
 def test_a_perfect_dry_test_is_clearance_plus_deflection():
     for pad in (1, 3):
-        _, load, position, _ = dry_record(DryTest(pad))
+        _, load, position, _ = dry_record(vr.DryTest(pad))
         np.testing.assert_allclose(position[:, 0], TRUTH.clearance[pad - 1] + hertzian(pad, load[:, 0]), rtol=1e-12)
         np.testing.assert_allclose(position[:, 1], 0.0, atol=1e-18)
         np.testing.assert_allclose(load[:, 1], 0.0, atol=1e-9)
 
 
 def test_load_off_direction_and_shaft_moving_sideways():
-    flaws = DryImperfections(direction=(math.radians(1), math.radians(2)), side=(0.08, 0.22))
+    flaws = vr.DryImperfections(direction=(math.radians(1), math.radians(2)), side=(0.08, 0.22))
     angles, shares = [], []
     for seed in range(40):
-        _, load, position, facts = dry_record(DryTest(2, levels=(500.0, 4000.0)), flaws, seed)
+        _, load, position, facts = dry_record(vr.DryTest(2, levels=(500.0, 4000.0)), flaws, seed)
         angle = np.arctan2(load[-1, 1], load[-1, 0])
         share = np.ptp(position[:, 1]) / np.ptp(position[:, 0])
         assert math.degrees(angle) == pytest.approx(facts["load_direction_error_deg"])
@@ -105,8 +96,8 @@ def test_load_off_direction_and_shaft_moving_sideways():
 
 
 def test_friction_holds_back_going_up_and_keeps_on_going_down():
-    test = DryTest(1, branch="cycle")
-    _, load, position, _ = dry_record(test, DryImperfections(friction=0.02))
+    test = vr.DryTest(1, branch="cycle")
+    _, load, position, _ = dry_record(test, vr.DryImperfections(friction=0.02))
     top = np.argmax(load[:, 0])
     for level in (1000.0, 3000.0):
         up = position[:top][np.isclose(load[:top, 0], level), 0][-1]
@@ -127,16 +118,16 @@ def test_friction_waits_on_reversal():
 
 
 def test_contact_is_missing_on_upper_pads_only():
-    flaws = DryImperfections(contact_gap=(3e-6, 3e-6), contact_load=500.0)
+    flaws = vr.DryImperfections(contact_gap=(3e-6, 3e-6), contact_load=500.0)
     for pad, upper in ((1, False), (2, False), (3, True), (4, True), (5, False)):
-        _, load, position, facts = dry_record(DryTest(pad), flaws)
+        _, load, position, facts = dry_record(vr.DryTest(pad), flaws)
         gap = position[:, 0] - TRUTH.clearance[pad - 1] - hertzian(pad, load[:, 0])
         expected = -3e-6 * np.exp(-load[:, 0] / 500.0) if upper else np.zeros(len(load))
         np.testing.assert_allclose(gap, expected, atol=1e-15)
         assert (facts["contact_gap_m"] > 0) == upper
 
 
-def swept(truth: RigTruth, push: float = 200.0, lag: float = math.radians(5)) -> tuple[np.ndarray, np.ndarray]:
+def swept(truth: vr.RigTruth, push: float = 200.0, lag: float = math.radians(5)) -> tuple[np.ndarray, np.ndarray]:
     direction = np.linspace(0.0, 2 * np.pi, 7201)
     return direction, swept_position(truth, push, direction, lag)
 
@@ -178,7 +169,9 @@ def test_a_pad_out_of_reach_has_no_side():
 
 
 def test_sweep_goes_once_around_with_its_push():
-    rig = VirtualRig(TRUTH, RigPlan(clearance=(ClearanceSweep(push=150.0, seconds=4.0),)), noise=Noise.none())
+    rig = vr.VirtualRig(
+        TRUTH, vr.RigPlan(clearance=(vr.ClearanceSweep(push=150.0, seconds=4.0),)), noise=vr.Noise.none()
+    )
     record = rig.simulate("c-1")
     columns = record.readings.columns
     force = np.stack([columns["L1H"], columns["L1V"]]) / rig.instruments.named("L1H").scale

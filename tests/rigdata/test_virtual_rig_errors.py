@@ -8,28 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigdata.virtual_rig import (
-    Instruments,
-    Noise,
-    RigPlan,
-    RigTruth,
-    VirtualRig,
-    locus_points,
-    operating_points,
-)
+from rigdata import virtual_rig as vr
 from rigdata.virtual_rig.campaign import apparent_stiffness, campaign_truth
 from tests.good_campaigns import CROSS_DAMPING as C
 from tests.good_campaigns import CROSS_STIFFNESS as K
 
 OMEGA = 2 * np.pi * 40.0
 H = K + 1j * OMEGA * C
-RIGID = replace(Instruments.like_paper(), cell_stiffness=(math.inf, math.inf))
+RIGID = replace(vr.Instruments.like_paper(), cell_stiffness=(math.inf, math.inf))
 
 
-def seen_in_records(instruments: Instruments) -> np.ndarray:
+def seen_in_records(instruments: vr.Instruments) -> np.ndarray:
     """Dynamic stiffness by calibrating the readings as stated: nothing of the generator's own algebra."""
-    plan = RigPlan(dynamic=operating_points([(5000.0, 40.0)]), directions=(0.2, 1.4))
-    rig = VirtualRig(RigTruth.constant(K, C), plan, instruments, Noise.none(), seed=8)
+    plan = vr.RigPlan(dynamic=vr.operating_points([(5000.0, 40.0)]), directions=(0.2, 1.4))
+    rig = vr.VirtualRig(vr.RigTruth.constant(K, C), plan, instruments, vr.Noise.none(), seed=8)
     columns = {"displacement": [], "force": [], "acceleration": []}
     for run in rig.runs():
         readings = rig.simulate(run.id).readings
@@ -62,7 +54,7 @@ def seen_in_records(instruments: Instruments) -> np.ndarray:
     ids=lambda e: "-".join(e) or "none",
 )
 def test_apparent_stiffness_is_what_the_records_show(errors):
-    instruments = Instruments.like_paper(seed=1).with_errors(**errors)
+    instruments = vr.Instruments.like_paper(seed=1).with_errors(**errors)
     np.testing.assert_allclose(seen_in_records(instruments), apparent_stiffness(H, OMEGA, instruments), rtol=1e-8)
 
 
@@ -87,16 +79,16 @@ def test_each_effect_means_what_physics_md_says(name):
 @pytest.mark.parametrize("error", [0.0, 12.0])
 def test_housing_mass_error_takes_its_inertia_out_of_the_force(error):
     """F_cell + stated mass a_h = F_oil - error a_h, with a_h = -omega^2 F_oil / (k - m omega^2)."""
-    instruments = Instruments.like_paper().with_errors(mass_error=error)
+    instruments = vr.Instruments.like_paper().with_errors(mass_error=error)
     share = error * OMEGA**2 / (np.array([4e8, 6e8]) - (30.0 + error) * OMEGA**2)
     np.testing.assert_allclose(apparent_stiffness(H, OMEGA, instruments), (1 + share)[:, None] * H, rtol=1e-12)
 
 
 def test_cell_gain_shows_in_the_mean_force_and_probe_gain_in_the_position():
-    plan = RigPlan(locus=locus_points(1))
-    truth = RigTruth.constant(K, C)
+    plan = vr.RigPlan(locus=vr.locus_points(1))
+    truth = vr.RigTruth.constant(K, C)
     instruments = RIGID.with_errors(loadcell_gain=1.02, probe_gain=1.05)
-    columns = VirtualRig(truth, plan, instruments, Noise.none()).simulate("l-05000-01").readings.columns
+    columns = vr.VirtualRig(truth, plan, instruments, vr.Noise.none()).simulate("l-05000-01").readings.columns
     assert columns["L1V"].mean() / instruments.named("L1V").scale == pytest.approx(-5100.0)
     x, y = truth.centre(plan.locus[0])
     probe = instruments.named("X1A")
@@ -105,9 +97,9 @@ def test_cell_gain_shows_in_the_mean_force_and_probe_gain_in_the_position():
 
 
 def test_truth_holds_the_apparent_coefficients_and_the_gap_voltages():
-    instruments = Instruments.like_paper(seed=5).with_errors(probe_gain=1.1)
-    plan = RigPlan(dynamic=operating_points([(5000.0, 40.0)]))
-    truth = campaign_truth(VirtualRig(RigTruth.constant(K, C), plan, instruments), {})
+    instruments = vr.Instruments.like_paper(seed=5).with_errors(probe_gain=1.1)
+    plan = vr.RigPlan(dynamic=vr.operating_points([(5000.0, 40.0)]))
+    truth = campaign_truth(vr.VirtualRig(vr.RigTruth.constant(K, C), plan, instruments), {})
     point = truth["points"][0]
     np.testing.assert_allclose(point["K"], K)
     np.testing.assert_allclose(point["C"], C)

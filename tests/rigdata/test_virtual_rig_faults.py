@@ -8,20 +8,7 @@ import numpy as np
 import pytest
 
 import rigdata
-from rigdata.virtual_rig import (
-    CsvLayout,
-    DryTest,
-    Fault,
-    Hdf5Layout,
-    Instruments,
-    Noise,
-    RigPlan,
-    RigTruth,
-    VirtualRig,
-    VirtualRigError,
-    operating_points,
-    write_campaign,
-)
+from rigdata import virtual_rig as vr
 from rigdata.virtual_rig.faults import KINDS
 from tests.good_campaigns import CROSS_DAMPING as C
 from tests.good_campaigns import CROSS_STIFFNESS as K
@@ -30,19 +17,19 @@ from tpjb_ident.check.campaign import check_campaign
 FIRST, SECOND = "d-05000-25-01", "d-05000-25-02"
 
 
-def rig(*faults: Fault, noise: Noise | None = None, seconds: float = 2.0) -> VirtualRig:
-    plan = RigPlan(
-        dynamic=operating_points([(5000.0, 25.0)]),
+def rig(*faults: vr.Fault, noise: vr.Noise | None = None, seconds: float = 2.0) -> vr.VirtualRig:
+    plan = vr.RigPlan(
+        dynamic=vr.operating_points([(5000.0, 25.0)]),
         directions=(0.3, 1.5),
-        dry=(DryTest(2, levels=(500.0,)),),
+        dry=(vr.DryTest(2, levels=(500.0,)),),
         dynamic_seconds=seconds,
     )
-    return VirtualRig(
-        RigTruth.constant(K, C), plan, Instruments.like_paper(), noise or Noise.like_samples(), faults, seed=6
+    return vr.VirtualRig(
+        vr.RigTruth.constant(K, C), plan, vr.Instruments.like_paper(), noise or vr.Noise.like_samples(), faults, seed=6
     )
 
 
-def pair(*faults: Fault, run: str = FIRST, noise: Noise | None = None):
+def pair(*faults: vr.Fault, run: str = FIRST, noise: vr.Noise | None = None):
     """Columns with and without the faults."""
     return tuple(rig(*of, noise=noise).simulate(run).readings.columns for of in (faults, ()))
 
@@ -71,8 +58,8 @@ CHANNEL_FAULTS = {
 @pytest.mark.parametrize("kind", CHANNEL_FAULTS)
 def test_channel_faults_change_that_channel_of_that_run(kind):
     entries, expected = CHANNEL_FAULTS[kind]
-    fault = Fault(kind, FIRST, *entries)
-    noise = None if fault.place == "record" else Noise.none()  # a sensor's error is there before its noise
+    fault = vr.Fault(kind, FIRST, *entries)
+    noise = None if fault.place == "record" else vr.Noise.none()  # a sensor's error is there before its noise
     faulty, sound = pair(fault, noise=noise)
     changed = expected(sound)
     for name, values in sound.items():
@@ -91,45 +78,45 @@ def test_every_spoiling_fault_is_tested_here():
 
 
 def test_clipped_has_flat_tops_and_delayed_is_late():
-    faulty, sound = pair(Fault("clipped", FIRST, "L1H", value=0.5), noise=Noise.none())
+    faulty, sound = pair(vr.Fault("clipped", FIRST, "L1H", value=0.5), noise=vr.Noise.none())
     assert np.ptp(faulty["L1H"]) == pytest.approx(0.5 * np.ptp(sound["L1H"]))
     assert np.sum(faulty["L1H"] == faulty["L1H"].max()) > 500
-    faulty, sound = pair(Fault("delayed", FIRST, "X1*", value=0.004), noise=Noise.none())
+    faulty, sound = pair(vr.Fault("delayed", FIRST, "X1*", value=0.004), noise=vr.Noise.none())
     for name in ("X1A", "X1B"):
         np.testing.assert_allclose(faulty[name][4:], sound[name][:-4], rtol=1e-12)
 
 
 def test_missing_excitation_leaves_the_mean_and_the_noise():
-    faulty, sound = pair(Fault("missing_excitation", FIRST), noise=Noise.none())
+    faulty, sound = pair(vr.Fault("missing_excitation", FIRST), noise=vr.Noise.none())
     assert np.ptp(sound["L1H"]) > 0.4
     assert np.ptp(faulty["L1H"]) == 0.0
     np.testing.assert_allclose(faulty["L1V"][0], -5000 * 5e-4)
 
 
 def test_duplicate_run_is_the_other_record():
-    broken = rig(Fault("duplicate_run", SECOND, other=FIRST))
+    broken = rig(vr.Fault("duplicate_run", SECOND, other=FIRST))
     copied = broken.simulate(SECOND)
     assert (copied.run.id, copied.source) == (SECOND, FIRST)
     np.testing.assert_array_equal(copied.readings.columns["X1A"], rig().simulate(FIRST).readings.columns["X1A"])
-    crossed = rig(Fault("duplicate_run", SECOND, other=FIRST), Fault("duplicate_run", FIRST, other=SECOND))
+    crossed = rig(vr.Fault("duplicate_run", SECOND, other=FIRST), vr.Fault("duplicate_run", FIRST, other=SECOND))
     assert [crossed.simulate(run.id).source for run in crossed.runs()][:2] == [SECOND, FIRST]
 
 
 def test_time_gap_takes_rows_out_of_all_channels_and_time_jitter_keeps_the_order():
-    record = rig(Fault("time_gap", FIRST, start=0.7, length=0.2)).simulate(FIRST).readings
+    record = rig(vr.Fault("time_gap", FIRST, start=0.7, length=0.2)).simulate(FIRST).readings
     assert {len(v) for v in record.columns.values()} == {1800}
     assert np.max(np.diff(record.time)) == pytest.approx(0.201)
-    time = rig(Fault("time_jitter", FIRST, value=0.3)).simulate(FIRST).readings.time
+    time = rig(vr.Fault("time_jitter", FIRST, value=0.3)).simulate(FIRST).readings.time
     assert np.all(np.diff(time) > 0)
     assert np.std(time - np.arange(2000) / 1000) == pytest.approx(0.3e-3 * 0.85, rel=0.1)
 
 
 def test_wrong_notes_are_in_the_manifest_only(campaign_of):
     faults = (
-        Fault("wrong_pad", "p-2-up", value=4),
-        Fault("wrong_direction", FIRST, value=np.pi / 2),
-        Fault("wrong_frequency", SECOND, value=5.0),
-        Fault("wrong_load", SECOND, value=2.0),
+        vr.Fault("wrong_pad", "p-2-up", value=4),
+        vr.Fault("wrong_direction", FIRST, value=np.pi / 2),
+        vr.Fault("wrong_frequency", SECOND, value=5.0),
+        vr.Fault("wrong_load", SECOND, value=2.0),
     )
     wrong, right = (rigdata.load_campaign(campaign_of(r)) for r in (rig(*faults, seconds=0.5), rig(seconds=0.5)))
     assert wrong.run("p-2-up").pad == 4
@@ -152,16 +139,16 @@ def test_wrong_notes_are_in_the_manifest_only(campaign_of):
     ],
 )
 def test_the_reader_reports_file_faults_of_that_run_only(campaign_of, layout, kind, channel):
-    problems = check_campaign(campaign_of(rig(Fault(kind, FIRST, channel), seconds=0.8), layout))
+    problems = check_campaign(campaign_of(rig(vr.Fault(kind, FIRST, channel), seconds=0.8), layout))
     assert {p.run for p in problems} == {FIRST}
 
 
-LAYOUTS = [Hdf5Layout(), *(CsvLayout(missing=m, delimiter=";") for m in ("", "NaN", "-", "#N/A"))]
+LAYOUTS = [vr.Hdf5Layout(), *(vr.CsvLayout(missing=m, delimiter=";") for m in ("", "NaN", "-", "#N/A"))]
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_missing_values_are_nan_in_every_layout(campaign_of, layout):
-    fault = Fault("nan_gap", FIRST, "X1A", start=0.5, length=0.1)
+    fault = vr.Fault("nan_gap", FIRST, "X1A", start=0.5, length=0.1)
     values = rigdata.load_campaign(campaign_of(rig(fault, seconds=0.8), layout)).run(FIRST).record("X1A").values
     assert np.flatnonzero(np.isnan(values)).tolist() == list(range(500, 600))
 
@@ -183,18 +170,18 @@ def test_missing_values_are_nan_in_every_layout(campaign_of, layout):
 )
 def test_faults_that_are_none_or_that_a_layout_cannot_show_are_refused(tmp_path, fault, layout, says):
     if layout:
-        made = rig(Fault(**{"run": FIRST, **fault}))
-        with pytest.raises(VirtualRigError, match=says):
-            write_campaign(tmp_path / "none", made, layout)
+        made = rig(vr.Fault(**{"run": FIRST, **fault}))
+        with pytest.raises(vr.VirtualRigError, match=says):
+            vr.write_campaign(tmp_path / "none", made, layout)
     else:
-        with pytest.raises(VirtualRigError, match=says):
-            rig(Fault(**{"run": FIRST, **fault}))
+        with pytest.raises(vr.VirtualRigError, match=says):
+            rig(vr.Fault(**{"run": FIRST, **fault}))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_truth_tells_all_faults(tmp_path):
-    fault = Fault("dead", FIRST, "X1A")
-    truth = write_campaign(tmp_path / "c.h5", rig(fault))
+    fault = vr.Fault("dead", FIRST, "X1A")
+    truth = vr.write_campaign(tmp_path / "c.h5", rig(fault))
     assert truth["faults"] == [{"kind": "dead", "run": FIRST, "channel": "X1A", "start": 0.0}]
     assert all(text for _, _, text in KINDS.values())
     assert replace(fault, run="*").affects(SECOND)

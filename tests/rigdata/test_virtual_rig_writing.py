@@ -13,38 +13,22 @@ import numpy as np
 import pytest
 
 import rigdata
-from rigdata.virtual_rig import (
-    ChannelNoise,
-    ClearanceSweep,
-    CsvLayout,
-    DryTest,
-    Glitches,
-    Instruments,
-    Noise,
-    RigPlan,
-    RigTruth,
-    Sensor,
-    VirtualRig,
-    VirtualRigError,
-    locus_points,
-    operating_points,
-    write_campaign,
-)
+from rigdata import virtual_rig as vr
 
 SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
-TRUTH = RigTruth.constant(np.diag([2e8, 4e8]), np.diag([4e5, 6e5]))
+TRUTH = vr.RigTruth.constant(np.diag([2e8, 4e8]), np.diag([4e5, 6e5]))
 
 
-def rig(seed: int = 1, **changes) -> VirtualRig:
-    plan = RigPlan(
-        dynamic=operating_points([(2500.0, 25.0)]),
+def rig(seed: int = 1, **changes) -> vr.VirtualRig:
+    plan = vr.RigPlan(
+        dynamic=vr.operating_points([(2500.0, 25.0)]),
         directions=(0.0, 1.5),
-        locus=locus_points(2),
-        dry=(DryTest(1, levels=(500.0,)),),
+        locus=vr.locus_points(2),
+        dry=(vr.DryTest(1, levels=(500.0,)),),
         dynamic_seconds=0.5,
         locus_seconds=0.5,
     )
-    return replace(VirtualRig(TRUTH, plan, Instruments.like_paper(seed=seed), seed=seed), **changes)
+    return replace(vr.VirtualRig(TRUTH, plan, vr.Instruments.like_paper(seed=seed), seed=seed), **changes)
 
 
 def digest(path: Path) -> dict[str, str]:
@@ -55,7 +39,7 @@ def digest(path: Path) -> dict[str, str]:
 @pytest.mark.parametrize("layout", ["hdf5", "csv-german"])
 def test_same_seed_same_bytes_other_seed_other_bytes(tmp_path, layout):
     for name, seed in (("a", 7), ("b", 7), ("c", 8)):
-        write_campaign(tmp_path / name, rig(seed), layout)
+        vr.write_campaign(tmp_path / name, rig(seed), layout)
     assert digest(tmp_path / "a") == digest(tmp_path / "b")
     other = digest(tmp_path / "c")
     assert all(other[name] != code for name, code in digest(tmp_path / "a").items() if "run" in name or name == ".")
@@ -71,15 +55,15 @@ def test_both_forms_hold_the_same_readings(campaign_of):
 
 def test_an_existing_target_is_never_replaced(tmp_path):
     for layout, name in (("hdf5", "c.h5"), ("csv", "c")):
-        write_campaign(tmp_path / name, rig(1), layout)
+        vr.write_campaign(tmp_path / name, rig(1), layout)
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "thesis.tex").write_text("mine")
     (tmp_path / "link").symlink_to(tmp_path / "c")
     before = digest(tmp_path / "c"), digest(tmp_path / "c.h5")
     for name, layout in (("notes.txt", "hdf5"), ("folder", "csv"), ("c", "csv"), ("c.h5", "hdf5"), ("link", "csv")):
-        with pytest.raises(VirtualRigError, match="exists"):
-            write_campaign(tmp_path / name, rig(2), layout)
+        with pytest.raises(vr.VirtualRigError, match="exists"):
+            vr.write_campaign(tmp_path / name, rig(2), layout)
     assert (digest(tmp_path / "c"), digest(tmp_path / "c.h5")) == before
     assert (tmp_path / "folder" / "thesis.tex").read_text() == "mine"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["c", "c.h5", "folder", "link", "notes.txt"]
@@ -91,16 +75,16 @@ def test_a_failure_on_the_way_leaves_nothing_behind(tmp_path, layout):
         return np.full((2, 2), np.nan) if point.static_load_direction > -1.0 else np.diag([2e8, 4e8])
 
     truth = replace(TRUTH, stiffness=broken)
-    with pytest.raises(VirtualRigError, match=r"stiffness\(.*finite"):
-        write_campaign(tmp_path / "c", rig(truth=truth), layout)
+    with pytest.raises(vr.VirtualRigError, match=r"stiffness\(.*finite"):
+        vr.write_campaign(tmp_path / "c", rig(truth=truth), layout)
     assert list(tmp_path.iterdir()) == []
-    with pytest.raises(VirtualRigError, match="not a folder"):
-        write_campaign(tmp_path / "no" / "c", rig(), layout)
+    with pytest.raises(vr.VirtualRigError, match="not a folder"):
+        vr.write_campaign(tmp_path / "no" / "c", rig(), layout)
 
 
 def test_the_truth_is_not_in_the_campaign(tmp_path):
-    hidden = rig(instruments=Instruments.like_paper(seed=1).with_errors(probe_gain=1.0437, mass_error=7.31))
-    truth = write_campaign(tmp_path / "c", hidden, "csv")
+    hidden = rig(instruments=vr.Instruments.like_paper(seed=1).with_errors(probe_gain=1.0437, mass_error=7.31))
+    truth = vr.write_campaign(tmp_path / "c", hidden, "csv")
     text = (tmp_path / "c" / "campaign.toml").read_text()
     assert "1.0437" not in text
     assert tomllib.loads(text)["housing"] == {"mass": "30 kg"}
@@ -116,8 +100,8 @@ def test_the_truth_is_not_in_the_campaign(tmp_path):
 
 def test_a_rigid_rig_has_a_truth_file_too(tmp_path):
     rigid = replace(TRUTH, pivot_deflection=lambda pad, load: 0 * load)
-    cells = replace(Instruments.like_paper(), cell_stiffness=(float("inf"), 6e8))
-    write_campaign(tmp_path / "c.h5", rig(truth=rigid, instruments=cells)).write(tmp_path / "truth.json")
+    cells = replace(vr.Instruments.like_paper(), cell_stiffness=(float("inf"), 6e8))
+    vr.write_campaign(tmp_path / "c.h5", rig(truth=rigid, instruments=cells)).write(tmp_path / "truth.json")
     stored = json.loads((tmp_path / "truth.json").read_text())
     assert stored["cell_stiffness_N_per_m"] == [None, 6e8]
     assert set(stored["pivot_curves"][0]["stiffness_N_per_m"]) == {None}
@@ -135,67 +119,72 @@ def test_float32_holds_16_bit_readings_exactly(campaign_of):
         assert narrow["runs/d-02500-25-01"].attrs["sample_rate_hz"] == 1000.0
 
 
-SINGULAR = RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=lambda point: np.zeros(2))
-PROBE = Sensor.probe("A", 0.0)
+SINGULAR = vr.RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=lambda point: np.zeros(2))
+PROBE = vr.Sensor.probe("A", 0.0)
 
 
 def swept(angles: tuple[float, ...]) -> object:
-    truth = RigTruth.constant(np.eye(2) * 1e8, np.eye(2), pivot_angles=angles, clearance=(8e-5,) * 3)
-    return VirtualRig(truth, RigPlan(clearance=(ClearanceSweep(),)), Instruments.like_paper(3)).simulate("c-1")
+    truth = vr.RigTruth.constant(np.eye(2) * 1e8, np.eye(2), pivot_angles=angles, clearance=(8e-5,) * 3)
+    return vr.VirtualRig(truth, vr.RigPlan(clearance=(vr.ClearanceSweep(),)), vr.Instruments.like_paper(3)).simulate(
+        "c-1"
+    )
 
 
 def four_pads_five_thermometers() -> object:
-    truth = RigTruth.constant(np.eye(2) * 1e8, np.eye(2), pivot_angles=(0.0, 1.5, 3.0, 4.5))
-    return VirtualRig(truth, RigPlan(locus=locus_points(1)), Instruments.like_paper(5))
+    truth = vr.RigTruth.constant(np.eye(2) * 1e8, np.eye(2), pivot_angles=(0.0, 1.5, 3.0, 4.5))
+    return vr.VirtualRig(truth, vr.RigPlan(locus=vr.locus_points(1)), vr.Instruments.like_paper(5))
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: CsvLayout(delimiter=",", decimal=","), "must differ"),
-        (lambda: write_campaign("x", rig(), "tdms"), "no layout 'tdms'"),
-        (lambda: RigPlan().runs(TRUTH.pivot_angles), "empty"),
-        (lambda: RigPlan(dry=(DryTest(6),)).runs(TRUTH.pivot_angles), "pads 1 to 5"),
-        (lambda: RigPlan(dry=(DryTest(1), DryTest(1, ramp=1.0))).runs(TRUTH.pivot_angles), "the id 'p-1-up'"),
-        (lambda: RigTruth.constant(np.eye(2), np.eye(2), clearance=(1e-4,)), "one clearance per pad"),
+        (lambda: vr.CsvLayout(delimiter=",", decimal=","), "must differ"),
+        (lambda: vr.write_campaign("x", rig(), "tdms"), "no layout 'tdms'"),
+        (lambda: vr.RigPlan().runs(TRUTH.pivot_angles), "empty"),
+        (lambda: vr.RigPlan(dry=(vr.DryTest(6),)).runs(TRUTH.pivot_angles), "pads 1 to 5"),
+        (lambda: vr.RigPlan(dry=(vr.DryTest(1), vr.DryTest(1, ramp=1.0))).runs(TRUTH.pivot_angles), "the id 'p-1-up'"),
+        (lambda: vr.RigTruth.constant(np.eye(2), np.eye(2), clearance=(1e-4,)), "one clearance per pad"),
         (lambda: rig(truth=SINGULAR).simulate("d-02500-25-01"), "singular"),
-        (lambda: DryTest(1, levels=(500.0, 400.0)), "levels must rise"),
-        (lambda: DryTest(1, hold=(1.0, 2.0)), "2 values for 10 levels"),
-        (lambda: DryTest(1, ramp=0.0), "ramp must be positive"),
-        (lambda: DryTest(1, branch="sideways"), "branch must be"),
-        (lambda: RigPlan(dynamic_rate=0.0), "must be positive"),
-        (lambda: RigPlan(dynamic=operating_points([(5000.0, 600.0)])).runs(()), "600 Hz cannot be sampled at 1000 Hz"),
-        (lambda: RigPlan(dynamic=operating_points([(5000.0, 0.0)])).runs(()), "0 Hz cannot be sampled"),
-        (lambda: RigPlan(dynamic=operating_points([(0.0, 25.0)])).runs(()), "positive static load"),
-        (lambda: Noise.like_samples().scaled(-1.0), "not negative"),
-        (lambda: ChannelNoise(white=float("nan")), "finite"),
-        (lambda: replace(Noise.none(), bits=64), "between 4 and 32 bits"),
-        (lambda: Glitches(share=2.0), "between 0 and 1"),
-        (lambda: ClearanceSweep(push=0.0), "must be positive"),
+        (lambda: vr.DryTest(1, levels=(500.0, 400.0)), "levels must rise"),
+        (lambda: vr.DryTest(1, hold=(1.0, 2.0)), "2 values for 10 levels"),
+        (lambda: vr.DryTest(1, ramp=0.0), "ramp must be positive"),
+        (lambda: vr.DryTest(1, branch="sideways"), "branch must be"),
+        (lambda: vr.RigPlan(dynamic_rate=0.0), "must be positive"),
+        (
+            lambda: vr.RigPlan(dynamic=vr.operating_points([(5000.0, 600.0)])).runs(()),
+            "600 Hz cannot be sampled at 1000 Hz",
+        ),
+        (lambda: vr.RigPlan(dynamic=vr.operating_points([(5000.0, 0.0)])).runs(()), "0 Hz cannot be sampled"),
+        (lambda: vr.RigPlan(dynamic=vr.operating_points([(0.0, 25.0)])).runs(()), "positive static load"),
+        (lambda: vr.Noise.like_samples().scaled(-1.0), "not negative"),
+        (lambda: vr.ChannelNoise(white=float("nan")), "finite"),
+        (lambda: replace(vr.Noise.none(), bits=64), "between 4 and 32 bits"),
+        (lambda: vr.Glitches(share=2.0), "between 0 and 1"),
+        (lambda: vr.ClearanceSweep(push=0.0), "must be positive"),
         (lambda: swept((0.0, 1.0, 2.0)), "fall out"),
         (lambda: swept((-math.pi / 2, math.pi / 2, math.pi / 2)), "fall out"),
         (
             lambda: rig(truth=replace(TRUTH, pivot_deflection=lambda pad, load: 1e-6)).simulate("p-1-up"),
             r"pivot_deflection\(1, load\) must be finite with shape",
         ),
-        (lambda: Instruments((PROBE, PROBE)), "must differ"),
-        (lambda: Instruments((PROBE,)), "in pairs"),
-        (lambda: Instruments.like_paper().named("B"), "no channel 'B'"),
+        (lambda: vr.Instruments((PROBE, PROBE)), "must differ"),
+        (lambda: vr.Instruments((PROBE,)), "in pairs"),
+        (lambda: vr.Instruments.like_paper().named("B"), "no channel 'B'"),
         (four_pads_five_thermometers, "pads 1 to 4"),
     ],
 )
 def test_impossible_numbers_are_refused_where_they_are_given(make, message):
-    with pytest.raises(VirtualRigError, match=message):
+    with pytest.raises(vr.VirtualRigError, match=message):
         make()
 
 
 def test_ids_tell_speeds_and_load_directions_apart():
     points = (
-        *operating_points([(2500.0, 25.0)]),
-        *operating_points([(2500.0, 25.0)], speed=200.0),
-        *operating_points([(2500.0, 25.0)], direction=0.0),
+        *vr.operating_points([(2500.0, 25.0)]),
+        *vr.operating_points([(2500.0, 25.0)], speed=200.0),
+        *vr.operating_points([(2500.0, 25.0)], direction=0.0),
     )
-    plan = RigPlan(dynamic=points, directions=(0.0,), repeats=2)
+    plan = vr.RigPlan(dynamic=points, directions=(0.0,), repeats=2)
     ids = [run.id for run in plan.runs(TRUTH.pivot_angles)]
     assert len(set(ids)) == 6
     assert ids[0] == "d-02500-w-90-n22-25-01-r1"
@@ -206,11 +195,11 @@ def test_manifest_has_the_shape_of_the_samples(tmp_path):
     if not SAMPLES.is_dir():
         pytest.skip("no samples beside the checkout")
     sample = tomllib.loads((SAMPLES / "rocker-baseline" / "campaign.toml").read_text())
-    ours = VirtualRig(TRUTH, RigPlan.short(), Instruments.like_paper(), seed=1)
+    ours = vr.VirtualRig(TRUTH, vr.RigPlan.short(), vr.Instruments.like_paper(), seed=1)
     brief = {"dynamic_seconds": 0.01, "locus_seconds": 0.01}
-    dry = tuple(DryTest(pad, levels=(500.0,), hold=0.01) for pad in range(1, 6))
-    short = replace(ours, plan=replace(ours.plan, **brief, dry=dry, clearance=(ClearanceSweep(seconds=0.1),)))
-    write_campaign(tmp_path / "c", short, "csv-german")
+    dry = tuple(vr.DryTest(pad, levels=(500.0,), hold=0.01) for pad in range(1, 6))
+    short = replace(ours, plan=replace(ours.plan, **brief, dry=dry, clearance=(vr.ClearanceSweep(seconds=0.1),)))
+    vr.write_campaign(tmp_path / "c", short, "csv-german")
     made = tomllib.loads((tmp_path / "c" / "campaign.toml").read_text())
     for manifest in (sample, made):
         for key in ("id", "bearing", "description"):
@@ -224,8 +213,8 @@ def test_manifest_has_the_shape_of_the_samples(tmp_path):
 def test_csv_has_the_shape_of_the_samples(tmp_path):
     if not SAMPLES.is_dir():
         pytest.skip("no samples beside the checkout")
-    plan = RigPlan(dynamic=operating_points([(2500.0, 25.0)]), directions=(0.0,))
-    write_campaign(tmp_path / "c", rig(plan=plan), "csv-german")
+    plan = vr.RigPlan(dynamic=vr.operating_points([(2500.0, 25.0)]), directions=(0.0,))
+    vr.write_campaign(tmp_path / "c", rig(plan=plan), "csv-german")
     sample = (SAMPLES / "rocker-baseline" / "runs" / "d-02500-25-01.csv").read_bytes()
     made = (tmp_path / "c" / "runs" / "d-02500-25-01.csv").read_bytes()
     assert sample.splitlines()[:7] == made.splitlines()[:7]
@@ -245,9 +234,9 @@ def test_noise_is_of_the_samples_kind_and_size(tmp_path):
     path = SAMPLES / "spherical-baseline.h5"
     if not path.is_file():
         pytest.skip("no samples beside the checkout")
-    noise = replace(Noise.like_samples(), bits=16)
-    ours = VirtualRig(TRUTH, RigPlan(locus=locus_points(20)), Instruments.like_paper(), noise, seed=3)
-    write_campaign(tmp_path / "c.h5", ours)
+    noise = replace(vr.Noise.like_samples(), bits=16)
+    ours = vr.VirtualRig(TRUTH, vr.RigPlan(locus=vr.locus_points(20)), vr.Instruments.like_paper(), noise, seed=3)
+    vr.write_campaign(tmp_path / "c.h5", ours)
     found = []
     for file in (path, tmp_path / "c.h5"):
         with h5py.File(file) as handle:
