@@ -23,7 +23,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -243,19 +243,23 @@ def trial(bench: Bench, command: str, reference: Reference, rng: random.Random) 
     return f"{command}: {'killed' if code == -9 else 'had ended'}, results {state}", wrong
 
 
-def run(kills: int, seed: int, commands: tuple[str, ...]) -> tuple[Counter[str], Counter[str]]:
-    """Outcomes and faults of `kills` trials."""
+#: Outcomes, each with what is wrong, of a trial of a command, by its number.
+Trial = Callable[[Bench, str, Reference, int], Iterable[tuple[str, list[str]]]]
+
+
+def run(trial: Trial, trials: int, commands: Sequence[str], scratch: str | None = None) -> list[Counter[str]]:
+    """Outcomes and faults of so many trials."""
     outcomes: Counter[str] = Counter()
     wrong: Counter[str] = Counter()
-    with tempfile.TemporaryDirectory() as scratch:
-        bench = make_bench(Path(scratch), commands)
+    with tempfile.TemporaryDirectory(dir=scratch) as folder:
+        bench = make_bench(Path(folder), tuple(commands))
         references = {command: bench.reference(command) for command in commands}
-        for number in range(kills):
+        for number in range(trials):
             command = commands[number % len(commands)]
-            outcome, found = trial(bench, command, references[command], random.Random(f"{seed}-{number}"))
-            outcomes[outcome] += 1
-            wrong.update(f"{command}: {text}" for text in found)
-    return outcomes, wrong
+            for outcome, faults in trial(bench, command, references[command], number):
+                outcomes[outcome] += 1
+                wrong.update(f"{command}: {text}" for text in faults)
+    return [outcomes, wrong]
 
 
 def tell(section: str, outcomes: Counter[str], wrong: Counter[str]) -> None:
@@ -271,12 +275,14 @@ def tell(section: str, outcomes: Counter[str], wrong: Counter[str]) -> None:
 
 
 def main() -> None:
-    parser = study_parser(__doc__)
-    parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=1)
+    parser = study_parser(__doc__, kills=200, seed=1)
     parser.add_argument("--commands", nargs="+", choices=(*COMMANDS, *_LONG), default=COMMANDS)
     given = parser.parse_args()
-    tell("kills" if given.write else "", *run(given.kills, given.seed, tuple(given.commands)))
+
+    def kill(bench: Bench, command: str, reference: Reference, number: int) -> list[tuple[str, list[str]]]:
+        return [trial(bench, command, reference, random.Random(f"{given.seed}-{number}"))]
+
+    tell("kills" if given.write else "", *run(kill, given.kills, given.commands))
 
 
 if __name__ == "__main__":

@@ -17,10 +17,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from tests.hostile.kills import (
@@ -28,8 +26,8 @@ from tests.hostile.kills import (
     Bench,
     Reference,
     faults_after_rerun,
-    make_bench,
     prepare,
+    run,
     start,
     state_and_faults,
     tell,
@@ -61,17 +59,8 @@ def new_image(path: Path) -> Path:
     return path
 
 
-@dataclass(frozen=True)
-class Trial:
-    """One command on an image of its own, and the state of the image before each of its steps."""
-
-    command: str
-    old: dict[str, str]
-    cuts: tuple[Path, ...]
-
-
-def trial(bench: Bench, command: str, former: bool, place: Path) -> Trial:
-    """Run a command to its end; an image per step on the disk, the last one of after the end."""
+def cuts(bench: Bench, command: str, former: bool, place: Path) -> tuple[dict[str, str], list[Path]]:
+    """Run a command to its end: the former tables, and an image before each step on the disk and after the end."""
     image, point = new_image(place / "image"), place / "disk"
 
     def cut(step: int) -> None:
@@ -80,61 +69,48 @@ def trial(bench: Bench, command: str, former: bool, place: Path) -> Trial:
     with mounted(image, point):
         old = prepare(bench, point / "out", command, former)
         os.sync()  # the former results are long on the disk
-        child = start(bench.words(command, point / "out"), place / "log", at_step=cut)
-        wait(child)
+        wait(start(bench.words(command, point / "out"), place / "log", at_step=cut))
         cut(9999)
-    return Trial(command, old, tuple(sorted(place.glob("cut-*"))))
+    return old, sorted(place.glob("cut-*"))
 
 
-def judged(bench: Bench, tried: Trial, reference: Reference, place: Path, rerun: set[int]) -> Iterator[tuple[str, str]]:
-    """For every cut: what is there, and what is wrong with it (nothing: empty)."""
-    for number, image in enumerate(tried.cuts):
-        last = number == len(tried.cuts) - 1
+def trial(
+    bench: Bench, command: str, reference: Reference, former: bool, rng: random.Random, reruns: int
+) -> Iterator[tuple[str, list[str]]]:
+    """For every cut: what is there, and what is wrong with it; some are given the command once more."""
+    place = Path(tempfile.mkdtemp(dir=bench.folder))
+    old, images = cuts(bench, command, former, place)
+    rerun = set(rng.sample(range(len(images)), reruns))
+    for number, image in enumerate(images):
+        last = image is images[-1]
         with mounted(image, place / "after") as folder:
             out = folder / "out"
-            state, wrong = state_and_faults(out, tried.old, reference.tables)
+            state, wrong = state_and_faults(out, old, reference.tables)
             if last and (state != "new" or not (out / "run.json").exists()):
                 wrong.append(f"the command had ended, and its results are {state}")
             if number in rerun:
-                code = wait(start(bench.words(tried.command, out), place / "log"))
+                code = wait(start(bench.words(command, out), place / "log"))
                 wrong += faults_after_rerun(out, code, reference)
-        when = "after the end" if last else "on the way"
-        yield f"{tried.command}: cut {when}, results {state}", "; ".join(wrong)
+        wrong += ["the raw data has changed"] * (last and bench.raw_data_changed())
+        yield f"{command}: cut {'after the end' if last else 'on the way'}, results {state}", wrong
         image.unlink()
-
-
-def run(trials: int, seed: int, commands: tuple[str, ...], reruns: int) -> tuple[Counter[str], Counter[str]]:
-    """States and faults over all cuts of `trials` commands."""
-    outcomes: Counter[str] = Counter()
-    wrong: Counter[str] = Counter()
-    with tempfile.TemporaryDirectory(dir="/dev/shm") as scratch:
-        bench = make_bench(Path(scratch), commands)
-        references = {command: bench.reference(command) for command in commands}
-        for number in range(trials):
-            command = commands[number % len(commands)]
-            place = Path(tempfile.mkdtemp(dir=scratch))
-            tried = trial(bench, command, number // len(commands) % 2 == 1, place)
-            chosen = set(random.Random(f"{seed}-{number}").sample(range(len(tried.cuts)), reruns))
-            for outcome, fault in judged(bench, tried, references[command], place, chosen):
-                outcomes[outcome] += 1
-                if fault:
-                    wrong[f"{command}: {fault}"] += 1
-            wrong.update({f"{command}: the raw data has changed": 1} if bench.raw_data_changed() else {})
-            shutil.rmtree(place)
-    return outcomes, wrong
+    shutil.rmtree(place)
 
 
 def main() -> None:
-    parser = study_parser(__doc__)
-    parser.add_argument("--trials", type=int, default=6)
-    parser.add_argument("--seed", type=int, default=1)
+    parser = study_parser(__doc__, trials=6, seed=1)
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=COMMANDS)
     parser.add_argument("--reruns", type=int, default=3, help="cuts per trial that are given the command once more")
     given = parser.parse_args()
     if "TPJB_IN_NAMESPACE" not in os.environ:  # mounts that nobody else sees, and that go with this process
         words = ["unshare", "-m", sys.executable, "-m", "tests.hostile.power_cuts", *sys.argv[1:]]
         os.execvpe(words[0], words, {**os.environ, "TPJB_IN_NAMESPACE": "1"})
-    tell("power-cuts" if given.write else "", *run(given.trials, given.seed, tuple(given.commands), given.reruns))
+
+    def cut(bench: Bench, command: str, reference: Reference, number: int) -> Iterator[tuple[str, list[str]]]:
+        former, rng = number // len(given.commands) % 2 == 1, random.Random(f"{given.seed}-{number}")
+        return trial(bench, command, reference, former, rng, given.reruns)
+
+    tell("power-cuts" if given.write else "", *run(cut, given.trials, given.commands, "/dev/shm"))
 
 
 if __name__ == "__main__":
