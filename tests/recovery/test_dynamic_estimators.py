@@ -16,40 +16,32 @@ from tpjb_ident.estimators.estimate import estimate_dynamic_stiffness
 SEED = 61
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("case", "rmse"),
-    [
-        (Case("forcesys", 0.4), 1.1),
-        (Case("force", 0.3), 1.0),
-        (Case("forcesys", 0.3), 1.0),
-        (Case("lev", 0.4), 1.1),
-        (Case("gain", 0.2), 1.1),
-    ],
-    ids=lambda value: value.name if isinstance(value, Case) else str(value),
-)
-def test_default_method_stands_every_fault(case: Case, rmse: float):
-    n = 20
-    result = score(case, "mm-eiv", n, SEED)
-    assert result.rmse <= rmse * (1 + 2.5 / np.sqrt(2 * n))
-    assert result.worst < 4 * rmse  # not one replicate breaks down
-    assert 88 <= result.coverage <= 100
+#: Not one replicate of any breaks down. Of the second of many replicates an RMSE of 1.0 without a scatter of the runs,
+#: which is asked for here and costs 1.5 % of efficiency.
+CASES = [
+    (Case("forcesys", 0.4), 20, 1.1, 2.5, np.inf, (88, 100)),
+    (Case("force", 0.3), 20, 1.0, 2.5, np.inf, (88, 100)),
+    (Case("forcesys", 0.3), 20, 1.0, 2.5, np.inf, (88, 100)),
+    (Case("lev", 0.4), 20, 1.1, 2.5, np.inf, (88, 100)),
+    (Case("gain", 0.2), 20, 1.1, 2.5, np.inf, (88, 100)),
+    (Case(), 100, 1.0, 1.0, 0.3, (92, 99)),
+    (Case("lev", 0.3), 100, 1.02, 1.0, 0.3, (92, 99)),
+    (Case(relx=0.2), 100, 3.5, 1.0, 0.6, (92, 99)),
+]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("case", "rmse", "bias"),
-    [(Case(), 1.0, 0.3), (Case("lev", 0.3), 1.02, 0.3), (Case(relx=0.2), 3.5, 0.6)],
+    ("case", "n", "rmse", "deviations", "bias", "coverage"),
+    CASES,
     ids=lambda value: value.name if isinstance(value, Case) else str(value),
 )
-def test_targets_of_error_bias_and_coverage(case: Case, rmse: float, bias: float):
-    """Of the second case 1.0 without a scatter of the runs, which is asked for here and costs 1.5 % of efficiency."""
-    n = 100
+def test_default_method_keeps_its_targets_of_error_bias_and_coverage(case, n, rmse, deviations, bias, coverage):
     result = score(case, "mm-eiv", n, SEED)
-    assert result.rmse <= rmse * (1 + 1 / np.sqrt(2 * n))
+    assert result.rmse <= rmse * (1 + deviations / np.sqrt(2 * n))
     assert result.worst < 4 * rmse
     assert np.abs(result.bias).max() <= bias
-    assert 92 <= result.coverage <= 99
+    assert coverage[0] <= result.coverage <= coverage[1]
 
 
 @pytest.mark.parametrize("directions", first_quick(3, 4, 5, 8))

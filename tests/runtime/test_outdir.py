@@ -12,57 +12,44 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import READY, former_runs, output_folder
 
 
-def fill(target, command, names, inputs=()):
+def fill(target, command, names, inputs=(), error=None):
     with output_folder(target, command, inputs) as folder:
         for name in names:
             (folder / name).parent.mkdir(exist_ok=True)
             (folder / name).write_text(command)
+        if error is not None:
+            raise error
         write_record(folder, target, command, {"a": 1}, {"in.h5": "0" * 64})
-
-
-def fill_half(target, error):
-    with output_folder(target, "pivot") as folder:
-        (folder / "a.csv").write_text("new")
-        raise error
 
 
 def names_in(folder):
     return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
 
 
-def test_a_new_folder_appears_whole(tmp_path):
-    fill(tmp_path / "deep" / "out", "pivot", ["a.csv", "figures/b.svg"])
-    assert names_in(tmp_path / "deep" / "out") == ["a.csv", "figures/b.svg", "run.json"]
-    assert [p.name for p in (tmp_path / "deep").iterdir()] == ["out"]
-
-
 def test_an_error_leaves_nothing_or_the_former_results(tmp_path):
     with pytest.raises(RuntimeError):
-        fill_half(tmp_path / "out", RuntimeError)
+        fill(tmp_path / "out", "pivot", ["a.csv"], error=RuntimeError)
     assert list(tmp_path.iterdir()) == []
     fill(tmp_path / "out", "pivot", ["a.csv"])
     with pytest.raises(KeyboardInterrupt):
-        fill_half(tmp_path / "out", KeyboardInterrupt)
+        fill(tmp_path / "out", "identify", ["a.csv"], error=KeyboardInterrupt)
     assert (tmp_path / "out" / "a.csv").read_text() == "pivot"
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
-def test_commands_share_a_folder_and_its_record(tmp_path):
-    fill(tmp_path / "out", "pivot", ["pivots.toml"])
-    fill(tmp_path / "out", "identify", ["coefficients.csv"])
-    data = json.loads((tmp_path / "out" / "run.json").read_text())
+def test_commands_share_a_folder_and_its_record_and_drop_what_they_no_longer_make(tmp_path):
+    out = tmp_path / "deep" / "out"
+    fill(out, "pivot", ["a.csv", "figures/old.svg"])
+    assert names_in(tmp_path) == ["deep/out/a.csv", "deep/out/figures/old.svg", "deep/out/run.json"]
+    fill(out, "identify", ["coefficients.csv"])
+    fill(out, "pivot", ["a.csv"])
+    assert names_in(tmp_path) == [f"deep/out/{name}" for name in ("a.csv", "coefficients.csv", "run.json")]
+    data = json.loads((out / "run.json").read_text())
     assert data["schema"] == "tpjb-run/2"
     assert set(data["commands"]) == {"pivot", "identify"}
-    assert data["commands"]["pivot"]["outputs"] == ["pivots.toml"]
+    assert data["commands"]["pivot"]["outputs"] == ["a.csv"]
     assert data["commands"]["identify"]["inputs_sha256"] == {"in.h5": "0" * 64}
     assert data["commands"]["identify"]["versions"]["numpy"]
-
-
-def test_a_second_run_replaces_and_drops_what_it_no_longer_makes(tmp_path):
-    fill(tmp_path / "out", "compare", ["a.csv", "figures/old.svg"])
-    fill(tmp_path / "out", "identify", ["keep.csv"])
-    fill(tmp_path / "out", "compare", ["a.csv"])
-    assert names_in(tmp_path / "out") == ["a.csv", "keep.csv", "run.json"]
 
 
 def test_files_that_are_not_ours_are_not_replaced_and_stay(tmp_path):
@@ -140,27 +127,19 @@ def test_what_a_kill_left_half_moved_is_finished_by_the_next_command(tmp_path):
     assert (tmp_path / "victim.txt").exists()
 
 
-def test_a_folder_that_a_killed_run_left_beside_is_cleared_and_a_living_one_is_not(tmp_path):
-    dead = tmp_path / ".out.part-dead"
+def test_a_folder_that_a_killed_run_left_beside_is_cleared_and_a_living_one_stands_in_the_record(tmp_path):
+    dead, out = tmp_path / ".out.part-dead", tmp_path / "out"
     dead.mkdir()
     (dead / "half.csv").write_text("x")
-    with output_folder(tmp_path / "out", "pivot") as living:
+    with output_folder(out, "pivot") as living:
         assert not dead.exists()
-        fill(tmp_path / "out", "identify", ["a.csv"])
+        fill(out, "predict", ["p.csv"])
         assert living.exists()
         (living / "b.csv").write_text("b")
-        write_record(living, tmp_path / "out", "pivot", {}, {})
-    assert names_in(tmp_path) == ["out/a.csv", "out/b.csv", "out/run.json"]
-
-
-def test_two_commands_at_once_both_stand_in_the_record(tmp_path):
-    target = tmp_path / "out"
-    fill(target, "predict", ["p.csv"])
-    with output_folder(target, "pivot") as folder:
-        (folder / "b.csv").write_text("b")
-        write_record(folder, target, "pivot", {}, {})
-        fill(target, "identify", ["a.csv"])  # begins and ends between the other's record and its end
-    assert set(former_runs(target)) == {"predict", "pivot", "identify"}
+        write_record(living, out, "pivot", {}, {})
+        fill(out, "identify", ["a.csv"])  # begins and ends between the other's record and its end
+    assert names_in(tmp_path) == ["out/a.csv", "out/b.csv", "out/p.csv", "out/run.json"]
+    assert set(former_runs(out)) == {"predict", "pivot", "identify"}
 
 
 def test_every_output_is_recorded_with_its_fingerprint_and_where_the_inputs_lie(tmp_path):

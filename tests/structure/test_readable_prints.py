@@ -11,36 +11,36 @@ import tpjb_ident as ti
 from model.bearing_file import load_bearing
 from model.predict import predict
 from rigdata import OperatingPoint
+from tests.good_campaigns import BEARINGS
 from tests.report.plot_cases import curve, locus, polygon
 
-
-def test_bearing_and_pad(rocker_file):
-    bearing = load_bearing(rocker_file)
-    assert str(bearing) == (
-        "Rocker-backed five-pad bearing: 5 pads, 99.86 x 69.6 mm, Cb 80 um, preload 0.385 (pad #1), rocker pivots, "
-        "oil ISO VG 46 at 40 degC"
-    )
-    assert repr(bearing) == f"<Bearing: {bearing}>"
-    assert str(bearing.pads[0]) == "pad at -90 deg, 63.5 deg of arc, Cb 80 um, preload 0.385"
-    assert "0 pads" in str(bearing.with_pads(()))
+POINT = OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 2 * math.pi * 25)
+ROCKER = load_bearing(BEARINGS / "rocker.toml")
+SHOWN = (
+    "Rocker-backed five-pad bearing: 5 pads, 99.86 x 69.6 mm, Cb 80 um, preload 0.385 (pad #1), rocker pivots, "
+    "oil ISO VG 46 at 40 degC"
+)
 
 
 @pytest.mark.parametrize(
-    "settings",
+    ("printed", "text"),
     [
-        pytest.param((ti.IdentifySettings(), "IdentifySettings()"), id="defaults"),
-        pytest.param((ti.IdentifySettings(method="ols"), "IdentifySettings(method='ols')"), id="one changed"),
-        pytest.param((ti.CompareSettings(thermal="tehd"), "CompareSettings(thermal='tehd')"), id="of a comparison"),
+        (str(ROCKER), SHOWN),
+        (repr(ROCKER), f"<Bearing: {SHOWN}>"),
+        (str(ROCKER.pads[0]), "pad at -90 deg, 63.5 deg of arc, Cb 80 um, preload 0.385"),
+        (repr(ti.IdentifySettings()), "IdentifySettings()"),
+        (repr(ti.IdentifySettings(method="ols")), "IdentifySettings(method='ols')"),
+        (repr(ti.CompareSettings(thermal="tehd")), "CompareSettings(thermal='tehd')"),
+        (str(POINT), "5000 N at -90 deg, shaft 22 Hz, excited at 25 Hz"),
+        (str(OperatingPoint(500.0)), "500 N at -90 deg, shaft at rest"),
     ],
 )
-def test_settings_show_what_was_changed(settings):
-    assert repr(settings[0]) == settings[1]
+def test_bearings_pads_points_and_what_was_changed_of_settings(printed, text):
+    assert printed == text
 
 
-def test_a_campaign_is_one_line(small_campaign):
-    shown = repr(ti.load_campaign(small_campaign))
-    assert shown.startswith("<Campaign ")
-    assert len(shown) < 140
+def test_a_bearing_without_pads():
+    assert "0 pads" in str(ROCKER.with_pads(()))
 
 
 def test_positions_and_curves_are_one_line_and_a_table_in_a_notebook():
@@ -51,16 +51,19 @@ def test_positions_and_curves_are_one_line_and_a_table_in_a_notebook():
         assert len(result.to_dataframe())
 
 
-def test_runs_points_and_records_in_the_units_of_a_rig(small_campaign):
-    run = ti.load_campaign(small_campaign).of_kind("dynamic")[0]
+def test_campaigns_runs_points_and_records_in_the_units_of_a_rig(small_campaign):
+    campaign = ti.load_campaign(small_campaign)
+    assert repr(campaign).startswith("<Campaign ")
+    assert len(repr(campaign)) < 140
+    run = campaign.of_kind("dynamic")[0]
     assert repr(run).startswith(f"<Run {run.id}: dynamic, ")
     assert repr(run.point) == f"<OperatingPoint: {run.point}>"
     assert repr(run.record("X1A")).startswith("<Record X1A: displacement at 45 deg, ")
     assert "1.57" not in repr(run)
 
 
-def test_prediction(rocker_file):
-    p = predict(load_bearing(rocker_file), 5000.0, speed=2 * math.pi * 22, thermal="isothermal")
+def test_prediction():
+    p = predict(ROCKER, 5000.0, speed=2 * math.pi * 22, thermal="isothermal")
     assert str(p).startswith("5000 N at -90 deg, 22 Hz: shaft at (")
     assert f"thinnest film {1e6 * p.min_film:.3g} um" in str(p)
     assert str(p).endswith("all well")
@@ -68,9 +71,3 @@ def test_prediction(rocker_file):
     assert len(table) == np.size(p.excitation)
     assert table["kyy_N_per_m"][0] == np.ravel(p.kyy)[0]
     assert table["shaft_speed_Hz"][0] == pytest.approx(22.0)
-
-
-def test_operating_point():
-    point = OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 2 * math.pi * 25)
-    assert str(point) == "5000 N at -90 deg, shaft 22 Hz, excited at 25 Hz"
-    assert str(OperatingPoint(500.0)) == "500 N at -90 deg, shaft at rest"
