@@ -129,11 +129,16 @@ def test_a_campaign_travels_to_worker_processes_and_threads_share_it(campaign):
     assert results == [expected[0]] * 8
 
 
-def test_missing_bearing_file_is_a_warning(folder):
+@pytest.mark.parametrize("is_folder", [False, True])
+def test_missing_bearing_file_is_a_warning(folder, is_folder):
     (folder / "rocker.toml").unlink()
+    if is_folder:
+        (folder / "rocker.toml").mkdir()
     campaign = rigdata.load_campaign(folder)
     assert campaign.bearing_text == ""
-    assert [p.severity for p in campaign.notes] == ["warning"]
+    (note,) = campaign.notes
+    assert note.severity == "warning"
+    assert "rocker.toml" in str(note)
 
 
 @pytest.mark.parametrize(

@@ -111,7 +111,7 @@ def test_what_the_manifest_says_of_the_dialect(tmp_path, text, csv):
     expect_good(make(tmp_path, text, f"[csv]\n{csv}\n"))
 
 
-@pytest.mark.parametrize("mark", [m for m in (*MISSING, "1E+99") if m not in {"*", "?"}])
+@pytest.mark.parametrize("mark", [m for m in (*MISSING, "1E+99", "1e31", "1e999") if m not in {"*", "?"}])
 @pytest.mark.parametrize("blank", ["", " "])
 def test_missing_values(tmp_path, mark, blank):
     values = make(tmp_path, with_line(5, "4,5000", blank + mark + blank, table())).record("X1A").values

@@ -150,6 +150,18 @@ def linked(target):
     return link
 
 
+def chain(length):
+    """A soft link to a soft link, and so on, to a record."""
+
+    def link(group):
+        group.file["link0"] = np.full(N, 7.0)
+        for i in range(1, length + 1):
+            group.file[f"link{i}"] = h5py.SoftLink(f"/link{i - 1}")
+        group["X1A"] = h5py.SoftLink(f"/link{length}")
+
+    return link
+
+
 NO_RECORDS = {
     "external link": (external_link, ("link out of the file", "other.h5")),
     "soft link through an external one": (soft_link_through_an_external_one, ("link out of the file",)),
@@ -163,6 +175,8 @@ NO_RECORDS = {
     "dangling": (linked("/nowhere"), ("X1A",)),
     "link to itself": (linked("/runs/c-1/X1A"), ("X1A",)),
     "circle of links": (linked("loop"), ("X1A",)),
+    "long chain of links": (chain(62), ("circle of links, or too deep",)),
+    "longer chain of links": (chain(200), ("circle of links, or too deep",)),
 }
 
 
@@ -176,18 +190,14 @@ def test_what_is_no_record_in_this_file_is_refused_before_anything_is_loaded(pat
     refused(path, *says)
 
 
-def soft_link_inside(group):
-    group.file["store"] = np.full(N, 7.0)
-    group.file["alias"] = h5py.SoftLink("/store")
-    group["X1A"] = h5py.SoftLink("/alias")
-
-
 @pytest.mark.parametrize(
     ("store", "value"),
     [
-        (soft_link_inside, 7e-6),
+        (chain(1), 7e-6),
+        (chain(3), 7e-6),
         (stored(np.arange(N, dtype=">i2")), 5e-6),  # counts, big-endian
         (stored(np.full(N, 0x7F800001, "u4").view("f4")), np.nan),  # signals
+        *((stored(np.full(N, value)), np.nan) for value in (np.nan, np.inf, -np.inf, 1e31, -3e38)),
     ],
 )
 def test_records_of_every_kind_are_taken(path, store, value):

@@ -57,15 +57,11 @@ def test_flicker_has_its_density_over_three_decades():
     assert slope == pytest.approx(-1.0, abs=0.03)
 
 
-def test_flicker_does_not_return_to_its_start():
+def test_flicker_does_not_return_to_its_start_and_drift_is_slow_and_has_its_size():
     series = flicker(np.random.default_rng(4), 500, 500, 500.0)
     ends, neighbours = series[:, -1] - series[:, 0], series[:, 1] - series[:, 0]
     assert np.std(ends) > 1.5 * np.std(neighbours)
-
-
-def test_drift_is_slow_and_has_its_size():
-    time = np.arange(500) / 500
-    series = slow_drift(np.random.default_rng(5), 3000, time)
+    series = slow_drift(np.random.default_rng(5), 3000, np.arange(500) / 500)
     assert np.std(series[:, -1] - series[:, 0]) == pytest.approx(1.0, rel=0.05)
     np.testing.assert_allclose(series.mean(axis=1), 0.0, atol=1e-12)
     assert np.abs(np.diff(series, axis=1)).max() < 0.05
