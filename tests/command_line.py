@@ -25,3 +25,10 @@ def tpjb(*words: Any, app: typer.Typer = app, cores: int = 1) -> Any:
     """
     with mock.patch.object(executors, "cores", return_value=cores):
         return typer.testing.CliRunner(env={"COLUMNS": "400"}).invoke(app, [str(word) for word in words])
+
+
+def ended(code: int, *words: Any) -> Any:
+    """Run `tpjb words`, which has to end with this exit code; what `tpjb` gives."""
+    result = tpjb(*words)
+    assert result.exit_code == code, f"tpjb {' '.join(map(str, words))}: ended with {result.exit_code}\n{result.output}"
+    return result

@@ -24,7 +24,7 @@ import tpjb_ident as ti
 from model.bearing_file import load_bearing
 from rigdata import load_campaign
 from rigdata.operating_point import ROTATIONS
-from tests.command_line import tpjb
+from tests.command_line import ended
 from tpjb_ident.columns import use_units
 from tpjb_ident.compare.coefficient_table import read_rows
 from tpjb_ident.errors import NotTrustedError
@@ -310,12 +310,10 @@ def test_nothing_leaves_where_nothing_can_be_trusted_or_has_converged(tmp_path):
 
 def test_the_command_line_says_what_stayed_behind_and_exits_with_three(tmp_path):
     doubtful_table().to_csv(tmp_path / "coefficients.csv", index=False)
-    refused = tpjb("export", tmp_path, "--to", "csv", "--out", tmp_path / "o")
-    assert refused.exit_code == 3
+    refused = ended(3, "export", tmp_path, "--to", "csv", "--out", tmp_path / "o")
     assert "kxx is negative" in refused.stderr
     assert "--force" in refused.stderr
-    forced = tpjb("export", tmp_path, "--to", "csv", "--out", tmp_path / "f", "--force")
-    assert forced.exit_code == 3
+    ended(3, "export", tmp_path, "--to", "csv", "--out", tmp_path / "f", "--force")
     assert len(pd.read_csv(tmp_path / "f" / "bearing_coefficients.csv")) == 4
 
 
@@ -446,11 +444,9 @@ def test_tables_stay_si_beside_those_in_us_units(to, tmp_path):
 
 def test_the_command_line_exports_us_units_and_refuses_them_for_ross(tmp_path):
     table(SERIES).to_csv(tmp_path / "coefficients.csv", index=False)
-    refused = tpjb("export", tmp_path, "--to", "ross", "--units", "us", "--out", tmp_path / "r")
-    assert refused.exit_code == 2
+    refused = ended(2, "export", tmp_path, "--to", "ross", "--units", "us", "--out", tmp_path / "r")
     assert "Leave --units us out" in " ".join(refused.stderr.split())
-    done = tpjb("export", tmp_path, "--to", "parquet", "--units", "us", "--out", tmp_path / "o")
-    assert done.exit_code == 0, done.output
+    done = ended(0, "export", tmp_path, "--to", "parquet", "--units", "us", "--out", tmp_path / "o")
     assert "bearing_coefficients_us.csv" in " ".join(done.output.split())
     frame = pd.read_csv(tmp_path / "o" / "bearing_coefficients_us.csv")
     assert frame["kxx_lbf_per_in"].max() == pytest.approx(5.0e8 / LBF_PER_INCH, rel=1e-6)
@@ -596,9 +592,7 @@ def test_a_bearing_that_turns_clockwise_is_mirrored_for_ross(tmp_path, rocker_fi
 
 
 def test_a_bearing_leaves_for_ross_alone(tmp_path, rocker_file):
-    refused = tpjb("export", rocker_file, "--to", "xltrc", "--out", tmp_path / "x")
-    assert refused.exit_code == 2
+    refused = ended(2, "export", rocker_file, "--to", "xltrc", "--out", tmp_path / "x")
     assert "leaves for ROSS alone" in " ".join(refused.stderr.split())
-    written = tpjb("export", rocker_file, "--to", "ross", "--ross", "3", "--out", tmp_path / "o")
-    assert written.exit_code == 0, written.output
+    ended(0, "export", rocker_file, "--to", "ross", "--ross", "3", "--out", tmp_path / "o")
     assert "ROSS 3, as chosen" in (tmp_path / "o" / "ross_bearing.py").read_text(encoding="utf-8")

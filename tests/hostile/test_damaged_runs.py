@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from rigdata.virtual_rig import operating_points
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
 
 RUN = "d-05000-25-02"
@@ -106,8 +106,7 @@ def error_of(out, truth_row):
 @pytest.mark.parametrize("name", [*DAMAGE, "accelerometer zero"])
 def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, name):
     path = spoilt(name, RUN)
-    told = tpjb("identify", path, "--workers", 1, "--out", tmp_path / "out")
-    assert told.exit_code == 0, told.output
+    told = ended(0, "identify", path, "--workers", 1, "--out", tmp_path / "out")
     assert RUN in told.output
     table = pd.read_csv(tmp_path / "out" / "coefficients.csv").set_index("static_load_N")
     assert list(table.index) == [2500.0, 5000.0]
@@ -120,8 +119,7 @@ def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, n
 def test_a_check_names_every_damaged_run(spoilt):
     for name in DAMAGE:
         path = spoilt(name, RUN)
-        told = tpjb("check", path)
-        assert told.exit_code == 2, (name, told.output)
+        told = ended(2, "check", path)
         assert RUN in told.output, name
         shutil.rmtree(path) if path.is_dir() else path.unlink()
 
@@ -131,8 +129,7 @@ def test_a_record_that_lost_its_end_is_said_to_be_damaged(spoilt, tmp_path):
     path = spoilt("missing file")
     file = path / "runs" / f"{RUN}.csv"
     file.write_bytes(file.read_bytes()[:-30])
-    told = tpjb("identify", path, "--workers", 1, "--out", tmp_path / "out")
-    assert told.exit_code == 0
+    told = ended(0, "identify", path, "--workers", 1, "--out", tmp_path / "out")
     assert "record-damaged" in told.output
     assert f"{RUN}.csv" in told.output
 
@@ -161,8 +158,7 @@ DYNAMIC = [f"d-0{load}-25-0{i}" for load in (2500, 5000) for i in (1, 2, 3)]
     ],
 )
 def test_what_is_damaged_in_most_runs_is_no_accident(spoilt, tmp_path, command, name, runs, code, says):
-    result = tpjb(command, spoilt(name, *runs), "--out", tmp_path / "out")
-    assert result.exit_code == code, result.output
+    result = ended(code, command, spoilt(name, *runs), "--out", tmp_path / "out")
     assert all(text in result.output for text in says)
     assert (tmp_path / "out").exists() == (code != 2)
     assert not (tmp_path / "out" / "clearance.csv").exists()
@@ -173,8 +169,7 @@ def test_what_is_damaged_in_most_runs_is_no_accident(spoilt, tmp_path, command, 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["torn chunk", "probe zero", "cut off"])
 def test_pivot_goes_on_without_a_damaged_run_and_says_which_pad_has_no_curve(spoilt, tmp_path, name):
-    told = tpjb("pivot", spoilt(name, "p-2-up"), "--out", tmp_path / "out")
-    assert told.exit_code == 3, told.output
+    told = ended(3, "pivot", spoilt(name, "p-2-up"), "--out", tmp_path / "out")
     assert "pad #2: has no curve" in told.output
     assert told.output.count("p-2-up") >= 1
     assert sorted(set(pd.read_csv(tmp_path / "out" / "pivot_curves.csv")["pad"])) == [1, 3, 4, 5]
@@ -183,8 +178,7 @@ def test_pivot_goes_on_without_a_damaged_run_and_says_which_pad_has_no_curve(spo
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["missing file", "torn chunk", "probe NaN", "cell zero"])
 def test_locus_goes_on_without_a_damaged_direction(spoilt, tmp_path, name):
-    told = tpjb("locus", spoilt(name, "l-01000-02"), "--out", tmp_path / "out")
-    assert told.exit_code == 0, told.output
+    told = ended(0, "locus", spoilt(name, "l-01000-02"), "--out", tmp_path / "out")
     assert "runs-refused: l-01000-02" in told.output
     assert pd.read_csv(tmp_path / "out" / "locus.csv")["run"].tolist() == ["l-01000-01", "l-01000-03"]
     assert len(pd.read_csv(tmp_path / "out" / "clearance.csv")) == 5

@@ -12,7 +12,7 @@ import pytest
 
 import rigdata
 from rigdata.problem import RigDataError
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tests.manifests import manifest
 from tests.report.tags import Page
 from tpjb_ident.runtime.tables import safe_for_spreadsheets, write_table
@@ -106,8 +106,7 @@ def test_an_excel_file_holds_texts_not_formulas(small_campaign, tmp_path):
         **{f"{k}{a}{b}_{u}": [1.0] for k, u in (("k", "N_per_m"), ("c", "Ns_per_m")) for a in "xy" for b in "xy"},
     })  # fmt: skip
     write_table(tmp_path, "coefficients", frame)
-    result = tpjb("export", tmp_path, "--to", "excel", "--out", tmp_path / "out")
-    assert result.exit_code == 0, result.output
+    ended(0, "export", tmp_path, "--to", "excel", "--out", tmp_path / "out")
     (path,) = (tmp_path / "out").glob("*.xlsx")
     for sheet in openpyxl.load_workbook(path):
         for row in sheet.iter_rows():
@@ -124,8 +123,7 @@ def test_a_strange_name_in_a_message_is_one_printable_line(tmp_path, name):
         rigdata.load_campaign(folder)
     for line in str(caught.value).splitlines():
         assert line.isprintable()
-    result = tpjb("check", folder, "--out", tmp_path / "out")
-    assert result.exit_code == 2
+    result = ended(2, "check", folder, "--out", tmp_path / "out")
     assert "\x1b" not in result.output
 
 

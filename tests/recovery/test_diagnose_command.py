@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 
 SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
 pytestmark = [pytest.mark.slow, pytest.mark.samples, pytest.mark.skipif(not SAMPLES.is_dir(), reason="no ../shared")]
@@ -17,8 +17,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.samples, pytest.mark.skipif(not SAMP
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("diagnosed") / "out"
-    result = tpjb("diagnose", SAMPLES / "effect-b.h5", "--workers", 1, "--out", out)
-    assert result.exit_code == 0, result.output
+    ended(0, "diagnose", SAMPLES / "effect-b.h5", "--workers", 1, "--out", out)
     return out
 
 
@@ -42,8 +41,7 @@ def test_the_gap_shrinks_on_points_that_no_fit_has_seen(diagnosed):
 def test_the_effects_file_is_read_by_predict_and_changes_what_the_cells_show(diagnosed, tmp_path):
     bearing = SAMPLES.parent / "bearings" / "spherical.toml"
     for name, more in (("plain", ()), ("updated", ("--effects", diagnosed / "updated.effects.toml"))):
-        result = tpjb("predict", bearing, "--thermal", "isothermal", *more, "--out", tmp_path / name)
-        assert result.exit_code == 0, result.output
+        ended(0, "predict", bearing, "--thermal", "isothermal", *more, "--out", tmp_path / name)
     plain, updated = (pd.read_csv(tmp_path / name / "prediction.csv").iloc[0] for name in ("plain", "updated"))
     # a share of one cell's force in the other one: kyx shows that share of kxx, or kxy of kyy
     change = abs(updated["kxy_N_per_m"] - plain["kxy_N_per_m"]) / plain["kyy_N_per_m"]

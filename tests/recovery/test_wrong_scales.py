@@ -10,7 +10,7 @@ import pytest
 
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import Fault
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tests.good_campaigns import SMALL_PLAN, rocker_rig
 from tpjb_ident.clearance.measure import measure_run
 from tpjb_ident.clearance.polygon import gain_ratio
@@ -102,6 +102,5 @@ def test_gains_are_found_from_turned_normals(axes):
 @pytest.mark.slow
 def test_the_condition_reaches_the_table(campaign, tmp_path):
     source = campaign(gain("X1*", 10.0), plan=replace(SMALL_PLAN, dry=(), locus=()))
-    out = tpjb("identify", source.path, "--out", tmp_path / "out")
-    assert out.exit_code == 3
+    ended(3, "identify", source.path, "--out", tmp_path / "out")
     assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["quality"].str.contains("probes-contradict").all()

@@ -17,7 +17,7 @@ import pytest
 
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import write_campaign
-from tests.command_line import tpjb
+from tests.command_line import ended
 from tests.good_campaigns import directions, written
 from tests.identification.test_identify import rig
 from tpjb_ident.cli.commands.identify import KEPT
@@ -205,8 +205,7 @@ def test_an_error_leaves_nothing_behind(path, tmp_path):
     with h5py.File(copy, "r+") as file:
         for run in file["runs"]:
             del file[f"runs/{run}/X1A"]
-    result = tpjb("identify", copy, "--out", tmp_path / "out")
-    assert result.exit_code == 2
+    result = ended(2, "identify", copy, "--out", tmp_path / "out")
     assert "X1A" in result.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["copy.h5"]
 

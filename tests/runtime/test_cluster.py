@@ -11,7 +11,15 @@ from pathlib import Path
 
 import pytest
 
+from rigdata.campaign import load_campaign
+from tests.command_line import ended, tpjb
+from tests.good_campaigns import written
+from tests.identification.test_identify import rig
 from tests.runtime.test_executors import dies_once
+from tpjb_ident.cli.commands.identify import KEPT
+from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.settings import IdentifySettings
+from tpjb_ident.runs.run_store import RunStore
 from tpjb_ident.runtime import executors
 from tpjb_ident.runtime.executors import ClusterError, LostJobsError, dask_workers, local_workers, map_ordered
 
@@ -57,12 +65,7 @@ def cluster(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def campaign_file(tmp_path_factory):
-    from rigdata.virtual_rig import write_campaign
-    from tests.identification.test_identify import rig
-
-    path = tmp_path_factory.mktemp("rig") / "campaign.h5"
-    write_campaign(path, rig([(2500.0, 25.0), (5000.0, 25.0)], seed=7))
-    return path
+    return written(tmp_path_factory.mktemp("rig") / "campaign.h5", rig([(2500.0, 25.0), (5000.0, 25.0)], seed=7))
 
 
 def wait_for(address: str, count: int) -> None:
@@ -74,10 +77,6 @@ def wait_for(address: str, count: int) -> None:
 
 @pytest.mark.slow
 def test_a_worker_killed_half_way_changes_no_bit(cluster, campaign_file, tmp_path):
-    from rigdata.campaign import load_campaign
-    from tpjb_ident.identification.identify import identify
-    from tpjb_ident.identification.settings import IdentifySettings
-
     wait_for(str(cluster.file), 2)
     campaign = load_campaign(campaign_file)
     settings = IdentifySettings(methods=("ols", "mm"))
@@ -106,26 +105,20 @@ def test_a_worker_killed_half_way_changes_no_bit(cluster, campaign_file, tmp_pat
         assert (other.systematic == alone.systematic).all()
 
 
+def tables(out: Path) -> list[bytes]:
+    return [(out / f"{name}.csv").read_bytes() for name in ("coefficients", "estimators", "windows")]
+
+
 @pytest.mark.slow
 def test_the_command_line_works_on_a_cluster(cluster, small_campaign, tmp_path):
-    from tests.command_line import tpjb
-
     wait_for(str(cluster.file), 1)
-    tables = []
-    for options in (["--scheduler", str(cluster.file)], ["--workers", "1"]):
-        out = tmp_path / options[0].strip("-")
-        result = tpjb("identify", small_campaign, "--out", out, *options)
-        assert result.exit_code == 0, result.output
-        tables.append([(out / f"{name}.csv").read_bytes() for name in ("coefficients", "estimators", "windows")])
-    assert tables[0] == tables[1]
+    for name, options in (("spread", ["--scheduler", str(cluster.file)]), ("alone", ["--workers", "1"])):
+        ended(0, "identify", small_campaign, "--out", tmp_path / name, *options)
+    assert tables(tmp_path / "spread") == tables(tmp_path / "alone")
 
 
 @pytest.mark.slow
 def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign_file, tmp_path, monkeypatch):
-    from tests.command_line import tpjb
-    from tpjb_ident.cli.commands.identify import KEPT
-    from tpjb_ident.runs.run_store import RunStore
-
     wait_for(str(cluster.file), 1)
     out = tmp_path / "out"
     words = ["identify", str(campaign_file), "--scheduler", str(cluster.file), "--out", str(out)]
@@ -151,16 +144,14 @@ def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign
         plain(store, mark, result)
 
     monkeypatch.setattr(RunStore, "keep", keep)
-    again = tpjb(*words)
-    assert again.exit_code == 0, again.output
+    ended(0, *words)
     assert len(kept) == len(set(kept)) == 12 - len(finished)  # the others, and each of them once
     assert not finished & set(kept)
     assert not (out / KEPT).exists()
 
     alone = tmp_path / "alone"
     tpjb("identify", campaign_file, "--workers", "1", "--out", alone)
-    for name in ("coefficients", "estimators", "windows"):
-        assert (out / f"{name}.csv").read_bytes() == (alone / f"{name}.csv").read_bytes()
+    assert tables(out) == tables(alone)
 
 
 @pytest.mark.slow

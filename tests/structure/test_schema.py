@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.command_line import tpjb
+from tests.command_line import ended
 from tpjb_ident import schema
 
 ROOT = Path(__file__).parents[2]
@@ -58,8 +58,7 @@ def test_a_name_that_is_none_is_found(column):
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["identify", "locus"])
 def test_tables_on_disk_hold_columns_of_the_schema_only(command, small_campaign, tmp_path):
-    result = tpjb(command, small_campaign, "--out", tmp_path / "o")
-    assert result.exit_code == 0, result.output
+    ended(0, command, small_campaign, "--out", tmp_path / "o")
     tables = sorted((tmp_path / "o").glob("*.csv"))
     assert tables
     for path in tables:

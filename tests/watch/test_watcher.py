@@ -15,7 +15,7 @@ import time
 import pytest
 
 from rigdata.virtual_rig import Fault, write_campaign
-from tests.command_line import tpjb
+from tests.command_line import ended
 from tests.good_campaigns import rocker_rig
 from tpjb_ident.watch.landing import NewFiles
 from tpjb_ident.watch.watcher import Watcher
@@ -52,8 +52,7 @@ def live(finished, tmp_path):
 
 def test_the_page_begins_with_what_was_tested_what_it_gives_and_a_picture(finished, live, tmp_path):
     land(finished, live, *DYNAMIC)
-    done = tpjb("watch", live, "--once", "--settle", "2 s", "--units", "us", "--out", tmp_path / "o")
-    assert done.exit_code == 0, done.output
+    done = ended(0, "watch", live, "--once", "--settle", "2 s", "--units", "us", "--out", tmp_path / "o")
     page = (tmp_path / "o" / "watch.html").read_text(encoding="utf-8")
     first = page[page.index('<dl class="tested">') : page.index("<nav")]
     for words in ("Bearing:", "Static load:", "1124 lbf", "K, lbf/in", "C, lbf s/in", "How far the plan is"):
@@ -134,47 +133,31 @@ def test_records_under_other_names_are_placed_by_load_line_and_direction(live, f
     assert DYNAMIC[1] not in {s.run.id for s in snapshot.states}
 
 
-def test_a_record_that_fits_no_run_is_told_and_harms_nothing(live, finished):
+def test_what_is_foreign_away_edited_or_taken_meanwhile_stops_nothing(live, finished):
     watch = watcher(live)
     land(finished, live, *DYNAMIC)
-    (live / "runs" / "notes.csv").write_text("this is no record\n")
-    snapshot = watch.look()
-    assert [p.file for p in snapshot.problems] == ["runs/notes.csv"]
-    assert len(snapshot.measured.points) == 1
-
-
-def test_a_manifest_that_is_being_edited_stops_nothing(live, finished):
-    watch = watcher(live)
-    land(finished, live, *DYNAMIC)
+    notes, manifest = live / "runs" / "notes.csv", live / "campaign.toml"
+    notes.write_text("this is no record\n")
+    foreign = watch.look()
+    assert [p.file for p in foreign.problems] == ["runs/notes.csv"]
+    assert len(foreign.measured.points) == 1
+    notes.unlink()
     watch.look()
-    manifest = live / "campaign.toml"
-    text = manifest.read_text("utf-8")
-    manifest.write_text(text[: len(text) // 2])
-    snapshot = watch.look()
-    assert states(snapshot) == dict.fromkeys(DYNAMIC, "good")
-    assert "goes on with the last one" in str(snapshot.problems[0])
-    manifest.write_text(text)
-    assert not watch.look().problems
-
-
-def test_a_record_that_is_taken_away_is_to_be_run_again(live, finished):
-    watch = watcher(live)
-    land(finished, live, *DYNAMIC)
-    watch.look()
-    (live / "runs" / f"{DYNAMIC[0]}.csv").unlink()
-    snapshot = watch.look()
-    assert DYNAMIC[0] not in states(snapshot)
-    assert snapshot.measured.points[0].n_records == 2
-
-
-def test_a_share_that_is_away_for_a_while_loses_nothing(live, finished):
-    watch = watcher(live)
-    land(finished, live, *DYNAMIC)
-    watch.look()
-    away = live.rename(live.with_name("away"))
+    away = live.rename(live.with_name("away"))  # a share
     assert watch.look() is None
     away.rename(live)
     assert watch.look() is None
+    text = manifest.read_text("utf-8")
+    manifest.write_text(text[: len(text) // 2])
+    edited = watch.look()
+    assert states(edited) == dict.fromkeys(DYNAMIC, "good")
+    assert "goes on with the last one" in str(edited.problems[0])
+    manifest.write_text(text)
+    assert not watch.look().problems
+    (live / "runs" / f"{DYNAMIC[0]}.csv").unlink()
+    taken = watch.look()
+    assert DYNAMIC[0] not in states(taken)
+    assert taken.measured.points[0].n_records == 2
 
 
 def test_a_probe_that_is_dead_in_two_records_in_a_row_stops_the_campaign(live, finished, tmp_path):
@@ -193,12 +176,10 @@ def test_a_probe_that_is_dead_in_two_records_in_a_row_stops_the_campaign(live, f
 def test_the_command_tells_scripts_by_its_exit_code(live, finished, clipped, tmp_path):
     land(finished, live, *DYNAMIC)
     words = ("watch", live, "--once", "--settle", "0 s", "--within", "0.01 %", "--out", tmp_path / "out")
-    good = tpjb(*words)
-    assert good.exit_code == 0, good.output
+    good = ended(0, *words)
     assert "more record" in good.stdout or "calibration sets that" in good.stdout
     land(clipped, live, DYNAMIC[1])
-    bad = tpjb(*words)
-    assert bad.exit_code == 3
+    ended(3, *words)
     page = (tmp_path / "out" / "watch.html").read_text("utf-8")
     assert f"Repeat {DYNAMIC[1]} before you change the load" in page
     document = json.loads((tmp_path / "out" / "watch.json").read_text("utf-8"))
@@ -230,8 +211,7 @@ def test_killed_again_and_again_while_records_are_being_written_it_ends_with_the
         process.wait()
     documents = []
     for folder in (out, tmp_path / "fresh"):
-        done = tpjb("watch", live, "--once", "--settle", "0 s", "--out", folder)
-        assert done.exit_code == 0, done.output
+        ended(0, "watch", live, "--once", "--settle", "0 s", "--out", folder)
         documents.append(json.loads((folder / "watch.json").read_text("utf-8")))
         assert not list(tmp_path.glob(f".{folder.name}.part-*"))
     assert documents[0] == documents[1]
