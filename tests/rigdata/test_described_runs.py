@@ -147,6 +147,8 @@ def test_another_sensitivity_or_uncertainty_and_another_channel_are_another_cali
         ('runs = ["P-1"]', "no run is named by 'P-1'"),
         ('runs = ["p-?"]', "no run is named by"),
         ('runs = ["p-[12]"]', "no run is named by"),
+        ('runs = ["p-[12]*"]', "no run is named by"),
+        ('runs = ["p?*"]', "no run is named by"),
         ("runs = []", "no list of texts"),
         ('runs = "p-1"', "no list of texts"),
         ('axis = "40 deg"', "runs is missing"),

@@ -58,6 +58,7 @@ def test_a_column_of_dates_beside_the_times_is_no_trouble(tmp_path):
     [
         ([f"11:31:22.{int(1000 * i / 4000):03d}" for i in range(400)], 1 / 4000),  # milliseconds at 4 kHz
         (["23:59:59.8", "23:59:59.9", "00:00:00.0", "00:00:00.1"], 0.1),
+        (["01.02.2019 23:59:59.9", "02.02.2019 00:00:00.0", "02.02.2019 00:00:00.1"], 0.1),  # in February
     ],
 )
 def test_stamps_coarser_than_the_samples_are_spread_evenly_and_midnight_is_no_step_back(cells, step):
