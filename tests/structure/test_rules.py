@@ -199,13 +199,8 @@ def test_what_is_harmless_breaks_none(path, source):
     assert [rule(path, source) for rule in RULES] == [[]] * len(RULES)
 
 
-#: Distributions that are imported by another name.
-IMPORTED_AS = {"pillow": "pil"}
-
-
 def declared_names(requirements):
-    names = {re.split(r"[<>=\[ ]", d)[0].lower() for d in requirements}
-    return {IMPORTED_AS.get(name, name) for name in names}
+    return {re.split(r"[<>=\[ ]", d)[0].lower() for d in requirements}
 
 
 def test_every_third_party_import_is_declared_and_the_wheel_holds_the_three_packages():

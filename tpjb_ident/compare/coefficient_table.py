@@ -77,7 +77,7 @@ def read_rows(path: Path) -> pd.DataFrame:
     low, high = (rows[ends[k::2]].to_numpy(float) for k in (0, 1))
     stated = (high - low) / (2 * HALF)  # our own tables have both: the interval holds calibration too
     rows[ERRORS] = np.where(np.isnan(stated), rows[ERRORS], stated)
-    flags = rows["quality"].where(rows["quality"] != "", rows["status"]) + "; " + assumed
+    flags = rows["quality"].where(rows["quality"] != "", rows["status"]).astype(object) + "; " + assumed
     rows["status"] = flags.map(_flags)
     rows["converged"] = rows["converged"].ne(False)
     rows = rows.drop(columns=ends).dropna(subset=VALUES, how="all").reset_index(drop=True)
