@@ -13,9 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
 from tpjb_ident.estimate.equation import State
-from tpjb_ident.estimate.term import Factor, Fitted, Parameter
+from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter
+
+#: Standard errors from which a corner is negative.
+_CLEAR = 2.5
 
 
 class Corner(Factor):
@@ -50,3 +54,13 @@ class Corner(Factor):
         if self.rig.out_of_step or not self.parameters or not fitted.value[0] < -fitted.deviation[0]:
             return None
         return tuple(replace(s, out_of_step=s.quantity == "acceleration") for s in sensors)
+
+    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+        """Accelerometers whose corner would have to be negative: something else turns them, no filter does."""
+        for parameter, value, error in zip(self.parameters, fitted.value, fitted.deviation):
+            if parameter.name == "accelerometers" and value < -_CLEAR * error:
+                text = (
+                    f"the accelerometers lag the more the lower the frequency, as if their corner were {value:.2g} Hz"
+                )
+                return (Condition(OUT_OF_STEP, text),)
+        return ()
