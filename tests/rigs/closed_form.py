@@ -81,7 +81,10 @@ class Rig:
     mount: str = "cells"
     mass: float = 30.0
     springs: tuple[float, float] = (4e8, 6e8)
-    foundation: tuple[float, float] = (0.0, np.inf)  #: mass under the cells [kg], and its springs [N/m]
+    foundation: tuple[float, float] = (
+        0.0,
+        np.inf,
+    )  #: mass [kg] and springs [N/m] under the cells or a shaft's bearings
     beside: tuple[float, float] = (0.0, 0.0)  #: springs beside the film, which dry runs of the plan tell [N/m]
     shaft_mass: float = 0.0
     shaft_compliance: float = 0.0  #: of a floating stator's shaft [m/N]
@@ -126,13 +129,13 @@ def response(rig: Rig, frequency: Array, load: float, scale: float = 1.0) -> dic
     """Motion and cell force per actuator force, by quantity (..., 2, 2); signs of the contract."""
     h = rig.film.h(frequency, load) * scale + np.diag(rig.beside)
     w2, unit = (2 * np.pi * frequency[..., None, None]) ** 2, np.eye(2)
+    mass, springs = rig.foundation
+    below = 1 / (springs * (1 + 4j * LOSS) - mass * w2) if np.isfinite(springs) else 0.0
     if rig.mount == "floating":
-        moved = unit + rig.shaft_compliance * h  # housing against shaft, per displacement
+        moved = unit + (rig.shaft_compliance + below) * h  # housing against shaft, per displacement
         d = np.linalg.inv(rig.mass * w2 * moved - h)
         acceleration = w2 * moved @ d
     else:
-        mass, springs = rig.foundation
-        below = 1 / (springs * (1 + 4j * LOSS) - mass * w2) if np.isfinite(springs) else 0.0
         support = 1 / (1 / (np.array(rig.springs)[:, None] * (1 + 1j * LOSS)) + below)
         compliance = unit / (support - rig.mass * w2)
         d = np.linalg.inv(h - w2 * rig.shaft_mass * (unit + compliance @ h))

@@ -209,7 +209,7 @@ class Housing(Term):
 def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
     """Whether one symmetric compliance at every frequency, another at each, makes the accelerations of the forces.
 
-    A foundation with a resonance does, wrong accelerometers do not; at the lowest frequency it is a spring still.
+    A foundation with a resonance does, wrong accelerometers do not; at the lowest frequencies it is a spring still.
     Single lines of a band, which `check` looks at, cannot tell: there it may be one.
     """
     if len(rig.of("acceleration")) < 2:
@@ -222,20 +222,21 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
     rows = rig.of("acceleration")
     noise = np.sqrt(np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real)
     lines[~(np.linalg.norm(acceleration, axis=1) > 2 * _CLEAR * noise)] = np.nan
-    support, left, judged, count = np.full(3, np.nan + 0j), 0.0, 0.0, 0
-    for line in np.unique(lines[np.isfinite(lines)])[::-1]:
+    supports: list[ComplexArray] = []
+    left, judged = 0.0, 0.0
+    for line in np.unique(lines[np.isfinite(lines)]):
         pushes, shown = design[lines == line].reshape(-1, 3), acceleration[lines == line].ravel()
-        fit, _, rank, _ = np.linalg.lstsq(np.nan_to_num(pushes), shown, rcond=1e-3)
+        support, _, rank, _ = np.linalg.lstsq(np.nan_to_num(pushes), shown, rcond=1e-3)
         if rank == 3 and len(pushes) > 3:
-            support, count = fit, count + 1
-            left += float(np.linalg.norm(shown - pushes @ fit)) ** 2 * len(pushes) / (len(pushes) - 3)
+            supports.append(support)
+            left += float(np.linalg.norm(shown - pushes @ support)) ** 2 * len(pushes) / (len(pushes) - 3)
             judged += float(np.linalg.norm(shown)) ** 2
-    if count < 2 or not judged > 0.5 * float(np.linalg.norm(np.nan_to_num(acceleration))) ** 2:
+    if len(supports) < 2 or not judged > 0.5 * float(np.linalg.norm(np.nan_to_num(acceleration))) ** 2:
         return not (blocks.windows > 1).any()
-    springs = support[[[0, 2], [2, 1]]]
-    is_spring = (
-        np.linalg.eigvalsh(springs.real)[0] > 0 and np.abs(springs.imag).max() < 2 * _LOSS * np.abs(springs).max()
-    )
+    xx, yy, xy = np.mean(supports[: (len(supports) + 3) // 4], axis=0)
+    springs = np.array([[xx, xy], [xy, yy]])
+    is_spring = np.linalg.eigvalsh(springs.real)[0] > 0
+    is_spring &= np.abs(springs.imag).max() < 2 * _LOSS * np.abs(springs).max()
     return bool(is_spring and left < _LEFT**2 * judged)
 
 

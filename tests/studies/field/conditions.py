@@ -295,6 +295,12 @@ def bad_data() -> list[Condition]:
         bad("no accelerometers, soft cells", without="A1", **SOFT),
         bad("accelerometers inverted, floating", ("A1", inverted), **HEAVY),
         bad("accelerometers exchanged, soft cells", *two_axes(90, 0, "A1H A1V"), **SOFT),
+        bad(
+            "floating, the shaft's pedestal resonates",
+            head=('mount = "floating"',),
+            limits=WIDER,
+            **{**FLOATING, "foundation": (2000.0, 6e8), "frequencies": (25.0, 60.0)},
+        ),
         bad("accelerometers inverted, foundation", ("A1", inverted), **FOUNDATION),
         bad("accelerometers exchanged, foundation", *two_axes(90, 0, "A1H A1V"), **FOUNDATION),
         bad("accelerometers late by 2 ms, floating", ("A1", {"late": 2e-3}), **HEAVY),
