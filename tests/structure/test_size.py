@@ -18,7 +18,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (126.71, 15_315),  # 124.83, shafts that give, slower devices over a band, foundations, ranges
+    "measurement": (126.85, 15_335),  # 124.83, shafts that give, slower devices over a band, foundations, ranges
     "model": (81.88, 10_942),
     "rigdata": (65.13, 8_739),
     "diagnosis": (38.71, 4_800),  # 38.48, look-alikes, tolerances that say an effect together

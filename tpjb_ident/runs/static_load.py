@@ -39,6 +39,8 @@ _CONTRADICTS = (0.7, 1.4)
 _CONTRADICTS_TURN = 0.5
 #: Spread of a half of the runs within which their loads agree: actuators are no better.
 _ONE_HALF = 1e-3
+#: Runs that are tried as its middle.
+_MIDDLES = 500
 #: Set points must differ by this share for a zero to be told from a gain.
 _MIN_RANGE = 0.15
 #: Standard errors beyond which an intercept is one,
@@ -124,11 +126,12 @@ def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[L
 def _common_ratio(ratios: ComplexArray) -> complex:
     """Mean of the ratios (n,) about the one that half of them lie closest to."""
     half = (len(ratios) - 1) // 2 if len(ratios) >= _MIN_RUNS else len(ratios) - 1
-    reach = np.sort(np.abs(ratios[:, None] - ratios), axis=1)[:, half]
+    middles = ratios[:: 1 + len(ratios) // _MIDDLES]
+    reach = np.sort(np.abs(middles[:, None] - ratios), axis=1)[:, half]
     # groups of runs that each agree among themselves are as good as one another
     alike = np.flatnonzero(reach <= max(2 * float(reach.min()), _ONE_HALF))
-    place = alike[np.argmin(np.abs(ratios[alike] - 1))]
-    return complex(ratios[np.abs(ratios - ratios[place]) <= 4 * reach[place] + 1e-12].mean())
+    place = alike[np.argmin(np.abs(middles[alike] - 1))]
+    return complex(ratios[np.abs(ratios - middles[place]) <= 4 * reach[place] + 1e-12].mean())
 
 
 def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
