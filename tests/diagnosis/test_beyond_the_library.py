@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from model.effects import Effect, known_effects, load_effects
-from model.setup import Mesh
 from tests.diagnosis.rocker_case import noisy, rocker_setup, whole_layout
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import diagnose
@@ -27,7 +26,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def setup():
-    return rocker_setup(Mesh(40, 4))
+    return rocker_setup()
 
 
 @pytest.fixture(scope="module")

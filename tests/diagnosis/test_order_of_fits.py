@@ -77,7 +77,7 @@ def campaign():
     return forward, pose(noisy(planned, hidden, 3), forward, DiagnoseSettings(workers=1, skip=skipped)), skipped
 
 
-def fits_of(campaign, monkeypatch, **changed):
+def fits_of(campaign, promising=search._Search._promising, **changed):
     """Every proposal that was fitted, with the largest estimate that waited, and what came out."""
     forward, problem, skipped = campaign
     fitted_in_order, fit = [], search._Search._fit
@@ -87,15 +87,21 @@ def fits_of(campaign, monkeypatch, **changed):
         fitted_in_order.append((proposal, max(waiting, default=-np.inf)))
         fit(self, proposal, rough)
 
-    monkeypatch.setattr(search._Search, "_fit", recorded)
     settings = DiagnoseSettings(workers=1, skip=skipped, **changed)
-    with workers(forward, problem, 1) as run:
+    with pytest.MonkeyPatch.context() as patch, workers(forward, problem, 1) as run:
+        patch.setattr(search._Search, "_fit", recorded)
+        patch.setattr(search._Search, "_promising", promising)
         return fitted_in_order, search.compare(run, problem, settings)
 
 
+@pytest.fixture(scope="module")
+def usual(campaign):
+    return fits_of(campaign)
+
+
 @pytest.mark.slow  # seconds: the bearing model itself
-def test_the_likeliest_explanation_is_fitted_first_and_no_hopeless_one_at_all(campaign, monkeypatch):
-    order, comparison = fits_of(campaign, monkeypatch)
+def test_the_likeliest_explanation_is_fitted_first_and_no_hopeless_one_at_all(usual):
+    order, comparison = usual
     assert comparison.best.names == {"oil_viscosity"}
     assert [sorted(p.labels) for p, _ in order[:2]] == [[], ["oil_viscosity"]]
     exchanged = [p for p, _ in order if len(p.labels) == 1 and p.labels != {"oil_viscosity"}]  # at last, for the leader
@@ -105,11 +111,9 @@ def test_the_likeliest_explanation_is_fitted_first_and_no_hopeless_one_at_all(ca
 
 
 @pytest.mark.slow
-def test_what_is_left_out_would_not_have_changed_the_answer(campaign, monkeypatch):
-    few, quick = fits_of(campaign, monkeypatch)
-    monkeypatch.undo()
-    monkeypatch.setattr(search._Search, "_promising", lambda *_: True)
-    many, whole = fits_of(campaign, monkeypatch, near=1e3, most_fits=8)
+def test_what_is_left_out_would_not_have_changed_the_answer(campaign, usual):
+    few, quick = usual
+    many, whole = fits_of(campaign, lambda *_: True, near=1e3, most_fits=8)
     assert len(many) == 8 > len(few)
     assert whole.best.labels == quick.best.labels
     # beside the leader nothing is fitted whose estimate could not take the name's certainty from it

@@ -529,7 +529,8 @@ def test_the_same_results_are_the_same_bytes(form, tmp_path):
         export(table(SERIES), form, tmp_path / name)
         (path,) = (tmp_path / name).iterdir()
         bytes_of.append(path.read_bytes())
-        time.sleep(1.1 if form != "parquet" else 0.0)  # the times that their libraries write are in seconds
+        if form != "parquet" and name == "a":
+            time.sleep(1.1)  # the times that their libraries write are in seconds
     assert bytes_of[0] == bytes_of[1]
 
 
