@@ -12,7 +12,6 @@ from tpjb_ident.estimators.r_matrix import phasor_table
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.phasors.lines import known_lines
 from tpjb_ident.phasors.run_data import QUANTITIES, RunPhasors
-from tpjb_ident.runs.point_data import PointData, gather
 
 H = np.array([[2.0 + 0.7j, 0.3 - 0.2j], [-0.4 + 0.1j, 1.5 + 0.9j]])
 
@@ -66,11 +65,6 @@ def stiff(h=H, omega: float = 160.0, covariance=None, dof: float = np.inf, **mor
     """An estimate with this answer; by default each of its eight parts has variance one, known for certain."""
     spread = np.eye(8) if covariance is None else covariance
     return DynamicStiffness(np.asarray(h, dtype=complex), omega, spread, np.full(8, dof), "mm", np.ones((3, 2)), **more)
-
-
-def point_of(runs) -> PointData:
-    (data,) = gather(list(runs))
-    return data
 
 
 def hermitian(rng, n):
