@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
+import os
 from typing import Any
 from unittest import mock
 
 import typer.testing
 
 from tpjb_ident.cli.commands.app import app
-from tpjb_ident.runtime import executors
 
 # typer builds all commands anew for every call, which takes longer than most calls that are tested; where a version has
 # no such function, tests only take longer
@@ -23,7 +23,7 @@ def tpjb(*words: Any, app: typer.Typer = app, cores: int = 1) -> Any:
     One core, unless more are asked for: a job beside the command would load everything once more, and the other core is
     busy with other tests.
     """
-    with mock.patch.object(executors, "cores", return_value=cores):
+    with mock.patch.object(os, "sched_getaffinity", return_value=set(range(cores)), create=True):
         return typer.testing.CliRunner(env={"COLUMNS": "400"}).invoke(app, [str(word) for word in words])
 
 

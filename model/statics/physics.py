@@ -60,13 +60,8 @@ def case_of(setup: Setup, load: FloatArray, surface_speed: float, heat: float) -
 
 
 def bodies_of(setup: Setup, case: Case, films: Sequence[PadFilm]) -> BodyStack | None:
-    """The bodies of pads that bend or conduct; None for rigid pads whose films are for themselves.
-
-    Only the plainest search is compiled without those loops: films of another kind of rupture take them along, empty,
-    else there were a fourth search to compile.
-    """
-    alone = case.thermal in (ISOTHERMAL, ALONE) and case.rupture is None
-    if alone and not (setup.flexible_pads or case.axial):
+    """The bodies of pads that bend or conduct; None for rigid pads whose plain films are for themselves."""
+    if case.rupture is None and not (couples_heat(setup) or setup.flexible_pads or case.axial):
         return None
     bodies = tuple(f.deformation for f in films if f.deformation is not None)
     factor = setup.bending_factor if setup.flexible_pads else 0.0
