@@ -190,12 +190,12 @@ def _impedance(setup: Setup, equilibrium: Equilibrium, lines: FloatArray) -> tup
 
 
 def solve_as_it_runs(
-    setup: Setup, force: FloatArray, speed: float, start: Equilibrium | None = None
+    setup: Setup, force: FloatArray, speed: float, start: Equilibrium | None = None, patient: bool = True
 ) -> tuple[Setup, Equilibrium]:
     """Find the equilibrium with the clearances that belong to its own temperatures: `force` (2,) [N].
 
     `speed` [rad/s] is about +z. Both results are in the frame where the shaft turns counter-clockwise, see
-    `model.mirror`; so is `start`.
+    `model.mirror`; so is `start`. `patient` as of `solve_equilibrium`.
     """
     setup = seen_by_shaft(setup, speed)
     force = in_rig(setup, force)
@@ -203,7 +203,7 @@ def solve_as_it_runs(
     if growth is not None and growth.journal is not None:
         grown_bearing = grown(setup.bearing, growth, setup.inlet_temperature, growth.journal)
         setup = setup.change(bearing=grown_bearing, grown=True)
-    equilibrium = solve_equilibrium(setup, force, abs(speed), start)
+    equilibrium = solve_equilibrium(setup, force, abs(speed), start, patient)
     if setup.growth is not None:
         running = setup.bearing.with_pads(tuple(f.pad for f in equilibrium.films))
         setup = setup.change(bearing=running, grown=True)

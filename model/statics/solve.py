@@ -31,8 +31,13 @@ _EDGE = 3e-4
 _MOST_PADS = 6
 
 
-def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None) -> Equilibrium:
-    """Find where the journal stands: `load` (2,) [N]."""
+def solve_equilibrium(
+    setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None, patient: bool = True
+) -> Equilibrium:
+    """Find where the journal stands: `load` (2,) [N]; `patient`: by raising load or heat too, where nothing else does.
+
+    That takes some hundred times as long as an equilibrium from a neighbour.
+    """
     load = np.asarray(load, float)
     warm = None
     if start is not None:
@@ -54,7 +59,7 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
     if not result.converged and warm is not None and warm.converged:
         return warm
     for attempt in _ATTEMPTS:
-        if not result.converged:
+        if patient and not result.converged:
             result = attempt(setup, load, speed, result)
     return result
 

@@ -82,10 +82,10 @@ def fits_of(campaign, promising=search._Search._promising, **changed):
     forward, problem, skipped = campaign
     fitted_in_order, fit = [], search._Search._fit
 
-    def recorded(self, proposal, rough=False):
+    def recorded(self, proposal):
         waiting = [p.estimate for p in self.proposals.values()]
         fitted_in_order.append((proposal, max(waiting, default=-np.inf)))
-        fit(self, proposal, rough)
+        fit(self, proposal)
 
     settings = DiagnoseSettings(workers=1, skip=skipped, **changed)
     with pytest.MonkeyPatch.context() as patch, workers(forward, problem, 1) as run:

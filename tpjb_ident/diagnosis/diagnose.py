@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from model.mirror import rotation_of
 from model.setup import Setup
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
+from tpjb_ident.compare.comparison import joined
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Problem, loosened
 from tpjb_ident.diagnosis.comparison.search import Comparison, Progress, compare
@@ -26,10 +26,9 @@ from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map, workers
 from tpjb_ident.diagnosis.next_test import Separation, options_for, ranked, say, separated, suggested
 from tpjb_ident.diagnosis.observations.constants import Deciding
-from tpjb_ident.diagnosis.observations.observe import Layout, Observations
+from tpjb_ident.diagnosis.observations.observe import Layout, Observations, Where
 from tpjb_ident.diagnosis.verdict.decide import decide
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
-from tpjb_ident.results.identification import coefficient_columns
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, coefficient_column
 
 if TYPE_CHECKING:
@@ -142,63 +141,47 @@ def _rivals(comparison: Comparison, model: Fit) -> list[Fit]:
 
 def before_and_after(diagnosis: Diagnosis, identification: Identification | None) -> pd.DataFrame:
     """Make a table as comparison.csv of a diagnosis; K and C of a table stand in it as the table has them."""
+    observations = diagnosis.observations
+    models = {BEFORE: diagnosis.problem.base}
+    if diagnosis.verdict.effects:
+        models[AFTER] = diagnosis.after
+    measured = _coefficients(observations, observations.value) if identification is None else identification.to_frame()
+    measured = measured.reindex(columns=measured.columns.union(["static_load_measured_N", "quality"]))
+    predictions = {}
+    for name, vector in models.items():
+        predicted = _coefficients(observations, vector)[[*POINT_KEY, *COEFFICIENT_COLUMNS]]
+        predictions[name] = (
+            measured[[*POINT_KEY]]
+            .merge(predicted, how="left")
+            .reindex(columns=[*predicted, "x_m", "y_m", "converged", "pivot_extrapolated", "status"])
+        )
+    return joined(measured, predictions)
+
+
+def _coefficients(observations: Observations, vector: FloatArray) -> pd.DataFrame:
+    """K and C of every operating point of a vector (n,) with the measured intervals' widths; NaN where it has none."""
     import pandas as pd
 
-    observations = diagnosis.observations
-    models = [(BEFORE, diagnosis.problem.base)]
-    models += [(AFTER, diagnosis.after)] if diagnosis.verdict.effects else []
-    measured = (
-        {_place(p.point): (p.point, coefficient_columns(p.stiffness)) for p in identification.points}
-        if identification is not None
-        else _coefficients(observations, observations.value, np.sqrt(np.diag(observations.covariance)))
-    )
-    rows = []
-    for name, prediction in models:
-        predicted = _coefficients(observations, prediction)
-        for place, (point, columns) in measured.items():
-            empty = {f"{column}{end}": math.nan for column in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi")}
-            row: dict[str, Any] = {"pivots": name, **dict(zip(POINT_KEY, point.key, strict=True)), **empty, **columns}
-            own = predicted[place][1] if place in predicted else {}
-            for column in COEFFICIENT_COLUMNS:
-                row[f"{column}_predicted"] = own.get(column, math.nan)
-                row[f"{column}_ratio"] = row[f"{column}_predicted"] / row[column]
-            rows.append(row)
-    return pd.DataFrame(rows)
-
-
-Place = tuple[float, ...]
-
-
-def _place(point: OperatingPoint) -> Place:
-    return tuple(round(v, 6) for v in (point.static_load, point.static_load_direction, point.spin, point.excitation))
-
-
-def _coefficients(
-    observations: Observations, vector: FloatArray, errors: FloatArray | None = None
-) -> dict[Place, tuple[OperatingPoint, dict[str, float]]]:
-    """K and C of every operating point of a vector (n,), with intervals where there are errors (n,)."""
-    out: dict[Place, tuple[OperatingPoint, dict[str, float]]] = {}
-    for i, element in enumerate(observations.elements):
+    half = 1.96 * np.sqrt(np.diag(observations.covariance))
+    rows: dict[Where, dict[str, Any]] = {}
+    for element, value, width in zip(observations.elements, vector, half, strict=True):
         if element.family != "h":
             continue
         load, direction, speed, omega = (element.place(k) for k in ("load", "direction", "speed", "excitation"))
         point = OperatingPoint(load, direction, abs(speed), omega, rotation_of(speed))
-        _, columns = out.setdefault(_place(point), (point, {}))
+        row = rows.setdefault(element.where, dict(zip(POINT_KEY, point.key, strict=True)))
         column, factor = coefficient_column(element.observable), omega if element.observable[0] == "c" else 1.0
-        columns[column] = float(vector[i]) / factor
-        if errors is not None:
-            half = 1.96 * float(errors[i]) / factor
-            columns |= {f"{column}_lo": columns[column] - half, f"{column}_hi": columns[column] + half}
-    return out
+        for end, sign in (("", 0.0), ("_lo", -1.0), ("_hi", 1.0)):
+            row[column + end] = float(value + sign * width) / factor
+    columns = [*POINT_KEY, *(name + end for name in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi"))]
+    return pd.DataFrame(list(rows.values()), columns=columns)
 
 
 def median_deviations(table: pd.DataFrame) -> dict[str, tuple[float, float]]:
     """Median of predicted / measured - 1 before and after, of every direct coefficient."""
-    medians: dict[str, tuple[float, float]] = {}
+    from tpjb_ident.compare.summary import agreements
+
     if table.empty:
-        return medians
-    for name in ("kxx", "kyy", "cxx", "cyy"):
-        off = (table[f"{coefficient_column(name)}_ratio"] - 1.0).groupby(table["pivots"]).median()
-        if BEFORE in off and np.isfinite(off[BEFORE]):
-            medians[name] = (float(off[BEFORE]), float(off.get(AFTER, off[BEFORE])))
-    return medians
+        return {}
+    medians = agreements(table)["median"].dropna(axis=1)
+    return {str(name): (float(off[BEFORE]), float(off.iloc[-1])) for name, off in medians.items()}

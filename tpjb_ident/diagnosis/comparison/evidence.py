@@ -64,6 +64,11 @@ class Posterior:
     promised: float  #: `total` with what the next step promises
 
     @property
+    def refused(self) -> float:
+        """What the next step promises and no solved point kept, where a fit has ended: it counts for none beside."""
+        return self.promised - self.total
+
+    @property
     def leading(self) -> int:
         """Index of the likeliest scale."""
         return int(np.argmax(self.weights))

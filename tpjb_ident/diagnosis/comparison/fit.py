@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -196,10 +196,10 @@ def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
         held = unknowns.width.copy()
         held[unknowns.tolerances] = Deciding.held
         coarse = problem.errors.coarse
-        linear = _renewed(run, unknowns, linear)  # those from before the jump say nothing behind it
+        # those from before the jump say nothing behind it; of tolerances that are held little is asked
+        linear = _renewed(run, unknowns, linear, [i for at in unknowns.slices for i in range(at.start, at.stop)])
         linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
         linear = _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
-        linear = _renewed(run, unknowns, linear)
     return _settled(run, unknowns, linear)
 
 
@@ -213,7 +213,8 @@ def _better(reached: Linear, start: Start, errors: ErrorModel) -> Linear:
 
 def refined(run: Map, fit: Fit) -> Fit:
     """The same with derivatives of its own, and moved on by them."""
-    return _settled(run, fit.unknowns, _renewed(run, fit.unknowns, fit.linear))
+    asked = [i for i, reading in enumerate(fit.unknowns.is_reading) if not reading]
+    return _settled(run, fit.unknowns, _renewed(run, fit.unknowns, fit.linear, asked))
 
 
 def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:
@@ -222,9 +223,8 @@ def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:
     return Fit(unknowns, moved, posterior(errors, moved))
 
 
-def _renewed(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
-    """A model with derivatives of its own; what acts on readings has them already."""
-    asked = [i for i, reading in enumerate(unknowns.is_reading) if not reading]
+def _renewed(run: Map, unknowns: Unknowns, linear: Linear, asked: Sequence[int]) -> Linear:
+    """A model with derivatives of its own by some numbers; what acts on readings has them already."""
     parts = [asked[k :: run.opened.count] for k in range(run.opened.count)]
     jacobian = linear.jacobian.copy()
     jobs = [(unknowns.faults, linear.theta, part) for part in parts]

@@ -81,6 +81,7 @@ class _Search:
         self.tried = 0
         self.estimates: dict[frozenset[str], float] = {}
         self.proposals: dict[frozenset[str], Start] = {}
+        self.begun: dict[frozenset[str], float] = {}  #: estimates of coarse starts that were fitted
         self.paths: tuple[Path, ...] = ()
         self.exchanged: dict[frozenset[str], list[Start]] = {}  #: look-alikes by the leader that they are held against
         self.whole = True  #: whether paths are known as far as jumps of K and C ask for
@@ -90,7 +91,7 @@ class _Search:
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
         stated = self._stated
-        self._fit(Start((), stated.theta, stated.jacobian), rough=True)
+        self._fit(Start((), stated.theta, stated.jacobian))
         self.report("every effect of the library", 0.1)
         self._propose_singles()
         baseline, best = self.fits[frozenset()], max((p.estimate for p in self.proposals.values()), default=-math.inf)
@@ -110,10 +111,11 @@ class _Search:
             self._ask_whole_paths()
         order = sorted(self.proposals.values(), key=lambda p: (not self._comes_first(p), -p.estimate))
         leader = self._leader()
-        if leader is not None and leader.posterior.scale <= self.settings.right:
-            order = [p for p in order if self._promising(p, leader)]
+        right = leader is not None and leader.posterior.scale <= self.settings.right
+        if leader is not None:
+            order = [p for p in order if (self._promising if right else self._may_lead)(p, leader)]
         if not order:
-            return None if leader is None else self._look_alike(leader) or self._passed_over(leader)
+            return self._look_alike(leader) or self._passed_over(leader) if leader is not None and right else None
         return self.proposals.pop(order[0].labels)
 
     def _look_alike(self, leader: Fit) -> Start | None:
@@ -174,6 +176,11 @@ class _Search:
             self._lengthen([end * float(path.fault.width[0]) for path in self.paths])
         self._propose_alone()
 
+    def _may_lead(self, proposal: Start, leader: Fit) -> bool:
+        """Whether a proposal may take the lead from one that is wrong itself."""
+        rise = self.settings.near + self.settings.mistaken
+        return proposal.coarse or proposal.estimate > self._log_probability(leader) - rise
+
     def _promising(self, proposal: Start, leader: Fit) -> bool:
         """Whether a proposal may change the answer: as a rival of a right leader, or by a fault beside it."""
         plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
@@ -191,25 +198,28 @@ class _Search:
         again = refined(self.run, fit)
         return again if again.posterior.total > fit.posterior.total - Deciding.better else fit
 
-    def _past_jumps(self, fit: Fit) -> Fit:
-        """A fit that leads and is surely wrong, or stopped at a jump, begun coarsely where that makes it better."""
-        again = fitted(self.run, self.problem, Start(fit.faults, fit.linear.theta, fit.linear.jacobian, coarse=True))
-        return fit if again is None or again.posterior.total <= fit.posterior.total else again
+    def _reached(self, start: Start) -> Fit | None:
+        """Where a start leads; steps that fail on derivatives from elsewhere say nothing: what they promise counts."""
+        fit, leader = fitted(self.run, self.problem, start), self._leader()
+        if fit is None or not fit.faults:
+            return fit
+        right = leader is not None and min(leader.posterior.scale, fit.posterior.scale) <= self.settings.right
+        nats = self.settings.mistaken if start.coarse else self.settings.worth_derivatives if right else 0.0
+        near = self._near(fit, fit.posterior.promised, nats)
+        return self._renewed(fit) if near else fit
 
-    def _fit(self, proposal: Start, rough: bool = False) -> None:
-        fit = fitted(self.run, self.problem, proposal)
+    def _fit(self, proposal: Start) -> None:
+        """Fit a proposal; one that leads and is surely wrong, or stopped at a jump, once more with a coarse start."""
+        fit = self._reached(proposal)
         self.tried += 1
+        if proposal.coarse:
+            self.begun[proposal.labels] = proposal.estimate
         if fit is None:
             return
-        leader = self._leader()
-        right = leader is not None and min(leader.posterior.scale, fit.posterior.scale) <= self.settings.right
-        # steps that fail on derivatives from elsewhere say nothing: what they promise is asked
-        if not rough and self._near(fit, fit.posterior.promised, self.settings.worth_derivatives if right else 0.0):
-            fit = self._renewed(fit)
-        begun_fine = not (rough or proposal.coarse)
-        broken = fit.posterior.promised > fit.posterior.total + Deciding.better  # a jump lies in every step's way
-        if begun_fine and (broken or fit.needs_more(self.settings)) and self._near(fit, fit.posterior.promised, 0.0):
-            fit = self._past_jumps(fit)
+        wrong = fit.posterior.refused > Deciding.better or fit.needs_more(self.settings)
+        if fit.faults and not proposal.coarse and wrong and self._near(fit, fit.posterior.promised, 0.0):
+            coarse = self._reached(Start(fit.faults, fit.linear.theta, fit.linear.jacobian, coarse=True))
+            fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
         known = self.fits.get(proposal.labels)
         if known is not None and known.posterior.total >= fit.posterior.total:
             return
@@ -219,7 +229,8 @@ class _Search:
             self._propose_neighbours(fit)
 
     def _near(self, fit: Fit, total: float, nats: float) -> bool:
-        leader = self._leader()
+        """Whether a fit with some evidence comes near the leader, or near the best of all where none is tenable."""
+        leader = self._leader() or max(self.fits.values(), key=self._log_probability, default=None)
         return leader is None or total + self._log_prior(fit.faults) > self._log_probability(leader) - nats
 
     def _leader(self) -> Fit | None:
@@ -275,10 +286,11 @@ class _Search:
         for score in singles:
             self._propose(score, (), self._stated)
         if scale > self.settings.suspect:
-            rough = self._singles(coarse=True)[: self.settings.coarse]
-            for score in rough:
+            # a path that was never followed shows no jump
+            rough = [score for score in self._singles(coarse=True) if score.path.nodes is not None]
+            for score in rough[: self.settings.coarse]:
                 self._propose(score, (), self._stated, coarse=True)
-            self.clear = rough[0].total - self.settings.mistaken
+            self.clear = max((score.total for score in rough), default=-math.inf) - self.settings.mistaken
         return scale
 
     def _propose_neighbours(self, fit: Fit) -> None:
@@ -286,7 +298,7 @@ class _Search:
         if len(fit.faults) < len(self.settings.prior) - 1:
             further = [self._beside(path, fit) for path in self.paths if path.fault.label not in fit.labels]
             for score in scores(self.problem.errors, fit.linear, further, fit.strain):
-                self._propose(score, fit.faults, fit.linear)
+                self._propose(replace(score, total=score.total - fit.posterior.refused), fit.faults, fit.linear)
         if len(fit.faults) > 1:
             for fault in fit.faults:
                 self._propose_without(fit, fault)
@@ -329,7 +341,7 @@ class _Search:
     def _propose_without(self, fit: Fit, fault: Fault) -> None:
         """Take a fault from a model."""
         faults, linear = self._without(fit, fault)
-        estimate = posterior(self.problem.errors, linear).promised + self._log_prior(faults)
+        estimate = posterior(self.problem.errors, linear).promised - fit.posterior.refused + self._log_prior(faults)
         self._offer(Start(faults, linear.theta, linear.jacobian, estimate=estimate))
 
     def _without(self, fit: Fit, fault: Fault) -> tuple[tuple[Fault, ...], Linear]:
@@ -345,7 +357,10 @@ class _Search:
     def _offer(self, proposal: Start) -> None:
         """Keep the likeliest start of every explanation that was not fitted yet, or less well than from there."""
         known, fit = self.proposals.get(proposal.labels), self.fits.get(proposal.labels)
-        better = fit is None or proposal.coarse or proposal.estimate > self._log_probability(fit) + Deciding.better
+        if proposal.coarse:
+            better = proposal.estimate > self.begun.get(proposal.labels, -math.inf)
+        else:
+            better = fit is None or proposal.estimate > self._log_probability(fit) + Deciding.better
         if known is not None and known.coarse and not proposal.coarse:  # a start that would lead is past the jumps
             leader = self._leader()
             better &= leader is not None and proposal.estimate > self._log_probability(leader)

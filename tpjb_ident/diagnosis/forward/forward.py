@@ -86,7 +86,9 @@ class ModelCache:
     ) -> SolvedPoint:
         load, direction, speed = point
         force = load * np.array([math.cos(direction), math.sin(direction)])
-        running, equilibrium = solve_as_it_runs(setup, force, speed, self.start.get(point))
+        start = self.start.get(point)
+        # what no solved neighbour and no curve of a pad leads to is too far away: a step is shortened sooner
+        running, equilibrium = solve_as_it_runs(setup, force, speed, start, patient=start is None)
         if not equilibrium.converged:
             raise NoEquilibriumError(f"no equilibrium at {load:.0f} N ({', '.join(equilibrium.status)})")
         self.start[point] = equilibrium
