@@ -87,7 +87,7 @@ class _OperatingRange:
 
     @classmethod
     def of(cls, layout: Layout, pads: int) -> _OperatingRange:
-        points = [(t.load, t.direction, t.speed) for t in layout.dynamic] or [(5000.0, -math.pi / 2, 22.0 * HZ)]
+        points = [t.point for t in layout.dynamic] or [(5000.0, -math.pi / 2, 22.0 * HZ)]
         load, direction, speed = sorted(points)[len(points) // 2]
         lines = tuple(sorted({w for t in layout.dynamic for w in t.excitation})) or (speed,)
         return cls(load, max(p[0] for p in points), min(p[0] for p in points), direction, speed, lines, pads)

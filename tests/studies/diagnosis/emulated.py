@@ -236,9 +236,9 @@ def emulate(forward: Forward, kept: Path) -> Emulated:
 
 def _asked(forward: Forward) -> Iterator[tuple[StaticPoint, tuple[float, ...]]]:
     for test in forward.layout.dynamic:
-        yield (test.load, test.direction, test.speed), tuple(test.excitation)
+        yield test.point, tuple(test.excitation)
     for test in forward.layout.locus:
-        yield (test.load, test.direction, test.speed), (test.speed,)
+        yield test.point, (test.speed,)
 
 
 def solve(forward: Forward, setup: Setup, points: Any) -> FloatArray:

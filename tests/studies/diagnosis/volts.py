@@ -74,7 +74,7 @@ def case_of(kind: str, seed: int) -> Case | None:
 def plan_of(layout: Layout) -> RigPlan:
     """The test plan that gives a layout of observations."""
     points = tuple(
-        OperatingPoint(test.load, test.direction, test.speed, omega)
+        OperatingPoint(*test.point, omega)
         for test in layout.dynamic
         for omega in test.excitation
     )
@@ -83,7 +83,7 @@ def plan_of(layout: Layout) -> RigPlan:
     levels = tuple(top * share for share in np.arange(1, 11) / 10.0)
     return RigPlan(
         dynamic=points,
-        locus=tuple(OperatingPoint(test.load, test.direction, test.speed) for test in layout.locus),
+        locus=tuple(OperatingPoint(*test.point) for test in layout.locus),
         dry=tuple(DryTest(test.pad, levels, start=0.5 * levels[0]) for test in layout.dry),
         clearance=(ClearanceSweep(layout.push_load),) if layout.push_load else (),
         dynamic_rate=max(1000.0, 12.0 * fastest),

@@ -211,9 +211,12 @@ def _better(reached: Linear, start: Start, errors: ErrorModel) -> Linear:
     return reached if totals[0] >= totals[1] else start.solved
 
 
-def refined(run: Map, fit: Fit) -> Fit:
-    """The same with derivatives of its own, and moved on by them."""
-    asked = [i for i, reading in enumerate(fit.unknowns.is_reading) if not reading]
+def refined(run: Map, fit: Fit, whole: bool = True) -> Fit:
+    """The same with derivatives of its own, and moved on by them; not `whole`: by numbers whose next step shows."""
+    errors, unknowns, linear = fit.problem.errors, fit.unknowns, fit.linear
+    step = np.clip(fit.posterior.mean, unknowns.low, unknowns.high) - linear.theta
+    shown = np.linalg.norm(errors.white(linear.jacobian * step, fit.posterior.leading), axis=0) > 1.0
+    asked = [i for i, reading in enumerate(unknowns.is_reading) if not reading and (whole or shown[i])]
     return _settled(run, fit.unknowns, _renewed(run, fit.unknowns, fit.linear, asked))
 
 

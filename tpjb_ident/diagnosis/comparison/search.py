@@ -193,9 +193,9 @@ class _Search:
         rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
         return proposal.estimate > total - self.settings.near - rise
 
-    def _renewed(self, fit: Fit) -> Fit:
+    def _renewed(self, fit: Fit, whole: bool = True) -> Fit:
         """A fit with derivatives of its own, where these do not make it worse."""
-        again = refined(self.run, fit)
+        again = refined(self.run, fit, whole)
         return again if again.posterior.total > fit.posterior.total - Deciding.better else fit
 
     def _reached(self, start: Start) -> Fit | None:
@@ -205,8 +205,13 @@ class _Search:
             return fit
         right = leader is not None and min(leader.posterior.scale, fit.posterior.scale) <= self.settings.right
         nats = self.settings.mistaken if start.coarse else self.settings.worth_derivatives if right else 0.0
-        near = self._near(fit, fit.posterior.promised, nats)
-        return self._renewed(fit) if near else fit
+        if not self._near(fit, fit.posterior.promised, nats):
+            return fit
+        if not right and not self._near(fit, fit.posterior.total, 0.0):
+            fit = self._renewed(fit, whole=False)  # where all that is fitted is wrong, most promises are
+            if not self._near(fit, fit.posterior.total, 0.0):
+                return fit
+        return self._renewed(fit)
 
     def _fit(self, proposal: Start) -> None:
         """Fit a proposal; one that leads and is surely wrong, or stopped at a jump, once more with a coarse start."""
@@ -217,7 +222,10 @@ class _Search:
         if fit is None:
             return
         wrong = fit.posterior.refused > Deciding.better or fit.needs_more(self.settings)
-        if fit.faults and not proposal.coarse and wrong and self._near(fit, fit.posterior.promised, 0.0):
+        # what stands beside one that was begun coarsely is past its jumps
+        passed = not fit.faults or any(labels <= proposal.labels for labels in self.begun)
+        if wrong and not passed and self._near(fit, fit.posterior.promised, 0.0):
+            self.begun[proposal.labels] = -math.inf
             coarse = self._reached(Start(fit.faults, fit.linear.theta, fit.linear.jacobian, coarse=True))
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
         known = self.fits.get(proposal.labels)

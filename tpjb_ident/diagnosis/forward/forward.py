@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,8 +18,8 @@ from model.predict import in_rig, solve_as_it_runs
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
 from model.statics.equilibrium import Equilibrium
-from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.diagnosis.observations.observe import DryTest, DynamicTest, Element, Layout
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.diagnosis.observations.observe import DryTest, Element, Layout, LocusTest, all_elements
 from tpjb_ident.errors import TpjbError
 
 #: Load [N], its direction [rad], shaft speed about +z [rad/s]: negative where it turns clockwise.
@@ -127,7 +128,6 @@ class Forward:
     layout: Layout
     elements: tuple[Element, ...] = field(repr=False)
     cache: ModelCache = field(default_factory=ModelCache, repr=False)
-    _shares: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
     last: Change | None = None  #: of a rig that a test itself has changed, after effects and nuisances
 
     def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
@@ -135,82 +135,69 @@ class Forward:
         setup = apply_effects(self.setup, effects)
         for done in (change, self.last):
             setup = setup if done is None else done(setup)
-        table = _PredictedTable(setup)
+        values: list[FloatArray] = []
         for test in self.layout.dynamic:
-            point = (test.load, test.direction, test.speed)
-            reading = self._solve(setup, point, test.excitation)
-            table.dynamic(test, reading)
-            for pad, load in enumerate(reading.pad_load, start=1):
-                self._shares[(*point, float(pad))] = float(load) / test.load
-        for locus_test in self.layout.locus:
-            point = (locus_test.load, locus_test.direction, locus_test.speed)
-            table.locus(point, self._solve(setup, point, ()))
-        for dry in self.layout.dry:
-            table.dry(dry)
+            reading = self._solve(setup, test, test.excitation)
+            values += [np.stack([reading.h.real, reading.h.imag], axis=1).ravel()]
+            values += [reading.temperature[np.array(test.pads, int) - 1]]
+        values += [_locus(test, self._solve(setup, test)) for test in self.layout.locus]
+        values += [_dry(setup, dry) for dry in self.layout.dry]
         if self.layout.push_load is not None:
-            table.clearance(self.layout.push_load)
-        return np.array([table.get(e) for e in self.elements])
+            values += _clearance(setup, self.layout.push_load)
+        return np.concatenate(values)[self._rows]
 
     def fresh(self) -> Forward:
         """Return a copy that knows what this one knows now, whatever this one goes on to solve."""
-        return replace(self, cache=self.cache.copy(), _shares=dict(self._shares))
+        return replace(self, cache=self.cache.copy())
+
+    @functools.cached_property
+    def _rows(self) -> IntArray:
+        """Where the elements are among all that the layout shows; not every one was measured."""
+        shown = all_elements(self.layout, [pad.pivot_angle for pad in self.setup.bearing.pads])
+        places = {element: row for row, element in enumerate(shown)}
+        return np.array([places[element] for element in self.elements], dtype=int)
 
     def pad_shares(self) -> FloatArray:
-        """Share of the static load on the pad of every temperature element at the last call; NaN elsewhere, (n,)."""
+        """Share of the static load on the pad of every temperature element in the baseline; NaN elsewhere, (n,)."""
+        shares = {}
+        for test in self.layout.dynamic:
+            loads = self._solve(self.setup, test, test.excitation).pad_load
+            shares.update({(*test.point, float(pad)): load / test.load for pad, load in enumerate(loads, start=1)})
         names = ("load", "direction", "speed", "pad")
-        places = [tuple(e.place(name) for name in names) for e in self.elements]
-        return np.array([self._shares.get(place, math.nan) for place in places])
+        return np.array([shares.get(tuple(map(e.place, names)), math.nan) for e in self.elements])
 
     @property
     def _sensors(self) -> tuple[float, ...]:
         positions = self.layout.temperature_position
         return (*positions, *(SENSOR for _ in range(len(self.setup.bearing.pads) - len(positions))))
 
-    def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> SolvedPoint:
-        return self.cache.ask(setup, point, tuple(excitation), self._sensors)
+    def _solve(self, setup: Setup, test: LocusTest, excitation: Sequence[float] = ()) -> SolvedPoint:
+        return self.cache.ask(setup, test.point, tuple(excitation), self._sensors)
 
 
-_ROW = {"xx": (0, 0), "xy": (0, 1), "yx": (1, 0), "yy": (1, 1)}
+def _locus(test: LocusTest, reading: SolvedPoint) -> FloatArray:
+    """Position, load over its set point, and the angle between them."""
+    x, y = reading.load
+    turn = math.remainder(math.atan2(y, x) - test.direction, 2.0 * math.pi)
+    return np.array([*reading.position, math.hypot(x, y) / test.load, turn])
 
 
-@dataclass
-class _PredictedTable:
-    setup: Setup
-    table: dict[tuple[object, ...], float] = field(default_factory=dict)
+def _dry(setup: Setup, test: DryTest) -> FloatArray:
+    """Logarithm of the tangent compliance at loads as read."""
+    out = []
+    for load in test.load:
+        step = 0.02 * load
+        forces, deflections = dry_curve(setup, test.pad, np.array([load - step, load + step]))
+        gain = forces[1] / (load + step)  # loads are as read: ask at the true ones
+        if abs(gain - 1.0) > 1e-12:
+            forces, deflections = dry_curve(setup, test.pad, np.array([load - step, load + step]) / gain)
+        slope = max(float(np.diff(deflections)[0] / np.diff(forces)[0]), 1e-16)
+        out.append(math.log(slope))
+    return np.array(out)
 
-    def get(self, element: Element) -> float:
-        return self.table[(element.observable, *(v for _, v in element.where))]
 
-    def dynamic(self, test: DynamicTest, reading: SolvedPoint) -> None:
-        point = (test.load, test.direction, test.speed)
-        for h, omega in zip(reading.h, test.excitation, strict=True):
-            for name, at in _ROW.items():
-                self.table[(f"k{name}", *point, omega)] = float(h[at].real)
-                self.table[(f"c{name}", *point, omega)] = float(h[at].imag)
-        for pad, t in enumerate(reading.temperature, start=1):
-            self.table[("pad_temperature", *point, float(pad))] = float(t)
-
-    def locus(self, point: StaticPoint, reading: SolvedPoint) -> None:
-        self.table[("locus_x", *point)], self.table[("locus_y", *point)] = map(float, reading.position)
-        load = reading.load
-        self.table[("load_ratio", *point)] = float(np.hypot(*load)) / point[0]
-        turn = np.arctan2(load[1], load[0]) - point[1]
-        self.table[("load_turn", *point)] = float(np.arctan2(np.sin(turn), np.cos(turn)))
-
-    def dry(self, test: DryTest) -> None:
-        """Logarithm of the tangent compliance at loads as read."""
-        for load in test.load:
-            step = 0.02 * load
-            forces, deflections = dry_curve(self.setup, test.pad, np.array([load - step, load + step]))
-            gain = forces[1] / (load + step)  # loads are as read: ask at the true ones
-            if abs(gain - 1.0) > 1e-12:
-                forces, deflections = dry_curve(self.setup, test.pad, np.array([load - step, load + step]) / gain)
-            slope = max(float(np.diff(deflections)[0] / np.diff(forces)[0]), 1e-16)
-            self.table[("dry_compliance", float(test.pad), load)] = float(np.log(slope))
-
-    def clearance(self, push_load: float) -> None:
-        sides = zip(self.setup.bearing.pads, *polygon_sides(self.setup, push_load), strict=True)
-        for k, (pad, pushed, angle) in enumerate(sides, start=1):
-            self.table[("clearance_pushed", float(k), pad.pivot_angle)] = float(pushed)
-            turn = angle - pad.pivot_angle
-            self.table[("side_angle", float(k), pad.pivot_angle)] = float(np.arctan2(np.sin(turn), np.cos(turn)))
+def _clearance(setup: Setup, push_load: float) -> list[FloatArray]:
+    """Sides of the polygon, then their angles from the pivots'."""
+    sides, angles = polygon_sides(setup, push_load)
+    turns = [math.remainder(a - p.pivot_angle, 2.0 * math.pi) for a, p in zip(angles, setup.bearing.pads, strict=True)]
+    return [np.asarray(sides), np.array(turns)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -29,23 +29,25 @@ from tpjb_ident.terms.mains import MAINS_CORRECTED, MAINS_ON_LINE
 
 
 @dataclass(frozen=True)
-class DynamicTest:
-    """Dynamic tests at one static operating point."""
+class LocusTest:
+    """One load direction of the locus: load [N], direction [rad], speed [rad/s] about +z."""
 
     load: float
     direction: float
     speed: float
-    excitation: tuple[float, ...]
-    pads: tuple[int, ...] = ()
+
+    @property
+    def point(self) -> tuple[float, float, float]:
+        """The static operating point."""
+        return self.load, self.direction, self.speed
 
 
 @dataclass(frozen=True)
-class LocusTest:
-    """One load direction of the locus: load [N], direction [rad], speed [rad/s]."""
+class DynamicTest(LocusTest):
+    """Dynamic tests at one static operating point."""
 
-    load: float
-    direction: float
-    speed: float
+    excitation: tuple[float, ...]
+    pads: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -88,44 +90,41 @@ def _at_point(*point: float) -> Where:
     return tuple(zip(("load", "direction", "speed", "excitation"), point))
 
 
-def _stiffness_elements(where: Where) -> list[Element]:
-    """Real, then imaginary parts."""
-    return [Element("h", f"{part}{entry}", where) for part in "kc" for entry in ("xx", "xy", "yx", "yy")]
+#: Family and observables of one test, in the order of its values: K and omega C, a position and a load reading.
+_STIFFNESS = [("h", f"{part}{entry}") for part in "kc" for entry in ("xx", "xy", "yx", "yy")]
+_LOCUS = [("locus", "locus_x"), ("locus", "locus_y"), ("load", "load_ratio"), ("load", "load_turn")]
+
+
+def _elements(names: Iterable[tuple[str, str]], *places: Where) -> list[Element]:
+    """Every observable at every place."""
+    return [Element(family, observable, where) for where in places for family, observable in names]
 
 
 def _temperature_elements(where: Where, pads: Iterable[int]) -> list[Element]:
     """One per pad."""
-    return [Element("temperature", "pad_temperature", (*where, ("pad", float(pad)))) for pad in pads]
+    return _elements([("temperature", "pad_temperature")], *((*where, ("pad", float(pad))) for pad in pads))
 
 
-def _locus_elements(where: Where) -> list[Element]:
-    """A position and a load reading."""
-    named = (("locus", "locus_x"), ("locus", "locus_y"), ("load", "load_ratio"), ("load", "load_turn"))
-    return [Element(family, name, where) for family, name in named]
-
-
-def _dry_elements(pad: int, loads: Iterable[float]) -> list[Element]:
+def _dry_elements(test: DryTest) -> list[Element]:
     """One per load."""
-    return [Element("dry", "dry_compliance", (("pad", float(pad)), ("load", float(load)))) for load in loads]
+    places = ((("pad", float(test.pad)), ("load", float(load))) for load in test.load)
+    return _elements([("dry", "dry_compliance")], *places)
 
 
 def _clearance_elements(name: str, angles: Iterable[float]) -> list[Element]:
     """One per side of the polygon."""
-    return [Element("clearance", name, (("pad", k), ("angle", float(a)))) for k, a in enumerate(angles, 1)]
+    return _elements([("clearance", name)], *((("pad", k), ("angle", float(a))) for k, a in enumerate(angles, 1)))
 
 
 def all_elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
-    """Everything that a layout of tests shows of a bearing with pivots at these angles."""
+    """Everything that a layout of tests shows of a bearing with pivots at these angles, in the order of predictions."""
     out: list[Element] = []
     for test in layout.dynamic:
-        place = _at_point(test.load, test.direction, test.speed)
-        for omega in test.excitation:
-            out += _stiffness_elements((*place, ("excitation", omega)))
-        out += _temperature_elements(place, test.pads)
-    for locus_test in layout.locus:
-        out += _locus_elements(_at_point(*astuple(locus_test)))
+        out += _elements(_STIFFNESS, *(_at_point(*test.point, omega) for omega in test.excitation))
+        out += _temperature_elements(_at_point(*test.point), test.pads)
+    out += _elements(_LOCUS, *(_at_point(*test.point) for test in layout.locus))
     for dry in layout.dry:
-        out += _dry_elements(dry.pad, dry.load)
+        out += _dry_elements(dry)
     if layout.push_load is not None:
         out += [*_clearance_elements("clearance_pushed", angles), *_clearance_elements("side_angle", angles)]
     return tuple(out)
@@ -241,7 +240,7 @@ def _mains_on_excitation(result: PointResult) -> bool:
 
 def _add_stiffness(builder: _Builder, result: PointResult, place: Where) -> None:
     h = result.stiffness.h
-    elements = _stiffness_elements((*place, ("excitation", result.point.excitation)))
+    elements = _elements(_STIFFNESS, (*place, ("excitation", result.point.excitation)))
     value = np.concatenate([h.real.ravel(), h.imag.ravel()])
     covariance = np.asarray(result.stiffness.covariance)
     if "no-spare-direction" in result.quality:  # the interval knows repeats only, not what runs differ by
@@ -266,7 +265,7 @@ def _add_locus(
         covariance = stacked @ spread @ stacked.T
         covariance[:2, :2] += p.covariance
         value = np.array([*p.position, p.load / test.load, turn])
-        builder.add(_locus_elements(_at_point(*astuple(test))), value, covariance)
+        builder.add(_elements(_LOCUS, _at_point(*test.point)), value, covariance)
         out.append(test)
     return tuple(out)
 
@@ -288,9 +287,8 @@ def _add_dry(builder: _Builder, curve: PivotCurve) -> DryTest:
     value = -np.log(np.asarray(curve.stiffness(load), float))
     covariance = curve.relative_stiffness_covariance(load)
     covariance = covariance + np.diag(Deciding.dry_shape**2 * np.diag(covariance))
-    builder.add(_dry_elements(curve.pad, load), value, covariance)
-    used_loads = load[builder.kept]
-    return DryTest(curve.pad, tuple(float(w) for w in used_loads))
+    builder.add(_dry_elements(DryTest(curve.pad, tuple(load))), value, covariance)
+    return DryTest(curve.pad, tuple(map(float, load[builder.kept])))
 
 
 def _add_clearance(builder: _Builder, polygon: ClearancePolygon) -> float:
@@ -366,7 +364,7 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
         static = (point.static_load, point.static_load_direction, point.spin)
         tests.setdefault(static, []).append(point.excitation)
         present = np.flatnonzero(np.isfinite(values))
-        named = _stiffness_elements(_at_point(*static, point.excitation))
+        named = _elements(_STIFFNESS, _at_point(*static, point.excitation))
         elements = [named[i] for i in present]
         factor = np.where(present < 4, 1.0, point.excitation)
         value, error = factor * values[present], factor * errors[present]
