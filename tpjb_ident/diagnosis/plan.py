@@ -105,9 +105,7 @@ class CampaignPlan:
 
 def plan(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None) -> CampaignPlan:
     """Work out what a layout of tests could tell."""
-    chosen = tuple(pool if pool is not None else one_amplitude(setup.bearing))
-    shown = _signatures(setup, layout, chosen)
-    return separated(chosen, np.asarray(np.linalg.solve(shown.factor(), shown.columns)))
+    return _shown(setup, layout, pool).by()
 
 
 @dataclass(frozen=True)
@@ -115,22 +113,28 @@ class _Signatures:
     """What every candidate does to the observation vector of a layout, beside what hides it."""
 
     observations: Observations
+    candidates: tuple[Candidate, ...]
     nuisances: FloatArray = field(repr=False)  #: (n, m): columns per standard deviation
     columns: FloatArray = field(repr=False)  #: (n, k): change by a typical size of every candidate
 
-    def factor(self, free: bool = True) -> FloatArray:
-        """Cholesky factor of the covariance, with or without nuisances."""
-        return usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
+    def by(self, rows: BoolArray | None = None, free: bool = True) -> CampaignPlan:
+        """Sizes and separations by some elements, all by default, with or without nuisances."""
+        mine = slice(None) if rows is None else rows
+        factor = usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
+        # rows of a Cholesky factor have the covariance of those elements
+        lower = np.linalg.qr(factor[mine].T, mode="r").T
+        return separated(self.candidates, np.asarray(np.linalg.solve(lower, self.columns[mine])))
 
 
-def _signatures(setup: Setup, layout: Layout, chosen: Sequence[Candidate]) -> _Signatures:
+def _shown(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None) -> _Signatures:
     """Work out the signature of every candidate on a layout."""
+    chosen = tuple(pool if pool is not None else one_amplitude(setup.bearing))
     observations = planned_observations(setup, layout)
     forward = Forward(setup, layout, observations.elements)
     base = forward()
     free = at_baseline(forward, (), setup, Tolerances(), base)
     columns = [_signature(forward, base, c) for c in chosen]
-    return _Signatures(observations, free, np.column_stack(columns))
+    return _Signatures(observations, chosen, free, np.column_stack(columns))
 
 
 def _signature(forward: Forward, base: FloatArray, candidate: Candidate) -> FloatArray:
@@ -192,22 +196,12 @@ class DataSet:
 def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
     """Work out what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free."""
     faster = tuple(replace(t, speed=_FASTER * t.speed) for t in layout.dynamic)
-    chosen = one_amplitude(setup.bearing)
-    shown = _signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
+    shown = _shown(setup, replace(layout, dynamic=(*layout.dynamic, *faster)))
     planned = {t.speed for t in layout.dynamic}
     return tuple(
-        DataSet(name, int(mask.sum()), *(_told(shown, mask, chosen, free) for free in (False, True)))
+        DataSet(name, int(mask.sum()), shown.by(mask, free=False), shown.by(mask))
         for name, mask in _masks(shown.observations.elements, planned).items()
     )
-
-
-def _told(shown: _Signatures, mine: BoolArray, chosen: Sequence[Candidate], free: bool) -> CampaignPlan:
-    """Sizes and separations by a part of the elements."""
-    factor = shown.factor(free)
-    part = (factor @ factor.T)[np.ix_(mine, mine)]
-    scale = np.sqrt(np.diag(part))
-    whole = np.linalg.cholesky(part / np.outer(scale, scale))
-    return separated(chosen, np.asarray(np.linalg.solve(whole, shown.columns[mine] / scale[:, None])))
 
 
 def _masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
