@@ -192,10 +192,11 @@ def test_what_a_diagnosis_measures_goes_on_without_damaged_runs_and_names_them(s
 
     bad = [RUN, "p-4-up", "l-01000-02", "c-1"]
     source = load_campaign(spoilt("probe zero", *bad))
-    found = measure_campaign(source, parse_bearing(source.bearing_text, "b.toml"))
-    told = " ".join(c.sentence() for c in found.identification.conditions)
+    bearing = parse_bearing(source.bearing_text, "b.toml")
+    identification, static = measure_campaign(source, bearing, lambda text, done, total: None)
+    told = " ".join(c.sentence() for c in identification.conditions)
     assert all(run in told for run in bad), told
-    assert [curve.pad for curve in found.curves] == [1, 2, 3, 5]
-    assert [p.n_records for p in found.identification.points] == [3, 2]
-    assert len(found.locus.points) == 2
-    assert found.polygon is None
+    assert [curve.pad for curve in static.curves] == [1, 2, 3, 5]
+    assert [p.n_records for p in identification.points] == [3, 2]
+    assert len(static.locus.points) == 2
+    assert static.clearance is None

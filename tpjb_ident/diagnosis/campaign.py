@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from model.effects import Effect, apply_effects
@@ -31,11 +31,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from model.bearing import Bearing
+    from model.pivots import PivotLaw
     from rigdata.campaign import Campaign
     from tpjb_ident.clearance.locus import Locus
-    from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.static_tests import StaticTests
-    from tpjb_ident.pivot import PivotCurve
     from tpjb_ident.results.identification import Identification
 
 
@@ -80,19 +79,6 @@ class CampaignDiagnosis(Presented):
         return plots.gap(self.diagnosis, **options)
 
 
-@dataclass(frozen=True)
-class Measured:
-    """All that a diagnosis needs of a campaign, without its records; it can be kept and diagnosed again."""
-
-    identification: Identification = field(repr=False)
-    curves: tuple[PivotCurve, ...] = field(repr=False)
-    polygon: ClearancePolygon | None = field(repr=False)
-    locus: Locus | None = field(repr=False)
-    instruments: Instruments
-    tolerances: Tolerances
-    sensors: tuple[float, ...] = ()
-
-
 def diagnose_campaign(
     campaign: Campaign,
     bearing: Bearing,
@@ -132,59 +118,52 @@ def diagnose_campaign(
     pivot_flexibility
     """
     settings, baseline = settings or DiagnoseSettings(), baseline or Baseline()
+    report = progress or (lambda text, done, total: None)
     rotations = {run.rotation for run in campaign.runs if run.point.shaft_speed}
     bearing = as_it_turns(bearing, rotations, campaign.rotation)
-    measured = measure_campaign(campaign, bearing, settings.tolerances, progress, ahead)
-    settings = replace(settings, tolerances=measured.tolerances)
-    report = progress or (lambda text, done, total: None)
-    setup = _before(bearing, baseline, measured)
+    identification, static = measure_campaign(campaign, bearing, report, ahead)
+    tolerances = _stated_tolerances(campaign, bearing, settings.tolerances)
+    if static.clearance is None and static.locus is not None:
+        tolerances = replace(tolerances, centre=unknown_centre(static.locus))
+    settings = replace(settings, tolerances=tolerances)
+    from_dry_tests = baseline.pivots == "measured"
+    laws = measured_laws(static.curves, len(bearing.pads), campaign.id) if from_dry_tests else None
+    setup = _before(bearing, baseline, laws, _instruments(campaign, identification))
     # curves that the model was given cannot testify about it
-    curves = () if baseline.pivots == "measured" else measured.curves
-    observations = observe(measured.identification, curves, measured.locus, measured.polygon, settings.tolerance)
-    observations = replace(observations, layout=replace(observations.layout, temperature_position=measured.sensors))
+    curves = () if from_dry_tests else static.curves
+    observations = observe(identification, curves, static.locus, static.clearance, settings.tolerance)
+    layout = replace(observations.layout, temperature_position=_sensor_positions(campaign, bearing))
     result = diagnose(
-        observations, setup, settings, lambda text, share: report(f"diagnosing, {text}", 30 + int(70 * share), 100)
-    )
-    return CampaignDiagnosis(result, measured.identification, setup)
+        replace(observations, layout=layout), setup, settings,
+        lambda text, share: report(f"diagnosing, {text}", 30 + int(70 * share), 100),
+    )  # fmt: skip
+    return CampaignDiagnosis(result, identification, setup)
 
 
-def _before(bearing: Bearing, baseline: Baseline, measured: Measured | None = None) -> Setup:
-    """The model that a diagnosis starts from."""
-    if measured is not None and baseline.pivots == "measured":
-        laws = measured_laws(measured.curves, len(bearing.pads), measured.identification.campaign)
-    else:
-        laws = pivot_laws(baseline.pivots, bearing)
-    instruments = Instruments() if measured is None else measured.instruments
+def _before(bearing: Bearing, baseline: Baseline, laws: tuple[PivotLaw, ...] | None, instruments: Instruments) -> Setup:
+    """The model that a diagnosis starts from; `laws` where pivots were measured."""
+    laws = pivot_laws(baseline.pivots, bearing) if laws is None else laws
     return apply_effects(Setup(bearing, laws, baseline.thermal, instruments=instruments), baseline.effects)
 
 
 def measure_campaign(
     campaign: Campaign,
     bearing: Bearing,
-    known: Tolerances | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    report: Callable[[str, int, int], None],
     ahead: Callable[[], StaticTests | None] | None = None,
-) -> Measured:
+) -> tuple[Identification, StaticTests]:
     """Identify a campaign and measure its static tests."""
-    report = progress or (lambda text, done, total: None)
     if not campaign.of_kind("dynamic"):
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to diagnose")
     least = min(pad.assembled_clearance for pad in bearing.pads)
-    chosen = IdentifySettings(clearance=least)
     identification = identify(
-        campaign, chosen, lambda text, done, total: report(f"identifying, {text}", 20 * done, 100 * total)
+        campaign,
+        IdentifySettings(clearance=least),
+        lambda text, done, total: report(f"identifying, {text}", 20 * done, 100 * total),
     )
     report("pivot curves, clearance and locus", 20, 100)
     static = (ahead() if ahead is not None else None) or measure_static(campaign, bearing)
-    curves, polygon, locus = static.curves, static.clearance, static.locus
-    identification = replace(identification, conditions=identification.conditions + static.left_out)
-    instruments = _instruments(campaign, identification)
-    certain = _stated_tolerances(campaign, bearing, known or Tolerances())
-    if polygon is None and locus is not None:
-        certain = replace(certain, centre=unknown_centre(locus))
-    return Measured(
-        identification, tuple(curves), polygon, locus, instruments, certain, _sensor_positions(campaign, bearing)
-    )
+    return replace(identification, conditions=identification.conditions + static.left_out), static
 
 
 def diagnose_table(
@@ -203,7 +182,7 @@ def diagnose_table(
     settings = replace(settings, tolerances=settings.tolerances.layered(bearing))
     observations = observe_table(path, reading_error, settings.tolerance)
     bearing = as_it_turns(bearing, {rotation_of(test.speed) for test in observations.layout.dynamic})
-    setup = _before(bearing, baseline)
+    setup = _before(bearing, baseline, None, Instruments())
     result = diagnose(observations, setup, settings, lambda text, share: report(text, int(100 * share), 100))
     return CampaignDiagnosis(result, None, setup)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from model.setup import Setup
 from rigdata.arrays import BoolArray, FloatArray
-from tpjb_ident.diagnosis.comparison.scores import separation
+from tpjb_ident.diagnosis.comparison.scores import separations
 from tpjb_ident.diagnosis.forward.candidates import Candidate, one_amplitude
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
@@ -154,12 +154,9 @@ def _signature(forward: Forward, base: FloatArray, candidate: Candidate) -> Floa
 
 def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
     """Sizes and separations of whitened signatures (n, k)."""
-    size = np.linalg.norm(white, axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):  # a signature of nothing has no direction: NaN
-        unit = white / size
-    apart = separation(unit.T @ unit)
+    apart = separations(white)
     np.fill_diagonal(apart, np.nan)
-    return CampaignPlan(tuple(chosen), size, apart)
+    return CampaignPlan(tuple(chosen), np.linalg.norm(white, axis=0), apart)
 
 
 _DIRECT = frozenset({"kxx", "kyy", "cxx", "cyy"})

@@ -47,9 +47,14 @@ class Strain:
         return min(1.0, len(self.rows) * 2.0 * float(ndtr(-farthest)))
 
 
-def separation(cosine: FloatArray) -> FloatArray:
-    """Standard deviations between an effect of a size that is seen and all that another one can imitate of it."""
-    return Deciding.seen * np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+def separations(white: FloatArray) -> FloatArray:
+    """Standard deviations between every effect, of a size that is seen, and all that another can imitate of it, (k, k).
+
+    Of whitened signatures (n, k); NaN where a signature is nothing.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit = white / np.linalg.norm(white, axis=0)
+    return Deciding.seen * np.sqrt(np.maximum(1.0 - (unit.T @ unit) ** 2, 0.0))
 
 
 def scores(errors: ErrorModel, linear: Linear, paths: Sequence[Path], strain: Strain) -> list[Score]:

@@ -17,11 +17,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from tpjb_ident.diagnosis.comparison.evidence import Levels, Linear, posterior
+from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
 from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
-from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores, separation
+from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores, separations
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
@@ -140,19 +140,14 @@ class _Search:
     def _alike(self, fit: Fit, fault: Fault) -> list[Path]:
         """Paths of effects that a campaign could not tell from a fault at a size that it sees."""
         others = [path for path in self.paths if path.fault.label not in fit.labels and not path.fault.is_term]
-        at, linear = fit.unknowns.slices[fit.faults.index(fault)], fit.linear
-        width = linear.width.copy()
-        width[at] = 0.0  # by itself, beside everything else that is free
+        at, linear, level = fit.unknowns.slices[fit.faults.index(fault)], fit.linear, fit.posterior.leading
+        beside = np.delete(linear.jacobian * linear.width, at, axis=1)  # everything else that is free
+        factor = np.linalg.cholesky(self.problem.errors.covariance(level) + beside @ beside.T)
         own = linear.jacobian[:, at]
-        levels = Levels.of(
-            self.problem.errors, replace(linear, width=width), np.column_stack([own, *(p.columns for p in others)])
-        )
-        gram = levels.product(slice(1, levels.rest.shape[1]))[fit.posterior.leading, 1:, 1:]
-        size = np.sqrt(np.maximum(np.diag(gram), 1e-12))
-        count = own.shape[1]
-        nearest = separation(gram / np.outer(size, size))[:count].min(axis=0)
-        ends = np.cumsum([count, *(path.columns.shape[1] for path in others)])
-        return [p for p, part in zip(others, np.split(nearest, ends[:-1])[1:]) if part.min() < Deciding.visible]
+        apart = separations(np.linalg.solve(factor, np.column_stack([own, *(path.columns for path in others)])))
+        ends = np.cumsum([own.shape[1], *(path.columns.shape[1] for path in others)])
+        nearest = np.split(np.nan_to_num(apart[: own.shape[1]], nan=np.inf).min(axis=0), ends[:-1])[1:]
+        return [path for path, part in zip(others, nearest, strict=True) if part.min() < Deciding.visible]
 
     def _exchange(self, fit: Fit, fault: Fault, path: Path) -> Start:
         """A fit with another fault in the place of one of its own."""
