@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from rigdata.operating_point import OperatingPoint
+from tests.diagnosis.rocker_case import rocker_setup
 from tpjb_ident.diagnosis.campaign import unknown_centre
+from tpjb_ident.diagnosis.forward import forward
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import _mains_on_excitation, observe
 from tpjb_ident.estimators.stiffness import DynamicStiffness
@@ -44,3 +46,17 @@ def test_two_directions_widen_the_covariance_by_what_runs_differ_by():
     plain, two = (observe(SimpleNamespace(points=(point(*q),))) for q in ((), ("no-spare-direction",)))
     more = np.diag(two.covariance - plain.covariance)
     np.testing.assert_allclose(more, (Deciding.unseen * np.repeat([2e8, 3e7], 4)) ** 2, rtol=1e-6)
+
+
+def test_load_and_heat_are_raised_only_where_no_solved_neighbour_is_known(monkeypatch):
+    asked, place = [], (5000.0, -1.5, 138.0)
+
+    def unsolved(*_, patient):
+        asked.append(patient)
+        raise forward.NoEquilibriumError("none")
+
+    monkeypatch.setattr(forward, "solve_as_it_runs", unsolved)
+    for known in ({}, {place: object()}):
+        with pytest.raises(forward.NoEquilibriumError):
+            forward.ModelCache(start=known).ask(rocker_setup(), place, (), (0.75,) * 5)
+    assert asked == [True, False]

@@ -123,6 +123,27 @@ def test_what_is_left_out_would_not_have_changed_the_answer(campaign, usual):
     assert sum(whole.probability(fit) for fit in left_out) < spare
 
 
+def test_what_a_refused_step_promised_counts_for_no_explanation_beside(monkeypatch):
+    errors, linear, columns = linear_case([1.0])
+    state = posterior(errors, linear)
+    assert state.refused == state.promised - state.total > 0.0
+    totals = []
+    monkeypatch.setattr(search._Search, "_propose", lambda self, score, *_: totals.append(score.total))
+    for refused in (0.0, 7.0):
+        tried = object.__new__(search._Search)
+        tried.paths, tried.problem = (
+            (straight(columns[:, 1]),),
+            SimpleNamespace(errors=errors, said_by=lambda fault: {}),
+        )
+        tried.settings = DiagnoseSettings()
+        fit = SimpleNamespace(
+            labels=frozenset(), faults=(), linear=linear, strain=Strain(np.zeros((0, 5)), np.zeros(0)),
+            posterior=SimpleNamespace(refused=refused),
+        )  # fmt: skip
+        tried._propose_neighbours(fit)
+    assert totals[0] - totals[1] == pytest.approx(7.0)
+
+
 @pytest.mark.slow
 def test_without_an_effect_in_the_library_none_is_below_the_floor_or_named(campaign):
     forward, problem, _ = campaign

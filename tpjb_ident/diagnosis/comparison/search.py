@@ -111,12 +111,13 @@ class _Search:
             self._ask_whole_paths()
         order = sorted(self.proposals.values(), key=lambda p: (not self._comes_first(p), -p.estimate))
         leader = self._leader()
-        right = leader is not None and leader.posterior.scale <= self.settings.right
         if leader is not None:
-            order = [p for p in order if (self._promising if right else self._may_lead)(p, leader)]
-        if not order:
-            return self._look_alike(leader) or self._passed_over(leader) if leader is not None and right else None
-        return self.proposals.pop(order[0].labels)
+            order = [proposal for proposal in order if self._promising(proposal, leader)]
+        if order:
+            return self.proposals.pop(order[0].labels)
+        if leader is None or leader.posterior.scale > self.settings.right:
+            return None
+        return self._look_alike(leader) or self._passed_over(leader)
 
     def _look_alike(self, leader: Fit) -> Start | None:
         """The leader with a fault exchanged for what the campaign hardly tells from it; None where all were fitted."""
@@ -171,22 +172,18 @@ class _Search:
             self._lengthen([end * float(path.fault.width[0]) for path in self.paths])
         self._propose_alone()
 
-    def _may_lead(self, proposal: Start, leader: Fit) -> bool:
-        """Whether a proposal may take the lead from one that is wrong itself."""
-        rise = self.settings.near + self.settings.mistaken
-        return proposal.coarse or proposal.estimate > self._log_probability(leader) - rise
-
     def _promising(self, proposal: Start, leader: Fit) -> bool:
-        """Whether a proposal may change the answer: as a rival of a right leader, or by a fault beside it."""
+        """Whether a proposal may change the answer: as a rival of a leader, or by a fault beside a right one."""
+        total, near, mistaken = self._log_probability(leader), self.settings.near, self.settings.mistaken
+        if leader.posterior.scale > self.settings.right:
+            return proposal.coarse or proposal.estimate > total - near - mistaken
         plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
         if proposal.coarse:
             return plain
-        total = self._log_probability(leader)
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
             return proposal.estimate > total + math.log(1.0 - self.settings.included)
-        mistaken = self.settings.mistaken
         rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
-        return proposal.estimate > total - self.settings.near - rise
+        return proposal.estimate > total - near - rise
 
     def _renewed(self, fit: Fit, whole: bool = True) -> Fit:
         """A fit with derivatives of its own, where these do not make it worse."""

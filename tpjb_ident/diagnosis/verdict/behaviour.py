@@ -111,8 +111,8 @@ class Drift:
 
     def to_dict(self) -> dict[str, object]:
         """Plain data, as in the contract."""
-        return {"effect": self.effect, "parameter": self.parameter, "over": self.over, "from": self.start,
-                "to": self.end, "words": self.words}  # fmt: skip
+        renamed = {"start": "from", "end": "to"}
+        return {renamed.get(name, name): value for name, value in vars(self).items()}
 
 
 def drifts(fit: Fit, notable: float) -> tuple[Drift, ...]:

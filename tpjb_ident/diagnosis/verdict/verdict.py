@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from model.effects import Effect, kind_of
@@ -33,13 +33,6 @@ class FoundEffect:
     def effect(self) -> Effect:
         """The effect itself."""
         return Effect(self.name, **{k: p.value for k, p in self.parameters.items()})
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data, as in the contract."""
-        parameters = {k: vars(p) for k, p in self.parameters.items()}
-        return {
-            "name": self.name, "probability": self.probability, "parameters": parameters, "stands_in": self.stands_in,
-        }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -112,25 +105,9 @@ class Verdict:
     beforehand: tuple[str, ...] = ()  #: what measurements contradict in the bearing file, before any search
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, in the order of the contract."""
-        return {
-            "schema": "tpjb-diagnosis/2",
-            "verdict": self.verdict,
-            "effects": [e.to_dict() for e in self.effects],
-            "indistinguishable": [list(group) for group in self.indistinguishable],
-            "below_floor": list(self.below_floor),
-            "next_test": self.next_test,
-            "candidates": [vars(c) for c in self.candidates],
-            "disagreement": [vars(d) for d in self.disagreement],
-            "gap_by_observable": self.gap_by_observable,
-            "remainder": vars(self.remainder),
-            "behaves_like": [vars(b) for b in self.behaves_like],
-            "drift": [d.to_dict() for d in self.drift],
-            "assumptions": [vars(a) for a in self.assumptions],
-            "gap": self.gap,
-            "reasons": list(self.reasons),
-            "beforehand": list(self.beforehand),
-        }
+        """Plain data, as in the contract."""
+        drift = [drift.to_dict() for drift in self.drift]
+        return {"schema": "tpjb-diagnosis/2", **asdict(self), "drift": drift}
 
     def to_json(self) -> str:
         """Serialise as JSON text; not-a-number becomes null, as JSON knows no other."""
