@@ -13,7 +13,7 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, Posterior, posterior
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Strain
-from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, derivatives, prediction
+from tpjb_ident.diagnosis.comparison.unknowns import SLOW, Unknowns, derivatives, prediction
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 
@@ -212,12 +212,15 @@ def _better(reached: Linear, start: Start, errors: ErrorModel) -> Linear:
 
 
 def refined(run: Map, fit: Fit, whole: bool = True) -> Fit:
-    """The same with derivatives of its own, and moved on by them; not `whole`: by numbers whose next step shows."""
+    """The same with derivatives of its own, and moved on by them.
+
+    Not `whole`: by numbers whose next step shows.
+    """
     errors, unknowns, linear = fit.problem.errors, fit.unknowns, fit.linear
     step = np.clip(fit.posterior.mean, unknowns.low, unknowns.high) - linear.theta
     shown = np.linalg.norm(errors.white(linear.jacobian * step, fit.posterior.leading), axis=0) > 1.0
     asked = [i for i, reading in enumerate(unknowns.is_reading) if not reading and (whole or shown[i])]
-    return _settled(run, fit.unknowns, _renewed(run, fit.unknowns, fit.linear, asked))
+    return _settled(run, unknowns, _renewed(run, unknowns, linear, asked, fit.posterior.scale <= Deciding.right))
 
 
 def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:
@@ -226,11 +229,22 @@ def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:
     return Fit(unknowns, moved, posterior(errors, moved))
 
 
-def _renewed(run: Map, unknowns: Unknowns, linear: Linear, asked: Sequence[int]) -> Linear:
-    """A model with derivatives of its own by some numbers; what acts on readings has them already."""
+def _renewed(run: Map, unknowns: Unknowns, linear: Linear, asked: Sequence[int], exact: bool = False) -> Linear:
+    """A model with derivatives of its own by some numbers; what acts on readings has them already.
+
+    Not `exact`: as they are without effects of which one prediction takes seconds, whose own stay.
+    """
+    faults = tuple(fault for fault in unknowns.faults if exact or fault.name not in SLOW)
+    present = np.ones(len(linear.theta), dtype=bool)
+    for fault, at in zip(unknowns.faults, unknowns.slices, strict=True):
+        present[at] = fault in faults
+    asked = [i for i in asked if present[i]]
+    if not asked:
+        return linear
+    places = np.cumsum(present) - 1
     parts = [asked[k :: run.opened.count] for k in range(run.opened.count)]
     jacobian = linear.jacobian.copy()
-    jobs = [(unknowns.faults, linear.theta, part) for part in parts]
+    jobs = [(faults, linear.theta[present], places[part].tolist()) for part in parts]
     for part, columns in zip(parts, run(derivatives, jobs), strict=True):
         for index, column in zip(part, columns, strict=True):
             if column is not None:

@@ -11,15 +11,13 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
-from tpjb_ident.diagnosis.comparison.unknowns import derivatives, path_changes
+from tpjb_ident.diagnosis.comparison.unknowns import SLOW, derivatives, path_changes
 from tpjb_ident.diagnosis.forward.workers import Map
 
 #: A typical size in widths of the prior.
 _NEAR = 1.0 / 3.0
 #: Amplitudes of a path at which a score is asked for.
 _POINTS = 41
-#: Effects of which one prediction takes seconds: a derivative has to do in place of a path.
-_SLOW = frozenset({"pad_bending", "pad_conduction"})
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
 
     Those without an equilibrium anywhere are left out.
     """
-    curved = [f for f in problem.faults if len(f.width) == 1 and f.name not in _SLOW]
+    curved = [f for f in problem.faults if len(f.width) == 1 and f.name not in SLOW]
     straight = [f for f in problem.faults if f not in curved]
     columns = problem.scaled(problem.columns)
     paths = [path_through(f, [(1.0, columns[:, f.own])]) for f in curved if f.own >= 0]
