@@ -183,5 +183,5 @@ def median_deviations(table: pd.DataFrame) -> dict[str, tuple[float, float]]:
 
     if table.empty:
         return {}
-    medians = agreements(table)["median"].dropna(axis=1)
+    medians = agreements(table)[["median"]].droplevel(0, axis=1).dropna(axis=1)
     return {str(name): (float(off[BEFORE]), float(off.iloc[-1])) for name, off in medians.items()}

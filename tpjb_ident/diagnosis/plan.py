@@ -122,7 +122,7 @@ class _Signatures:
         mine = slice(None) if rows is None else rows
         factor = usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
         # rows of a Cholesky factor have the covariance of those elements
-        lower = np.linalg.qr(factor[mine].T, mode="r").T
+        lower = np.asarray(np.linalg.qr(factor[mine].T, mode="r")).T
         return separated(self.candidates, np.asarray(np.linalg.solve(lower, self.columns[mine])))
 
 

@@ -195,15 +195,17 @@ class _Search:
         fit, leader = fitted(self.run, self.problem, start), self._leader()
         if fit is None or not fit.faults:
             return fit
-        right = leader is not None and min(leader.posterior.scale, fit.posterior.scale) <= self.settings.right
+        right = min(f.posterior.scale for f in (leader or fit, fit)) <= self.settings.right
         nats = self.settings.mistaken if start.coarse else self.settings.worth_derivatives if right else 0.0
-        if not self._near(fit, fit.posterior.promised, nats):
+        tenable_first = right and leader is None  # whether it is tenable tells none that has not arrived
+        if not (tenable_first or self._near(fit, fit.posterior.promised, nats)):
             return fit
         if not right and not self._near(fit, fit.posterior.total, 0.0):
             fit = self._renewed(fit, whole=False)  # where all that is fitted is wrong, most promises are
             if not self._near(fit, fit.posterior.total, 0.0):
                 return fit
-        return self._renewed(fit)
+        fit = self._renewed(fit)
+        return self._renewed(fit) if start.coarse else fit  # those from before a jump led here
 
     def _fit(self, proposal: Start) -> None:
         """Fit a proposal; one that leads and is surely wrong, or stopped at a jump, once more with a coarse start."""

@@ -159,7 +159,7 @@ class Forward:
 
     def pad_shares(self) -> FloatArray:
         """Share of the static load on the pad of every temperature element in the baseline; NaN elsewhere, (n,)."""
-        shares = {}
+        shares: dict[tuple[float, ...], float] = {}
         for test in self.layout.dynamic:
             loads = self._solve(self.setup, test, test.excitation).pad_load
             shares.update({(*test.point, float(pad)): load / test.load for pad, load in enumerate(loads, start=1)})
