@@ -23,7 +23,7 @@ from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores, separations
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
+from tpjb_ident.diagnosis.comparison.unknowns import SLOW, Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 
@@ -176,7 +176,8 @@ class _Search:
         """Whether a proposal may change the answer: as a rival of a leader, or by a fault beside a right one."""
         total, near, mistaken = self._log_probability(leader), self.settings.near, self.settings.mistaken
         if leader.posterior.scale > self.settings.right:
-            return proposal.coarse or proposal.estimate > total - near - mistaken
+            slow = any(fault.name in SLOW for fault in proposal.faults)  # only where they promise to lead
+            return proposal.coarse or proposal.estimate > (total if slow else total - near - mistaken)
         plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
         if proposal.coarse:
             return plain
