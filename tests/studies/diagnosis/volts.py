@@ -73,11 +73,7 @@ def case_of(kind: str, seed: int) -> Case | None:
 
 def plan_of(layout: Layout) -> RigPlan:
     """The test plan that gives a layout of observations."""
-    points = tuple(
-        OperatingPoint(*test.point, omega)
-        for test in layout.dynamic
-        for omega in test.excitation
-    )
+    points = tuple(OperatingPoint(*test.point, omega) for test in layout.dynamic for omega in test.excitation)
     top = max(point.static_load for point in points)
     fastest = max(max(point.excitation, point.shaft_speed) for point in points) / (2.0 * math.pi)
     levels = tuple(top * share for share in np.arange(1, 11) / 10.0)
