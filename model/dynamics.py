@@ -17,9 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from model.conditions import named
+from model.film.faces import conductances
 from model.film.following_heat import heat_impedance
-from model.film.mesh import Faces
-from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes, squeeze_slopes
 from model.mirror import MIRROR
 from model.pad.bending import force_weights
@@ -90,7 +89,7 @@ class _Bend:
     """The film's pressure with a pad that bends, from that with a rigid one."""
 
     film: PadFilm
-    conductance: Faces
+    conductance: FloatArray
     factor: float
 
     def slopes(self, shapes: Any) -> tuple[Any, Any]:

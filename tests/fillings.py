@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.film.cavitation_matrix import face_flows
+from model.film.cavitation import fed_film
 from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
@@ -13,15 +13,17 @@ def fluid_fraction(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, filling: float = 1.0
 ) -> FloatArray:
     """Filling theta of a film that `solve_film_jfo` has solved; (nt + 1, nz + 1), 1 where it is full."""
-    faces = face_flows(grid, work, wedge, speed, (filling, np.inf))
+    film = fed_film(grid, work, wedge, speed, (filling, np.inf))
     p, ruptured = work.pressure, work.ruptured
+    couette, along = film.faces.couette[0].reshape(p.shape), film.faces.conductance[0].reshape(p.shape)
+    across = film.faces.conductance[1].reshape(p.shape)[:, :-1]
     theta = np.ones_like(p)
     theta[0] = np.where(ruptured[0], filling, 1.0)
-    into = np.minimum(faces.supply, faces.couette[0] - faces.along[0] * p[1])
+    into = np.minimum(film.supply, couette[0] - along[0] * p[1])
     for i in range(1, p.shape[0] - 1):
-        into = into + faces.along[i] * p[i + 1]
-        into[:-1] += faces.across[i] * p[i, 1:]
-        into[1:] += faces.across[i] * p[i, :-1]
-        theta[i] = np.where(ruptured[i], into / faces.couette[i], 1.0)
-        into = faces.couette[i] * theta[i] + faces.along[i] * p[i]
+        into = into + along[i] * p[i + 1]
+        into[:-1] += across[i] * p[i, 1:]
+        into[1:] += across[i] * p[i, :-1]
+        theta[i] = np.where(ruptured[i], into / couette[i], 1.0)
+        into = couette[i] * theta[i] + along[i] * p[i]
     return theta

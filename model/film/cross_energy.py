@@ -20,6 +20,7 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.cross_film import CrossFilm, CrossOperator
+from model.film.energy import slope_across
 from model.film.matrix import factorise_general
 from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
@@ -43,10 +44,7 @@ def cross_operator(
     operator: CrossOperator,
 ) -> float:
     """Set up and factorise the heat balances of a film."""
-    nt = work.flow_x.shape[0]
-    lines = work.flow_x.shape[1]
-    cells = len(cross.edges) - 1
-    n = lines * cells
+    (nt, lines, cells), n = operator.flows.shape, operator.factor.shape[1]
     factor, before, journal, dissipation, carried, flows = operator
     factor[:] = 0.0
     before[:] = 0.0
@@ -94,7 +92,7 @@ def _flow_back(grid: FilmGrid, work: FilmWork, speed: float, flows: FloatArray) 
     back = max(0.0, -np.sum(np.minimum(flows, 0.0)) - _MOST_BACK * net) / max(net, 1e-300)
     for j in range(flows.shape[0]):
         dragged = 0.25 * speed * (work.thickness[0, j] * work.density[0, j] + work.thickness[1, j] * work.density[1, j])
-        back = max(back, 1.0 - work.flow_x[0, j] / (_LEAST_NET_FLOW * dragged * grid.height[j]))
+        back = max(back, 1.0 - work.flow[0, j] / (_LEAST_NET_FLOW * dragged * grid.height[j]))
     return back
 
 
@@ -121,7 +119,7 @@ def _shared_flow(film: tuple[FilmGrid, FilmWork, CrossFilm], speed: float, i: in
         total += flow[m]
         driven += (edges[m + 1] - edges[m]) * 0.5 * (edges[m] + edges[m + 1])
     # averages over the face differ in the second order: what is left goes with the shear
-    missing = work.flow_x[i, j] - total
+    missing = work.flow[0, i * grid.steps[0] + j] - total
     for m in range(cells):
         flow[m] += missing * (edges[m + 1] - edges[m]) * 0.5 * (edges[m] + edges[m + 1]) / driven
 
@@ -194,7 +192,7 @@ def _box(
     resists = np.empty(cells)  # of half a cell
     for j in range(lines - 1):
         _side_shares(cross, i, j, shares)
-        aside = 0.5 * (work.flow_z[i, j] + work.flow_z[i + 1, j])
+        aside = 0.5 * (work.flow[1, i * lines + j] + work.flow[1, (i + 1) * lines + j])
         for m in range(cells):
             sideways[j + 1, m] = aside * shares[m]
     for j in range(lines):
@@ -280,20 +278,12 @@ def _dissipation(
     grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, i: int, dissipation: FloatArray
 ) -> None:
     """Heat made in the cells of a station, per length dx and control-volume height [W], full film."""
-    p, edges = work.pressure, cross.edges
-    nt = work.flow_x.shape[0]
-    nz = work.flow_z.shape[1]
-    cells = len(cross.edges) - 1
-    behind, ahead = max(i - 1, 0), min(i + 1, nt)
-    for j in range(nz + 1):
+    p, edges, cells = work.pressure, cross.edges, len(cross.edges) - 1
+    behind, ahead = max(i - 1, 0), min(i + 1, len(p) - 1)
+    for j in range(p.shape[1]):
         h = work.thickness[i, j]
         slope = (p[ahead, j] - p[behind, j]) / ((ahead - behind) * grid.dx) * h
-        if j == nz:
-            across = (p[i, nz] - p[i, nz - 1]) / grid.dz[nz - 1] * h
-        elif j == 0:
-            across = 0.0 if grid.first == 0 else (p[i, 1] - p[i, 0]) / grid.dz[0] * h
-        else:
-            across = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1]) * h
+        across = slope_across(grid, p, i, j) * h
         along, aside = cross.driven[i, j, 0], cross.driven[i, j, 1]
         drag = speed * cross.shear[i, j] / h
         driven = along * slope * slope + aside * across * across

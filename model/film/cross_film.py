@@ -171,12 +171,10 @@ def cross_pressure_change(
     speed: float,
     oil: OilConstants,
     change: FloatArray,
-) -> FloatArray:
+) -> tuple[float, float]:
     """Change of the pressure that new temperatures across the film will make.
 
     As `model.film.slopes.pressure_change`.
-
-    Gives (2,) [N].
     """
     shape = work.temperature.shape
     lighter, denser = np.empty(shape), np.empty(shape)

@@ -45,10 +45,10 @@ def heat_sources(
     grid: FilmGrid, work: FilmWork, running: Running, kept: float, made: FloatArray, loss: FloatArray
 ) -> None:
     """What stations make [W] and lose per kelvin [W/K] if a share is kept: a hotter film makes less heat."""
-    dissipate(grid, work, running.speed, made, loss)
     for i in range(made.shape[0]):
         for j in range(made.shape[1]):
-            sheared, pressed = made[i, j], loss[i, j]
+            sheared, downstream, sideways = dissipated(grid, work, running.speed, i, j)
+            pressed = downstream + sideways
             fewer = kept * running.oil[1] * max(sheared - pressed, 0.0)
             made[i, j] = kept * (sheared + pressed + work.gained[i, j]) + fewer * work.temperature[i, j]
             loss[i, j] = work.exchange[i, j] + fewer
@@ -72,69 +72,53 @@ def march(grid: FilmGrid, work: FilmWork, running: Running, loss: Any, fields: A
 
     Real or complex: `loss` (nt + 1, nz + 1) [W/K], `fields` (m, nt + 1, nz + 1) [degC], `sources` (m, nt, nz + 1) [W].
     """
-    nz, count = work.flow_z.shape[1], fields.shape[0]
-    conduct = np.empty(nz)
-    for j in range(nz):
-        conduct[j] = 0.25 * running.heat[1] * grid.dx / grid.dz[j]
-    main = np.zeros(nz + 1, dtype=loss.dtype)
-    rhs = np.zeros((nz + 1, count), dtype=fields.dtype)
-    line = (np.zeros(nz + 1), main, np.zeros(nz + 1), rhs)
-    return _march_lines(grid, work, running, (loss, fields, sources), line, conduct)
-
-
-@inner
-def _march_lines(
-    grid: FilmGrid,
-    work: FilmWork,
-    running: Running,
-    march: tuple[Any, Any, Any],
-    line: tuple[Any, Any, Any, Any],
-    conduct: FloatArray,
-) -> float:
-    """Set up and solve the equations of every line between two stations; see `march`."""
-    (loss, fields, sources), (lower, main, upper, rhs) = march, line
-    specific, nz, limited = running.heat[0], work.flow_z.shape[1], 0.0
-    h, flow_x, flow_z, density = work.thickness, work.flow_x, work.flow_z, work.density
-    for i in range(flow_x.shape[0]):
-        for j in range(nz + 1):
+    specific, h, density = running.heat[0], work.thickness, work.density
+    (count, rows, lines), limited = fields.shape, 0.0
+    lower, upper, main = np.zeros(lines), np.zeros(lines), np.zeros(lines, dtype=loss.dtype)
+    rhs = np.zeros((lines, count), dtype=fields.dtype)
+    for i in range(rows - 1):
+        _side_exchange(grid, work, running, i, lower, upper)
+        for j in range(lines):
+            low, high, flow = lower[j], upper[j], work.flow[0, i * lines + j]
             dragged = h[i, j] * density[i, j] + h[i + 1, j] * density[i + 1, j]
             couette = 0.25 * running.speed * dragged * grid.height[j]
-            flow = flow_x[i, j]
             if flow < _LEAST_FLOW * couette:
                 limited = max(limited, 1.0 - flow / couette)
                 flow = _LEAST_FLOW * couette
-            # factors of (T[j-1] - T[j]) and (T[j+1] - T[j]); half of them act at i, half at i + 1
-            low = high = 0.0
-            if j > 0:
-                south = 0.5 * (flow_z[i, j - 1] + flow_z[i + 1, j - 1])
-                film = h[i, j] + h[i, j - 1] + h[i + 1, j] + h[i + 1, j - 1]
-                low = -0.5 * (0.5 * specific * south + conduct[j - 1] * film)
-                if j == nz:  # the edge is upwind: what leaves takes its temperature along
-                    low = -0.25 * specific * max(south, 0.0)
-            if j < nz:
-                north = 0.5 * (flow_z[i, j] + flow_z[i + 1, j])
-                film = h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1]
-                high = -0.5 * (-0.5 * specific * north + conduct[j] * film)
-                if j == 0 and grid.first == 1:
-                    high = -0.25 * specific * max(-north, 0.0)
             advect = specific * flow
-            lower[j] = low
             main[j] = advect - low - high + 0.5 * loss[i + 1, j]
-            upper[j] = high
-            for m in range(rhs.shape[1]):
-                t = fields[m]
-                value = (advect + low + high - 0.5 * loss[i, j]) * t[i, j]
-                value += sources[m, i, j]
+            for m in range(count):
+                t = fields[m, i]
+                value = (advect + low + high - 0.5 * loss[i, j]) * t[j] + sources[m, i, j]
                 if j > 0:
-                    value -= low * t[i, j - 1]
-                if j < nz:
-                    value -= high * t[i, j + 1]
+                    value -= low * t[j - 1]
+                if j < lines - 1:
+                    value -= high * t[j + 1]
                 rhs[j, m] = value
         tridiagonal(lower, main, upper, rhs)
-        for m in range(rhs.shape[1]):
-            for j in range(nz + 1):
+        for m in range(count):
+            for j in range(lines):
                 fields[m, i + 1, j] = rhs[j, m]
     return limited
+
+
+@inner
+def _side_exchange(
+    grid: FilmGrid, work: FilmWork, running: Running, i: int, lower: FloatArray, upper: FloatArray
+) -> None:
+    """Factors of (T[j-1] - T[j]) and (T[j+1] - T[j]) after station i; half of them act there, half at the next."""
+    h, lines = work.thickness, len(lower)
+    for j in range(lines - 1):
+        n = i * lines + j
+        aside = 0.25 * running.heat[0] * (work.flow[1, n] + work.flow[1, n + lines])
+        film = h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1]
+        conducted = 0.25 * running.heat[1] * grid.dx / grid.dz[j] * film
+        upper[j], lower[j + 1] = 0.5 * (aside - conducted), -0.5 * (aside + conducted)
+        # the edges are upwind: what leaves takes its temperature along
+        if j == lines - 2:
+            lower[j + 1] = -0.5 * max(aside, 0.0)
+        if j == 0 and grid.first == 1:
+            upper[j] = -0.5 * max(-aside, 0.0)
 
 
 @compiled
@@ -165,47 +149,40 @@ def warm(
     for i in range(asked.shape[0]):
         for j in range(asked.shape[1]):
             work.temperature[i, j] += share * asked[i, j]
-    force = pressure_change(grid, work, running.speed, running.oil, shift)
-    return change, force[0], force[1]
+    radial, tangential = pressure_change(grid, work, running.speed, running.oil, shift)
+    return change, radial, tangential
 
 
 @inner
-def dissipate(grid: FilmGrid, work: FilmWork, speed: float, sheared: FloatArray, pressed: FloatArray) -> None:
-    """Heat made by shear and by pressure per station of length dx and control-volume height [W], full film.
+def dissipated(grid: FilmGrid, work: FilmWork, speed: float, i: int, j: int) -> tuple[float, float, float]:
+    """Heat made at a node by shear, and by pressure along and across, in its dx and control-volume height [W]; full.
 
-    Where the viscosity falls by a share, there is less of the one by it and more of the other; (nt + 1, nz + 1).
+    Where the viscosity falls by a share, there is less of the first by it and more of the others.
     """
-    h, mu = work.thickness, work.viscosity
-    for i in range(h.shape[0]):
-        for j in range(h.shape[1]):
-            downstream, sideways = slope_products(grid, work.pressure, work.pressure, i, j)
-            station = grid.dx * grid.height[j]
-            sheared[i, j] = mu[i, j] * speed**2 / h[i, j] * station
-            pressed[i, j] = h[i, j] ** 3 / (12.0 * mu[i, j]) * (downstream + sideways) * station
+    h, mu, station = work.thickness[i, j], work.viscosity[i, j], grid.dx * grid.height[j]
+    downstream, sideways = slope_products(grid, work.pressure, work.pressure, i, j)
+    driven = h**3 / (12.0 * mu) * station
+    return mu * speed**2 / h * station, driven * downstream, driven * sideways
 
 
 @inner
 def slope_products(grid: FilmGrid, p: Any, q: Any, i: int, j: int) -> Any:
     """Products of two pressures' slopes at a node: along, the mean of both sides, which the box scheme sees; across."""
-    nt, nz = p.shape[0] - 1, p.shape[1] - 1
     product, sides = 0.0 * q[i, j], 0
-    if i > 0:
-        product += ((p[i, j] - p[i - 1, j]) / grid.dx) * ((q[i, j] - q[i - 1, j]) / grid.dx)
+    for k in range(max(i - 1, 0), min(i + 1, len(p) - 1)):
+        product += ((p[k + 1, j] - p[k, j]) / grid.dx) * ((q[k + 1, j] - q[k, j]) / grid.dx)
         sides += 1
-    if i < nt:
-        product += ((p[i + 1, j] - p[i, j]) / grid.dx) * ((q[i + 1, j] - q[i, j]) / grid.dx)
-        sides += 1
-    if j == nz:
-        wide = grid.dz[nz - 1]
-        low = nz - 1
-        high = nz
-    elif j == 0:
-        wide, low, high = grid.dz[0], 0, grid.first  # at a line of symmetry there is no slope
-    else:
-        wide = grid.dz[j] + grid.dz[j - 1]
-        low = j - 1
-        high = j + 1
-    return product / sides, ((p[i, high] - p[i, low]) / wide) * ((q[i, high] - q[i, low]) / wide)
+    return product / sides, slope_across(grid, p, i, j) * slope_across(grid, q, i, j)
+
+
+@inner
+def slope_across(grid: FilmGrid, p: Any, i: int, j: int) -> Any:
+    """Slope of a pressure across the film at a node; at a line of symmetry there is none."""
+    if j == len(grid.dz):
+        return (p[i, j] - p[i, j - 1]) / grid.dz[j - 1]
+    if j == 0:
+        return (p[i, grid.first] - p[i, 0]) / grid.dz[0]
+    return (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1])
 
 
 @inner

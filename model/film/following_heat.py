@@ -12,17 +12,17 @@ heavy to follow. At omega = 0 this is the slope of the static locus; far above o
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.energy import dissipate, march, slope_products
+from model.film.energy import dissipated, march, slope_products
+from model.film.faces import conductances, net_inflow
 from model.film.matrix import substitute
-from model.film.mesh import Faces, FilmGrid, FilmWork, Wedge
+from model.film.mesh import FilmGrid, FilmWork, Wedge
 from model.film.oil_state import Running
-from model.film.reynolds import conductances
-from model.film.slopes import flow_changes, force_of, keep_ruptured, net_inflow
+from model.film.slopes import flow_changes, force_of, keep_ruptured
 from model.interpolation import largest
 from rigdata.arrays import ComplexArray, FloatArray
 
@@ -30,47 +30,50 @@ from rigdata.arrays import ComplexArray, FloatArray
 _MOST_TURNS, _SETTLED = 60, 1e-7
 
 
-class _Change(NamedTuple):
-    """Changes of thickness along the arc (nt + 1,) [m/m], of temperature [K/m] and pressure [Pa/m], by (a, b)."""
+class _Film(NamedTuple):
+    """A film at rest, and what its heat and flows change by."""
 
-    thicker: FloatArray
-    warmer: ComplexArray
-    pressure: ComplexArray
+    grid: FilmGrid
+    work: FilmWork
+    running: Running
+    conductance: FloatArray
+    closer: FloatArray  #: (nt + 1, nz + 1): How the heat that a station makes changes with its thickness [W/m].
 
 
 @compiled
 def heat_impedance(grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Running, omega: float) -> ComplexArray:
     """What the temperature that follows adds to a film's impedance."""
-    conductance = conductances(grid, work, wedge)
-    shape, unknowns = work.pressure.shape, work.unknown.shape[0]
-    width = shape[1] - 1 - grid.first
-    out = np.zeros((2, 2), dtype=np.complex128)
+    shape, unknowns = work.pressure.shape, len(work.unknown)
+    film = _Film(grid, work, running, conductances(grid, work, wedge), np.empty(shape))
+    out, loss = np.zeros((2, 2), dtype=np.complex128), np.empty(shape, dtype=np.complex128)
     nothing = np.zeros(shape, dtype=np.complex128)
-    sheared, pressed = np.empty(shape), np.empty(shape)
-    dissipate(grid, work, running.speed, sheared, pressed)
-    # what a kelvin at a node stores and makes less [W/K]
-    stored = 1j * omega * running.heat[0] * grid.dx * grid.height * work.density * work.thickness
-    loss = stored + running.oil[1] * (sheared - pressed) + work.exchange
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            sheared, downstream, sideways = dissipated(grid, work, running.speed, i, j)
+            pressed, h = downstream + sideways, work.thickness[i, j]
+            film.closer[i, j] = (3.0 * pressed - sheared) / h
+            # what a kelvin at a node stores and makes less [W/K]
+            stored = 1j * omega * running.heat[0] * grid.dx * grid.height[j] * work.density[i, j] * h
+            loss[i, j] = stored + running.oil[1] * (sheared - pressed) + work.exchange[i, j]
     for axis in range(2):
-        thicker, pressure = -grid.cos if axis == 0 else -grid.sin, nothing.copy()
-        warmer, answer = nothing, np.zeros(unknowns, dtype=np.complex128)
+        thicker = np.empty(shape)
+        for i in range(shape[0]):
+            thicker[i] = -grid.cos[i] if axis == 0 else -grid.sin[i]
+        warmer, pressure, answer = nothing, nothing.copy(), np.zeros(unknowns, dtype=np.complex128)
         settled = False
         for _ in range(_MOST_TURNS):
             for k in range(unknowns):
                 frozen = work.slopes[k, axis] + 1j * omega * work.slopes[k, 2 + axis]
-                pressure[k // width + 1, k % width + grid.first] = frozen + answer[k]
-            change = _Change(thicker, warmer, pressure)
-            gained = _gain(grid, work, running, conductance, change, (sheared, pressed))
+                pressure.reshape(-1)[grid.node[k]] = frozen + answer[k]
             fields = np.zeros((1, shape[0], shape[1]), dtype=np.complex128)
-            march(grid, work, running, loss, fields, gained)
-            asked = largest((fields[0] - warmer).ravel())
-            size = largest(fields[0].ravel())
+            march(grid, work, running, loss, fields, _gain(film, thicker, warmer, pressure))
+            asked, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
             warmer = fields[0]
-            _pressure(grid, work, running, conductance, _Change(0.0 * thicker, warmer, nothing), omega, answer)
+            _pressure(film, 0.0 * thicker, warmer, nothing, omega, answer)
             if asked < _SETTLED * size:
                 settled = True
                 break
-        out[:, axis] = force_of(grid, answer, shape)
+        out[0, axis], out[1, axis] = force_of(grid, grid.area, answer)
         if not settled:
             out[:, axis] = np.nan
     return out
@@ -78,76 +81,56 @@ def heat_impedance(grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Runnin
 
 @inner
 def _pressure(
-    grid: FilmGrid,
-    work: FilmWork,
-    running: Running,
-    conductance: Faces,
-    change: _Change,
-    omega: float,
-    answer: ComplexArray,
+    film: _Film, thicker: FloatArray, warmer: ComplexArray, pressure: ComplexArray, omega: float, answer: ComplexArray
 ) -> None:
     """Change of pressure by a change of temperature, into `answer` (unknowns,)."""
-    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    along, across = _flows(grid, work, running, conductance, change)
-    rhs: Any = answer.reshape((answer.shape[0], 1))
-    net_inflow(along, across, grid.first, rhs)
-    by_heat = 1j * omega * running.oil[2] * running.oil[3]
-    for i in range(1, nt):
-        for j in range(grid.first, nz):
-            k = (i - 1) * (nz - grid.first) + j - grid.first
-            rhs[k, 0] += by_heat * change.warmer[i, j] * work.thickness[i, j] * grid.dx * grid.height[j]
-    keep_ruptured(work, grid.first, rhs)
+    grid, work, oil = film.grid, film.work, film.running.oil
+    net_inflow(grid, _flows(film, thicker, warmer, pressure), answer)
+    by_heat = 1j * omega * oil[2] * oil[3]
+    for k in range(len(answer)):
+        i, j = divmod(grid.node[k], grid.steps[0])
+        answer[k] += by_heat * warmer[i, j] * work.thickness[i, j] * grid.dx * grid.height[j]
+    keep_ruptured(grid, work, answer)
     substitute(work.band, answer)
 
 
 @inner
-def _flows(
-    grid: FilmGrid, work: FilmWork, running: Running, conductance: Faces, change: _Change
-) -> tuple[ComplexArray, ComplexArray]:
-    """Change of the mass flows through the faces along, (nt, nz + 1, 1), and across, (nt + 1, nz, 1) [kg/s/m]."""
-    gx, gz = conductance
-    oil, pressure = running.oil, change.pressure
-    denser = -oil[2] * oil[3] * change.warmer
-    lighter = work.density / work.viscosity * (denser / work.density + oil[1] * change.warmer)
-    along, across = flow_changes(grid, work, running.speed, change.thicker, lighter, denser)
-    for i in range(gx.shape[0]):
-        for j in range(gx.shape[1]):
-            along[i, j, 0] -= gx[i, j] * (pressure[i + 1, j] - pressure[i, j])
-    for i in range(gz.shape[0]):
-        for j in range(gz.shape[1]):
-            across[i, j, 0] -= gz[i, j] * (pressure[i, j + 1] - pressure[i, j])
-    return along, across
+def _flows(film: _Film, thicker: FloatArray, warmer: ComplexArray, pressure: ComplexArray) -> ComplexArray:
+    """Change of the mass flows through the faces, (2, nodes) [kg/s/m]."""
+    grid, work, oil, p = film.grid, film.work, film.running.oil, pressure.reshape(-1)
+    denser = -oil[2] * oil[3] * warmer
+    lighter = work.density / work.viscosity * (denser / work.density + oil[1] * warmer)
+    flows = flow_changes(grid, work, film.running.speed, thicker, lighter, denser)
+    for side in range(2):
+        step = grid.steps[side]
+        for n in range(len(p) - step):
+            flows[side, n] -= film.conductance[side, n] * (p[n + step] - p[n])
+    return flows
 
 
 @inner
-def _gain(
-    grid: FilmGrid,
-    work: FilmWork,
-    running: Running,
-    conductance: Faces,
-    change: _Change,
-    dissipated: tuple[FloatArray, FloatArray],
-) -> ComplexArray:
+def _gain(film: _Film, thicker: FloatArray, warmer: ComplexArray, pressure: ComplexArray) -> ComplexArray:
     """Change of the heat that the oil gains between stations at its old temperature, (1, nt, nz + 1) [W/m]."""
-    t, flow_z, heat, thicker = work.temperature, work.flow_z, running.heat, change.thicker
-    nt, nz = work.flow_x.shape[0], flow_z.shape[1]
-    gained = np.empty((1, nt, nz + 1), dtype=np.complex128)
-    made = _made(grid, work, dissipated, change)
-    along, across = _flows(grid, work, running, conductance, change)
+    grid, work, t, heat = film.grid, film.work, film.work.temperature, film.running.heat
+    nt, lines = t.shape[0] - 1, t.shape[1]
+    gained = np.empty((1, nt, lines), dtype=np.complex128)
+    made = _made(film, thicker, pressure)
+    flows = _flows(film, thicker, warmer, pressure)
     for i in range(nt):
-        for j in range(nz + 1):
-            value = 0.5 * (made[i, j] + made[i + 1, j]) - heat[0] * along[i, j, 0] * (t[i + 1, j] - t[i, j])
+        for j in range(lines):
+            value = 0.5 * (made[i, j] + made[i + 1, j])
+            value -= heat[0] * flows[0, i * lines + j] * (t[i + 1, j] - t[i, j])
             for side in range(-1, 2, 2):
                 line = j + side
-                if not 0 <= line <= nz:
+                if not 0 <= line < lines:
                     continue
                 face = min(j, line)
-                edge = j == (nz if side < 0 else 0) and (side < 0 or grid.first == 1)
-                out = side * 0.5 * (flow_z[i, face] + flow_z[i + 1, face])
-                changed = side * 0.125 * heat[0] * (across[i, face, 0] + across[i + 1, face, 0])
-                if not edge:
-                    changed -= 0.25 * heat[1] * grid.dx / grid.dz[face] * (thicker[i] + thicker[i + 1])
-                elif not out < 0.0:
+                n = i * lines + face
+                changed = side * 0.125 * heat[0] * (flows[1, n] + flows[1, n + lines])
+                if not _is_edge(grid, j, side):
+                    thick = thicker[i, j] + thicker[i + 1, j]
+                    changed -= 0.25 * heat[1] * grid.dx / grid.dz[face] * thick
+                elif not side * (work.flow[1, n] + work.flow[1, n + lines]) < 0.0:
                     changed *= 0.0
                 value -= changed * (t[i + 1, line] - t[i + 1, j] + t[i, line] - t[i, j])
             gained[0, i, j] = value
@@ -155,14 +138,19 @@ def _gain(
 
 
 @inner
-def _made(grid: FilmGrid, work: FilmWork, heat: tuple[FloatArray, FloatArray], change: _Change) -> ComplexArray:
+def _is_edge(grid: FilmGrid, j: int, side: int) -> bool:
+    """Whether a line is an edge of the film, seen from its neighbour."""
+    return j == len(grid.dz) if side < 0 else (j == 0 and grid.first == 1)
+
+
+@inner
+def _made(film: _Film, thicker: FloatArray, pressure: ComplexArray) -> ComplexArray:
     """Change of the heat made at every station, at the old temperature, (nt + 1, nz + 1) [W/m]."""
-    p, h, mu = work.pressure, work.thickness, work.viscosity
-    sheared, pressed = heat
+    grid, p, h, mu = film.grid, film.work.pressure, film.work.thickness, film.work.viscosity
     made = np.empty(p.shape, dtype=np.complex128)
     for i in range(p.shape[0]):
         for j in range(p.shape[1]):
-            along, across = slope_products(grid, p, change.pressure, i, j)
+            along, across = slope_products(grid, p, pressure, i, j)
             turned = h[i, j] ** 3 / (6.0 * mu[i, j]) * (along + across) * grid.dx * grid.height[j]
-            made[i, j] = turned + change.thicker[i] / h[i, j] * (3.0 * pressed[i, j] - sheared[i, j])
+            made[i, j] = turned + thicker[i, j] * film.closer[i, j]
     return made

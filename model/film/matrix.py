@@ -8,34 +8,27 @@ from __future__ import annotations
 from typing import Any
 
 from model.compilation import inner
-from rigdata.arrays import BoolArray, FloatArray
+from model.film.faces import Faces
+from model.film.mesh import FilmGrid, FilmWork
+from rigdata.arrays import FloatArray
 
 
 @inner
-def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArray, first: int) -> None:
-    """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone.
-
-    `band` (n, width + 1), `gx` (nt, nz + 1) [kg/s/Pa], `gz` (nt + 1, nz) [kg/s/Pa], `ruptured` (nt + 1, nz + 1).
-    """
-    nt, nz = gx.shape[0], gz.shape[1]
-    width = nz - first
-    for k in range(band.shape[0]):
-        for r in range(band.shape[1]):
-            band[k, r] = 0.0
-    for i in range(1, nt):
-        for j in range(first, nz):
-            k = (i - 1) * width + j - first
-            if ruptured[i, j]:
-                band[k, 0] = 1.0
-                continue
-            diagonal = gx[i - 1, j] + gx[i, j] + gz[i, j]
-            if j > 0:
-                diagonal += gz[i, j - 1]
-            band[k, 0] = diagonal
-            if j + 1 < nz and not ruptured[i, j + 1]:
-                band[k, 1] -= gz[i, j]
-            if i + 1 < nt and not ruptured[i + 1, j]:
-                band[k, width] -= gx[i, j]
+def assemble(grid: FilmGrid, work: FilmWork, faces: Faces) -> None:
+    """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone."""
+    band, ruptured, (along, beside) = work.band, work.ruptured.reshape(-1), faces.conductance
+    width, line = band.shape[1] - 1, grid.steps[0]
+    band[:] = 0.0
+    for k in range(len(band)):
+        n = grid.node[k]
+        if ruptured[n]:
+            band[k, 0] = 1.0
+            continue
+        band[k, 0] = along[n - line] + along[n] + beside[n] + beside[n - 1]
+        if (k + 1) % width != 0 and not ruptured[n + 1]:
+            band[k, 1] -= beside[n]
+        if k + width < len(band) and not ruptured[n + line]:
+            band[k, width] -= along[n]
 
 
 def _factoriser(known: int | None) -> Any:
@@ -176,3 +169,25 @@ def factorise_general(band: FloatArray) -> None:
             row_below = band[k + r, width - r + 1 : 2 * width - r + 1]
             for s in range(width):
                 row_below[s] -= scale * upper[s]
+
+
+@inner
+def substitute_general(band: FloatArray, x: FloatArray) -> None:
+    """Solve for the right-hand sides (n, m) in place, with the factor from `factorise_general`."""
+    n = band.shape[0]
+    width = band.shape[1] // 2
+    count = x.shape[1]
+    for k in range(n):
+        for r in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k + r, width - r]
+            if factor != 0.0:
+                for m in range(count):
+                    x[k + r, m] -= factor * x[k, m]
+    for k in range(n - 1, -1, -1):
+        for s in range(1, min(width, n - 1 - k) + 1):
+            factor = band[k, width + s]
+            if factor != 0.0:
+                for m in range(count):
+                    x[k, m] -= factor * x[k + s, m]
+        for m in range(count):
+            x[k, m] *= band[k, width]

@@ -8,30 +8,37 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from model.errors import OptionError
-from rigdata.arrays import BoolArray, FloatArray
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 
 #: Cp, a and b [m].
 Wedge = tuple[float, float, float]
 #: mu_40, kappa, rho_40, alpha_v.
 OilConstants = tuple[float, float, float, float]
-#: Values at the faces along the arc, (nt, nz + 1), and across, (nt + 1, nz).
-Faces = tuple[FloatArray, FloatArray]
 
 
 class FilmGrid(NamedTuple):
-    """Mesh of one film; `nt` intervals along the arc, `nz` across (half width if symmetric)."""
+    """Mesh of one film; `nt` intervals along the arc, `nz` across (half width if symmetric).
+
+    Nodes are counted line by line across. Every node n has two faces: to node n + `steps[0]` ahead along the arc, and
+    to n + `steps[1]` beside it; at the last of a line the latter conducts nothing, and there is none. Arrays of faces
+    are (2, nodes).
+    """
 
     angle: FloatArray  #: (nt + 1,): alpha, from the pivot, positive with rotation [rad].
     z: FloatArray  #: (nz + 1,): Axial coordinate from mid-length [m].
     cos: FloatArray  #: (nt + 1,): At the nodes.
     sin: FloatArray
-    cos_face: FloatArray  #: (nt,): At the faces between nodes.
+    cos_face: FloatArray  #: At the faces, beside as at the node.
     sin_face: FloatArray
-    dx: float
+    conducts: FloatArray  #: Length of the faces over the distance of their nodes.
+    drags: FloatArray  #: Axial size of the faces along, through which the journal drags; 0 beside [m].
+    node: IntArray  #: (unknowns,): Nodes with an unknown pressure: all but those at the edges.
+    dx: Any  #: Spacing along [m].
     dz: FloatArray  #: (nz,): Spacing across [m]; finer towards the edges, where the pressure bends most.
     height: FloatArray  #: (nz + 1,): Axial size of each control volume [m].
     area: FloatArray  #: (nt + 1, nz + 1): Quadrature weights [m^2]; the mirrored half is counted.
-    first: int
+    steps: IntArray  #: (2,)
+    first: int  #: The first line across with an unknown pressure: 0 in half a film, at the line of symmetry.
 
 
 class FilmWork(NamedTuple):
@@ -51,11 +58,20 @@ class FilmWork(NamedTuple):
     gained: FloatArray  #: What the film gains from them besides [W].
     thickness: FloatArray  #: h [m].
     extra: FloatArray  #: What is added to h: pad deformation, misalignment [m].
-    flow_x: FloatArray  #: (nt, nz + 1): Mass flow through the faces along the arc [kg/s].
-    flow_z: FloatArray  #: (nt + 1, nz): Mass flow through the faces across [kg/s].
+    flow: FloatArray  #: (2, nodes): Mass flow through the faces ahead and beside [kg/s].
     band: FloatArray  #: ((nt - 1) * unknowns, unknowns + 1): Factor of the matrix.
     unknown: FloatArray  #: ((nt - 1) * unknowns,): Pressure at the unknowns.
     slopes: FloatArray  #: ((nt - 1) * unknowns, 4): Its derivatives by a, b, da/dt, db/dt.
+
+    @property
+    def flow_x(self) -> FloatArray:
+        """Along the arc, (nt, nz + 1)."""
+        return self.flow[0].reshape(self.pressure.shape)[:-1]
+
+    @property
+    def flow_z(self) -> FloatArray:
+        """Across, (nt + 1, nz)."""
+        return self.flow[1].reshape(self.pressure.shape)[:, :-1]
 
 
 @lru_cache(maxsize=64)
@@ -68,6 +84,7 @@ def film_grid(
         raise OptionError(f"mesh must have even numbers of intervals, at least 4 x 2, got {nt} x {nz}")
     angle = np.linspace(start, end, nt + 1)
     z = 0.5 * length * _graded(nz, symmetric)
+    first = 0 if symmetric else 1
     face = 0.5 * (angle[1:] + angle[:-1])
     dx, dz = radius * (end - start) / nt, np.diff(z)
     height = np.zeros(nz + 1)
@@ -78,19 +95,15 @@ def film_grid(
     along = np.full(nt + 1, dx)
     along[[0, -1]] = 0.5 * dx
     area = np.outer(along, across) * (2.0 if symmetric else 1.0)
+    at_faces = np.stack([np.append(face, angle[-1]), angle]).repeat(nz + 1, axis=1)
+    conducts, drags = np.zeros((2, nt + 1, nz + 1)), np.zeros((2, nt + 1, nz + 1))
+    conducts[0, :-1], drags[0, :-1] = height / dx, height
+    conducts[1, :, :-1] = dx / dz
+    node = np.arange(area.size).reshape(area.shape)[1:-1, first:-1].ravel()
     return FilmGrid(
-        angle,
-        z,
-        np.cos(angle),
-        np.sin(angle),
-        np.cos(face),
-        np.sin(face),
-        dx,
-        dz,
-        height,
-        area,
-        0 if symmetric else 1,
-    )
+        angle, z, np.cos(angle), np.sin(angle), np.cos(at_faces), np.sin(at_faces), conducts.reshape(2, -1),
+        drags.reshape(2, -1), node, dx, dz, height, area, np.array([nz + 1, 1]), first,
+    )  # fmt: skip
 
 
 #: How much finer the axial mesh is at the edges: the spacing there is 1 - GRADING of the mean.
@@ -128,8 +141,7 @@ def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWor
         "ruptured": np.zeros(shape, dtype=np.bool_),
         "temperature": np.full(shape, inlet_temperature),
         "drag": np.ones(shape),
-        "flow_x": np.zeros((count, nt, nz + 1)),
-        "flow_z": np.zeros((count, nt + 1, nz)),
+        "flow": np.zeros((count, 2, (nt + 1) * (nz + 1))),
         "band": np.zeros((count, n, unknowns + 1)),
         "unknown": np.zeros((count, n)),
         "slopes": np.zeros((count, n, 4)),

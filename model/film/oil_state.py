@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.compilation import compiled, inner
-from model.film.mesh import FilmGrid, FilmWork, OilConstants, Wedge
+from model.compilation import compiled
+from model.film.mesh import FilmGrid, FilmWork, OilConstants
 from rigdata.arrays import FloatArray
 
 
@@ -27,13 +27,6 @@ def set_viscosity(work: FilmWork, oil: OilConstants) -> None:
         for j in range(t.shape[1]):
             work.viscosity[i, j] = oil[0] * np.exp(oil[1] * (40.0 - t[i, j]))
             work.density[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t[i, j]))
-
-
-@inner
-def face_height(grid: FilmGrid, work: FilmWork, wedge: Wedge, i: int, j: int) -> float:
-    """Film thickness at the face between stations i and i + 1 [m]; `wedge` is (Cp, a, b)."""
-    base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
-    return base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
 
 
 @compiled
@@ -58,22 +51,22 @@ def edge_flows(grid: FilmGrid, work: FilmWork, supplied: float) -> tuple[float, 
     The difference leaves at the trailing edge, in streaks where the film is ruptured: by balance, because the rupture
     line of a mesh moves by whole nodes and what is found behind it jumps.
     """
-    rows, last = work.flow_x.shape[0], work.flow_z.shape[1]
+    along, beside, lines, nodes = work.flow[0], work.flow[1], grid.steps[0], work.pressure.size
     entering, corners, leaving_corners, inside, leaving = 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(last + 1):
-        flow = min(work.flow_x[0, j], supplied * grid.height[j])
+    for j in range(lines):
+        flow, out = min(along[j], supplied * grid.height[j]), along[nodes - 2 * lines + j]
         entering += flow
-        if j == last or j < grid.first:
+        if j == lines - 1 or j < grid.first:
             corners += flow
-            leaving_corners += work.flow_x[rows - 1, j]
+            leaving_corners += out
         else:
             inside += flow
-            leaving += work.flow_x[rows - 1, j]
+            leaving += out
     over = 0.0
-    for i in range(rows + 1):
-        over += work.flow_z[i, last - 1]
+    for n in range(0, nodes, lines):
+        over += beside[n + lines - 2]
         if grid.first == 1:
-            over -= work.flow_z[i, 0]
+            over -= beside[n]
     # the half cells at the edges have no pressure: they run as full at the trailing edge as the lines beside them
     filled = min(1.0, max(0.0, (inside - over) / leaving)) if leaving > 0.0 else 1.0
     # the mesh holds one half of a symmetric film

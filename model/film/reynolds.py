@@ -23,12 +23,12 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
+from model.film.faces import Faces, film_faces, net_inflow, poiseuille_inflow
 from model.film.matrix import assemble, factorise, substitute
-from model.film.mesh import Faces, FilmGrid, FilmWork, Wedge
-from model.film.oil_state import face_height
-from model.film.slopes import derivatives, poiseuille_inflow, rupture_line
+from model.film.mesh import FilmGrid, FilmWork, Wedge
+from model.film.slopes import derivatives, force_of, rupture_line
 from model.film.turbulence import heat_beyond, resist
-from rigdata.arrays import BoolArray, FloatArray
+from rigdata.arrays import FloatArray
 
 #: A cold start moves the rupture line by one node a step, so that fine meshes need many.
 _MAX_ACTIVE_SET_STEPS = 2000
@@ -98,149 +98,78 @@ def solve_film(
     min_film = _thickness(grid, work, wedge)
     if not min_film > 0.0:
         return FilmForces(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)), min_film, -1)
-    gx, gz = conductances(grid, work, wedge)
-    powers = None
+    faces = film_faces(grid, work, wedge, speed)
     if turbulent is not None:
-        powers = resist(grid, work, wedge, speed, (gx, gz))
-    source = _source(grid, work, wedge, speed)
-    steps = 1 if solved else _active_set(grid, work, gx, gz, source)
+        resist(grid, work, speed, faces)
+    source = np.empty(len(work.unknown))
+    net_inflow(grid, faces.couette, source)
+    steps = 1 if solved else _active_set(grid, work, faces, source)
     weight = grid.area
     if steps > 0:
         if sharp:
-            assemble(work.band, gx, gz, work.ruptured, grid.first)
-            weight = rupture_line(grid, work, (gx, gz), source)
+            assemble(grid, work, faces)
+            weight = rupture_line(grid, work, faces, source)
             factorise(work.band)
-        derivatives(grid, work, wedge, (gx, gz), powers)
+        derivatives(grid, work, faces)
         if turbulent is not None:
             heat_beyond(grid, work, speed)
-    force, stiffness, damping = _integrate(grid, work, weight)
+    force, stiffness, damping = integrate(grid, work, weight)
     return FilmForces(force, stiffness, damping, min_film, steps)
 
 
 @inner
 def _thickness(grid: FilmGrid, work: FilmWork, wedge: Wedge) -> float:
-    h = work.thickness
-    low = np.inf
-    for i in range(h.shape[0]):
-        base = wedge[0] - wedge[1] * grid.cos[i] - wedge[2] * grid.sin[i]
-        for j in range(h.shape[1]):
-            h[i, j] = base + work.extra[i, j]
-            low = min(low, h[i, j])
+    h, extra, low = work.thickness.reshape(-1), work.extra.reshape(-1), np.inf
+    for n in range(len(h)):
+        h[n] = wedge[0] - wedge[1] * grid.cos_face[1, n] - wedge[2] * grid.sin_face[1, n] + extra[n]
+        low = min(low, h[n])
     return low
 
 
-@compiled
-def conductances(grid: FilmGrid, work: FilmWork, wedge: Wedge) -> Faces:
-    """Rho h^3 / (12 mu) times face length over distance, at the faces along and across.
-
-    Gives gx (nt, nz + 1), gz (nt + 1, nz) [kg/s/Pa].
-    """
-    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    gx = np.empty((nt, nz + 1))
-    gz = np.empty((nt + 1, nz))
-    fluidity = np.empty((nt + 1, nz + 1))
-    for i in range(nt + 1):
-        for j in range(nz + 1):
-            fluidity[i, j] = work.density[i, j] / work.viscosity[i, j]
-    for i in range(nt):
-        for j in range(nz + 1):
-            h = face_height(grid, work, wedge, i, j)
-            gx[i, j] = h**3 / 24.0 * (fluidity[i, j] + fluidity[i + 1, j]) * grid.height[j] / grid.dx
-    for i in range(nt + 1):
-        for j in range(nz):
-            h = 0.5 * (work.thickness[i, j] + work.thickness[i, j + 1])
-            gz[i, j] = h**3 / 24.0 * (fluidity[i, j] + fluidity[i, j + 1]) * grid.dx / grid.dz[j]
-    return gx, gz
-
-
 @inner
-def _source(grid: FilmGrid, work: FilmWork, wedge: Wedge, speed: float) -> FloatArray:
-    """Couette inflow minus outflow of each control volume (the right-hand side f of A p = f)."""
-    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    source = np.zeros((nt + 1, nz + 1))
-    for i in range(nt):
-        for j in range(nz + 1):
-            h = face_height(grid, work, wedge, i, j)
-            dragged = work.density[i, j] * work.drag[i, j] + work.density[i + 1, j] * work.drag[i + 1, j]
-            couette = 0.25 * speed * h * dragged * grid.height[j]
-            work.flow_x[i, j] = couette
-            source[i, j] -= couette
-            source[i + 1, j] += couette
-    return source
-
-
-@inner
-def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray) -> int:
+def _active_set(grid: FilmGrid, work: FilmWork, faces: Faces, source: FloatArray) -> int:
     """Solve the complementarity problem; returns the number of factorisations, -2 if it did not settle."""
-    p, ruptured = work.pressure, work.ruptured
-    nt, nz = gx.shape[0], gz.shape[1]
-    first = grid.first
-    width = nz - first
+    p, ruptured, x = work.pressure.reshape(-1), work.ruptured.reshape(-1), work.unknown
+    width, line = work.band.shape[1] - 1, grid.steps[0]
     for step in range(1, _MAX_ACTIVE_SET_STEPS + 1):
-        assemble(work.band, gx, gz, ruptured, first)
+        assemble(grid, work, faces)
         factorise(work.band)
-        x = work.unknown
-        for i in range(1, nt):
-            for j in range(first, nz):
-                k = (i - 1) * width + j - first
-                x[k] = 0.0 if ruptured[i, j] else source[i, j]
-                if i == 1 and not ruptured[i, j]:
-                    x[k] += gx[0, j] * p[0, j]  # the groove's
+        for k in range(len(x)):
+            n = grid.node[k]
+            x[k] = 0.0 if ruptured[n] else source[k]
+            if k < width and not ruptured[n]:
+                x[k] += faces.conductance[0, n - line] * p[n - line]  # the groove's
         substitute(work.band, x)
-        for i in range(1, nt):
-            for j in range(first, nz):
-                p[i, j] = x[(i - 1) * width + j - first]
-        if _update_active_set(p, ruptured, gx, gz, source, first) == 0:
+        for k in range(len(x)):
+            p[grid.node[k]] = x[k]
+        if _update_active_set(grid, work, faces, source) == 0:
             return step
     return -2
 
 
 @inner
-def _update_active_set(
-    p: FloatArray, ruptured: BoolArray, gx: FloatArray, gz: FloatArray, source: FloatArray, first: int
-) -> int:
-    nt, nz = gx.shape[0], gz.shape[1]
-    changed = 0
-    for i in range(1, nt):
-        for j in range(first, nz):
-            if ruptured[i, j]:
-                if (
-                    source[i, j] + poiseuille_inflow(p, (gx, gz), i, j) > 0.0
-                ):  # more flows in than out: the film reforms here
-                    ruptured[i, j] = False
-                    changed += 1
-            elif p[i, j] < 0.0:
-                ruptured[i, j] = True
-                changed += 1
+def _update_active_set(grid: FilmGrid, work: FilmWork, faces: Faces, source: FloatArray) -> int:
+    """Let nodes rupture whose pressure is negative, and the film reform where more flows in than out."""
+    ruptured, changed = work.ruptured.reshape(-1), 0
+    for k in range(len(source)):
+        n, wrong = grid.node[k], work.unknown[k] < 0.0
+        if ruptured[n]:
+            wrong = source[k] + poiseuille_inflow(grid, work, faces, n) > 0.0
+        if wrong:
+            ruptured[n] = not ruptured[n]
+            changed += 1
     return changed
 
 
 @inner
-def _integrate(grid: FilmGrid, work: FilmWork, weight: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def integrate(grid: FilmGrid, work: FilmWork, weight: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Forces and their derivatives; `weight` is the area that a node's perturbed pressure stands for."""
-    force = np.zeros(2)
-    stiffness = np.zeros((2, 2))
-    damping = np.zeros((2, 2))
-    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    first = grid.first
-    width = nz - first
-    total = np.zeros(5)
-    for j in range(first, nz):
+    force, stiffness, damping = np.empty(2), np.empty((2, 2)), np.empty((2, 2))
+    force[0], force[1] = force_of(grid, grid.area, work.unknown)
+    for j in range(grid.first, grid.steps[0] - 1):
         force[0] += grid.cos[0] * grid.area[0, j] * work.pressure[0, j]
         force[1] += grid.sin[0] * grid.area[0, j] * work.pressure[0, j]
-    for i in range(1, nt):
-        for m in range(5):
-            total[m] = 0.0
-        for j in range(first, nz):
-            k = (i - 1) * width + j - first
-            total[0] += grid.area[i, j] * work.unknown[k]
-            for m in range(4):
-                total[m + 1] += weight[i, j] * work.slopes[k, m]
-        for m in range(2):
-            direction = grid.cos[i] if m == 0 else grid.sin[i]
-            force[m] += direction * total[0]
-            stiffness[m, 0] += direction * total[1]
-            stiffness[m, 1] += direction * total[2]
-            damping[m, 0] += direction * total[3]
-            damping[m, 1] += direction * total[4]
+    for m in range(2):
+        stiffness[0, m], stiffness[1, m] = force_of(grid, weight, work.slopes[:, m])
+        damping[0, m], damping[1, m] = force_of(grid, weight, work.slopes[:, 2 + m])
     return force, stiffness, damping

@@ -27,9 +27,9 @@ import math
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.energy import slope_products
-from model.film.mesh import Faces, FilmGrid, FilmWork, Wedge
-from model.film.oil_state import face_height
+from model.film.energy import dissipated
+from model.film.faces import Faces
+from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
 #: Factor and exponent of Re in k_x, k_z (beside 12) and C (beside 1).
@@ -71,51 +71,28 @@ def still_shares(reynolds: float, cell: tuple[float, float], prandtl: float) -> 
 
 
 @inner
-def resist(
-    grid: FilmGrid,
-    work: FilmWork,
-    wedge: Wedge,
-    speed: float,
-    conductance: Faces,
-) -> Faces:
-    """Lower the conductances by 12 / k; returns with which power of h they grow, 3 - dln k / dln Re."""
-    gx, gz = conductance
-    px, pz = np.empty(gx.shape), np.empty(gz.shape)
-    h, light = work.thickness, work.density / work.viscosity
-    for i in range(gx.shape[0]):
-        for j in range(gx.shape[1]):
-            thick = face_height(grid, work, wedge, i, j)
-            share, px[i, j] = _resisted(0.5 * (light[i, j] + light[i + 1, j]) * speed * thick, ALONG)
-            gx[i, j] *= share
-    for i in range(gz.shape[0]):
-        for j in range(gz.shape[1]):
-            thick = 0.5 * (h[i, j] + h[i, j + 1])
-            share, pz[i, j] = _resisted(0.5 * (light[i, j] + light[i, j + 1]) * speed * thick, ACROSS)
-            gz[i, j] *= share
-    return px, pz
-
-
-@inner
-def _resisted(reynolds: float, law: tuple[float, float]) -> tuple[float, float]:
-    """Share of the laminar conductance that is left, 12 / k, and the power of h with which it grows."""
-    more, rate = excess(reynolds, law)
-    return 12.0 / (12.0 + more), 3.0 - rate / (12.0 + more)
+def resist(grid: FilmGrid, work: FilmWork, speed: float, faces: Faces) -> None:
+    """Lower the conductances by 12 / k; they grow with the power 3 - dln k / dln Re of h."""
+    light = (work.density / work.viscosity).reshape(-1)
+    for side in range(2):
+        step = grid.steps[side]
+        for n in range(len(light) - step):
+            reynolds = 0.5 * (light[n] + light[n + step]) * speed * faces.height[side, n]
+            more, rate = excess(reynolds, ALONG if side == 0 else ACROSS)
+            faces.conductance[side, n] *= 12.0 / (12.0 + more)
+            faces.power[side, n] -= rate / (12.0 + more)
 
 
 @inner
 def heat_beyond(grid: FilmGrid, work: FilmWork, speed: float) -> None:
     """Heat beyond that of a laminar film in the same state, per station of length dx and control-volume height [W]."""
-    h, mu = work.thickness, work.viscosity
-    for i in range(h.shape[0]):
-        for j in range(h.shape[1]):
-            reynolds = work.density[i, j] * speed * h[i, j] / mu[i, j]
-            along = excess(reynolds, ALONG)[0]
-            across = excess(reynolds, ACROSS)[0]
-            downstream, sideways = slope_products(grid, work.pressure, work.pressure, i, j)
-            shear = mu[i, j] * speed**2 / h[i, j] * excess(reynolds, SHEAR)[0]
+    for i in range(work.gained.shape[0]):
+        for j in range(work.gained.shape[1]):
+            reynolds = work.density[i, j] * speed * work.thickness[i, j] / work.viscosity[i, j]
+            along, across = excess(reynolds, ALONG)[0], excess(reynolds, ACROSS)[0]
+            sheared, downstream, sideways = dissipated(grid, work, speed, i, j)
             less = along / (12.0 + along) * downstream + across / (12.0 + across) * sideways
-            pressed = -(h[i, j] ** 3) / (12.0 * mu[i, j]) * less
-            work.gained[i, j] = (shear + pressed) * grid.dx * grid.height[j]
+            work.gained[i, j] = excess(reynolds, SHEAR)[0] * sheared - less
 
 
 def shear_factor(work: FilmWork, speed: float) -> FloatArray:

@@ -16,7 +16,7 @@ from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces
 from model.pad.bending import PadDeformation, pad_deformation
 from model.setup import Setup
-from model.statics.compiled.stack import GridStack, stacked_grids
+from model.statics.compiled.stack import stacked_grids
 from rigdata.arrays import FloatArray
 
 
@@ -81,7 +81,7 @@ class PadFilm:
         return Running(surface_speed, oil_constants(oil), (oil.specific_heat / self.kept, oil.conductivity / self.kept))
 
 
-def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, GridStack, CrossFilm | None]:
+def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFilm | None]:
     """Lay out every pad's film; all of them side by side besides."""
     bearing = setup.bearing
     symmetric = setup.misalignment[0] == 0.0
@@ -124,7 +124,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, GridStack, CrossFi
 @lru_cache(maxsize=64)
 def _grids(
     spans: tuple[tuple[float, float], ...], radius: float, length: float, shape: tuple[int, int], symmetric: bool
-) -> tuple[list[FilmGrid], GridStack]:
+) -> tuple[list[FilmGrid], FilmGrid]:
     """Meshes of films that start and end at angles from their pivots, one by one and as one."""
     grids = [film_grid(start, end, radius, length, shape, symmetric) for start, end in spans]
     return grids, stacked_grids(grids)

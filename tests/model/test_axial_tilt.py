@@ -10,7 +10,8 @@ import pytest
 from model.bearing import Bearing
 from model.effects import Effect
 from model.errors import OptionError
-from model.film.reynolds import conductances, solve_film
+from model.film.faces import conductances
+from model.film.reynolds import solve_film
 from model.film.slopes import shape_slopes, squeeze_slopes
 from model.options import Options
 from model.pad.bending import force_weights

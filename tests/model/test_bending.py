@@ -10,7 +10,8 @@ import pytest
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.effects import Effect
-from model.film.reynolds import conductances, solve_film
+from model.film.faces import conductances
+from model.film.reynolds import solve_film
 from model.film.slopes import shape_slopes
 from model.predict import predict
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from model.compilation import inner
 from model.film.dense import solve
+from model.film.faces import conductances
 from model.film.mesh import FilmGrid, FilmWork
-from model.film.reynolds import conductances
 from model.film.slopes import force_of, shape_slopes
 from model.interpolation import largest
 from model.pad.bending import PadDeformation
@@ -137,7 +137,7 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
             for s in range(count):
                 matrix[r, s] -= value * slopes[q, s]
     for r in range(count):
-        felt[:, r] = force_of(grid, slopes[:, r], work.pressure.shape)
+        felt[0, r], felt[1, r] = force_of(grid, grid.area, slopes[:, r])
     solve(matrix, right)
     for r in range(count):
         for axis in range(2):
@@ -167,15 +167,14 @@ def _axial_moment(
     `lever` (unknowns,) [m^3] is less what grows with the pad's load.
     """
     moment, stiffness, arm, _ = held_moment(case.hold, state.axial[m], state.corrected[m, 0])
-    total = -moment
-    rows, columns = work.pressure.shape
-    for i in range(rows):
-        for j in range(columns):
-            total += grid.area[i, j] * grid.cos[i] * grid.z[j] * work.pressure[i, j]
-            if 0 < i < rows - 1 and grid.first <= j < columns - 1:
-                q = (i - 1) * (columns - 1 - grid.first) + j - grid.first
-                total += grid.area[i, j] * grid.cos[i] * grid.z[j] * state.shift[m, q]
-                lever[q] = grid.area[i, j] * grid.cos[i] * (grid.z[j] - arm)
+    total, columns = -moment, grid.steps[0]
+    for n in range(work.pressure.size):
+        i, j = divmod(n, columns)
+        total += grid.area[i, j] * grid.cos[i] * grid.z[j] * work.pressure[i, j]
+    for q in range(len(lever)):
+        i, j = divmod(grid.node[q], columns)
+        total += grid.area[i, j] * grid.cos[i] * grid.z[j] * state.shift[m, q]
+        lever[q] = grid.area[i, j] * grid.cos[i] * (grid.z[j] - arm)
     return total, stiffness
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from model.compilation import inner
-from model.film.mesh import FilmWork
+from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import Running
-from model.statics.compiled.stack import BodyStack, GridStack, PadStack, PadState
+from model.statics.compiled.stack import BodyStack, PadStack, PadState
 from model.tilt_hold import HoldNumbers
 from rigdata.arrays import FloatArray
 
@@ -48,7 +48,7 @@ class Case(NamedTuple):
 class Problem(NamedTuple):
     """All that a search works on."""
 
-    grids: GridStack
+    grids: FilmGrid
     bodies: BodyStack | None  #: None: rigid pads and films for themselves, a search without those loops.
     pads: PadStack
     works: FilmWork

@@ -231,7 +231,7 @@ def _krylov(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, right
 def _pass_on(work: FilmWork, fields: FloatArray, outlet: FloatArray, taken: FloatArray) -> None:
     """Set what leaves and what the journal takes up: with all else at zero, per kelvin of inlet and journal."""
     count, rows, columns = fields.shape
-    flow = work.flow_x[rows - 2]
+    flow = work.flow[0, (rows - 2) * columns :]
     total = 0.0
     for j in range(columns):
         total += flow[j]

@@ -12,22 +12,6 @@ from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 
 
-class GridStack(NamedTuple):
-    """The meshes of n pads: arrays as of `FilmGrid`, the pad first; `dx` is (n,), `first` the same for all."""
-
-    angle: FloatArray
-    z: FloatArray
-    cos: FloatArray
-    sin: FloatArray
-    cos_face: FloatArray
-    sin_face: FloatArray
-    dx: FloatArray
-    dz: FloatArray
-    height: FloatArray
-    area: FloatArray
-    first: int
-
-
 class BodyStack(NamedTuple):
     """The matrices of k different pads and which of them the films have; n = (nt + 1)(nz + 1) film nodes.
 
@@ -106,18 +90,19 @@ class PadState(NamedTuple):
 JOURNAL, GROWN, GROWING, BACKFLOW = range(4)
 
 
-def stacked_grids(grids: Sequence[FilmGrid]) -> GridStack:
-    """The meshes of several pads as one."""
-    parts: dict[str, Any] = {name: np.array([getattr(g, name) for g in grids]) for name in GridStack._fields[:-1]}
-    return GridStack(**parts, first=grids[0].first)
+def stacked_grids(grids: Sequence[FilmGrid]) -> FilmGrid:
+    """The meshes of several pads as one: arrays as of one, the pad first; `first` is the same for all."""
+    parts: Any = [np.array(values) for values in zip(*grids, strict=True)]
+    return FilmGrid(*parts)._replace(first=grids[0].first)
 
 
 @inner
-def grid_of(grids: GridStack, m: int) -> FilmGrid:
+def grid_of(grids: FilmGrid, m: int) -> FilmGrid:
     """One pad's mesh."""
     return FilmGrid(
-        grids.angle[m], grids.z[m], grids.cos[m], grids.sin[m], grids.cos_face[m], grids.sin_face[m], grids.dx[m],
-        grids.dz[m], grids.height[m], grids.area[m], grids.first,
+        grids.angle[m], grids.z[m], grids.cos[m], grids.sin[m], grids.cos_face[m], grids.sin_face[m],
+        grids.conducts[m], grids.drags[m], grids.node[m], grids.dx[m], grids.dz[m], grids.height[m], grids.area[m],
+        grids.steps[m], grids.first,
     )  # fmt: skip
 
 
@@ -126,6 +111,6 @@ def work_of(works: FilmWork, m: int) -> FilmWork:
     """One film's arrays."""
     return FilmWork(
         works.pressure[m], works.ruptured[m], works.temperature[m], works.viscosity[m], works.density[m],
-        works.drag[m], works.exchange[m], works.gained[m], works.thickness[m], works.extra[m], works.flow_x[m],
-        works.flow_z[m], works.band[m], works.unknown[m], works.slopes[m],
+        works.drag[m], works.exchange[m], works.gained[m], works.thickness[m], works.extra[m], works.flow[m],
+        works.band[m], works.unknown[m], works.slopes[m],
     )  # fmt: skip
