@@ -20,7 +20,7 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.cross_film import CrossFilm, CrossOperator
-from model.film.energy import slope_across
+from model.film.energy import slope_products
 from model.film.matrix import factorise_general
 from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
@@ -283,14 +283,14 @@ def _dissipation(
     for j in range(p.shape[1]):
         h = work.thickness[i, j]
         slope = (p[ahead, j] - p[behind, j]) / ((ahead - behind) * grid.dx) * h
-        across = slope_across(grid, p, i, j) * h
+        across = slope_products(grid, p, p, i, j)[1] * h * h
         along, aside = cross.driven[i, j, 0], cross.driven[i, j, 1]
         drag = speed * cross.shear[i, j] / h
-        driven = along * slope * slope + aside * across * across
+        driven = along * slope * slope + aside * across
         station = h * grid.dx * grid.height[j]
         for m in range(cells):
             wide = edges[m + 1] - edges[m]
             away = 0.5 * (edges[m + 1] + edges[m]) - cross.centre[i, j]
             squared = (drag + slope * away) * (drag + along * slope * away)
-            squared += aside * (across * away) ** 2 + driven * wide * wide / 12.0
+            squared += aside * across * away * away + driven * wide * wide / 12.0
             dissipation[j * cells + m] = squared * cross.fluidity[i, j, m] * wide * station

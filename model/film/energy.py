@@ -45,10 +45,10 @@ def heat_sources(
     grid: FilmGrid, work: FilmWork, running: Running, kept: float, made: FloatArray, loss: FloatArray
 ) -> None:
     """What stations make [W] and lose per kelvin [W/K] if a share is kept: a hotter film makes less heat."""
+    heat = dissipated(grid, work, running.speed)
     for i in range(made.shape[0]):
         for j in range(made.shape[1]):
-            sheared, downstream, sideways = dissipated(grid, work, running.speed, i, j)
-            pressed = downstream + sideways
+            sheared, pressed = heat[0, i, j], heat[1, i, j] + heat[2, i, j]
             fewer = kept * running.oil[1] * max(sheared - pressed, 0.0)
             made[i, j] = kept * (sheared + pressed + work.gained[i, j]) + fewer * work.temperature[i, j]
             loss[i, j] = work.exchange[i, j] + fewer
@@ -154,35 +154,33 @@ def warm(
 
 
 @inner
-def dissipated(grid: FilmGrid, work: FilmWork, speed: float, i: int, j: int) -> tuple[float, float, float]:
-    """Heat made at a node by shear, and by pressure along and across, in its dx and control-volume height [W]; full.
+def dissipated(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
+    """Heat made by shear, by pressure along and across, per station of length dx and control-volume height [W], full.
 
-    Where the viscosity falls by a share, there is less of the first by it and more of the others.
+    (3, nt + 1, nz + 1). Where the viscosity falls by a share, there is less of the first by it and more of the others.
     """
-    h, mu, station = work.thickness[i, j], work.viscosity[i, j], grid.dx * grid.height[j]
-    downstream, sideways = slope_products(grid, work.pressure, work.pressure, i, j)
-    driven = h**3 / (12.0 * mu) * station
-    return mu * speed**2 / h * station, driven * downstream, driven * sideways
+    h, mu = work.thickness, work.viscosity
+    heat = np.empty((3, h.shape[0], h.shape[1]))
+    for i in range(h.shape[0]):
+        for j in range(h.shape[1]):
+            downstream, sideways = slope_products(grid, work.pressure, work.pressure, i, j)
+            station = grid.dx * grid.height[j]
+            driven = h[i, j] ** 3 / (12.0 * mu[i, j]) * station
+            heat[0, i, j] = mu[i, j] * speed**2 / h[i, j] * station
+            heat[1, i, j], heat[2, i, j] = driven * downstream, driven * sideways
+    return heat
 
 
 @inner
 def slope_products(grid: FilmGrid, p: Any, q: Any, i: int, j: int) -> Any:
     """Products of two pressures' slopes at a node: along, the mean of both sides, which the box scheme sees; across."""
-    product, sides = 0.0 * q[i, j], 0
-    for k in range(max(i - 1, 0), min(i + 1, len(p) - 1)):
-        product += ((p[k + 1, j] - p[k, j]) / grid.dx) * ((q[k + 1, j] - q[k, j]) / grid.dx)
-        sides += 1
-    return product / sides, slope_across(grid, p, i, j) * slope_across(grid, q, i, j)
-
-
-@inner
-def slope_across(grid: FilmGrid, p: Any, i: int, j: int) -> Any:
-    """Slope of a pressure across the film at a node; at a line of symmetry there is none."""
-    if j == len(grid.dz):
-        return (p[i, j] - p[i, j - 1]) / grid.dz[j - 1]
-    if j == 0:
-        return (p[i, grid.first] - p[i, 0]) / grid.dz[0]
-    return (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1])
+    behind, ahead, left, right = max(i - 1, 0), min(i + 1, len(p) - 1), max(j - 1, 0), min(j + 1, len(grid.dz))
+    along = (p[i, j] - p[behind, j]) * (q[i, j] - q[behind, j]) + (p[ahead, j] - p[i, j]) * (q[ahead, j] - q[i, j])
+    wide = grid.z[right] - grid.z[left]
+    if j < 1 - grid.first:
+        left = right  # at a line of symmetry there is no slope
+    across = (p[i, right] - p[i, left]) * (q[i, right] - q[i, left])
+    return along / ((ahead - behind) * grid.dx**2), across / wide**2
 
 
 @inner

@@ -64,8 +64,8 @@ def net_inflow(grid: FilmGrid, flow: Any, inflow: Any) -> None:
 
 
 @inner
-def poiseuille_inflow(grid: FilmGrid, work: FilmWork, faces: Faces, n: int) -> float:
+def poiseuille_inflow(p: FloatArray, conductance: FloatArray, line: int, n: int) -> float:
     """What the pressure of its neighbours drives into the control volume of a node without pressure."""
-    p, (along, beside), line = work.pressure.reshape(-1), faces.conductance, grid.steps[0]
+    along, beside = conductance
     inflow = along[n - line] * p[n - line] + along[n] * p[n + line]
     return inflow + beside[n] * p[n + 1] + beside[n - 1] * p[n - 1]

@@ -47,10 +47,10 @@ def heat_impedance(grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Runnin
     film = _Film(grid, work, running, conductances(grid, work, wedge), np.empty(shape))
     out, loss = np.zeros((2, 2), dtype=np.complex128), np.empty(shape, dtype=np.complex128)
     nothing = np.zeros(shape, dtype=np.complex128)
+    heat = dissipated(grid, work, running.speed)
     for i in range(shape[0]):
         for j in range(shape[1]):
-            sheared, downstream, sideways = dissipated(grid, work, running.speed, i, j)
-            pressed, h = downstream + sideways, work.thickness[i, j]
+            sheared, pressed, h = heat[0, i, j], heat[1, i, j] + heat[2, i, j], work.thickness[i, j]
             film.closer[i, j] = (3.0 * pressed - sheared) / h
             # what a kelvin at a node stores and makes less [W/K]
             stored = 1j * omega * running.heat[0] * grid.dx * grid.height[j] * work.density[i, j] * h
@@ -73,7 +73,7 @@ def heat_impedance(grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Runnin
             if asked < _SETTLED * size:
                 settled = True
                 break
-        out[0, axis], out[1, axis] = force_of(grid, grid.area, answer)
+        out[:, axis] = force_of(grid, grid.area, answer.reshape((-1, 1)))[:, 0]
         if not settled:
             out[:, axis] = np.nan
     return out

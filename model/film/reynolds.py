@@ -119,10 +119,12 @@ def solve_film(
 
 @inner
 def _thickness(grid: FilmGrid, work: FilmWork, wedge: Wedge) -> float:
-    h, extra, low = work.thickness.reshape(-1), work.extra.reshape(-1), np.inf
-    for n in range(len(h)):
-        h[n] = wedge[0] - wedge[1] * grid.cos_face[1, n] - wedge[2] * grid.sin_face[1, n] + extra[n]
-        low = min(low, h[n])
+    h, low = work.thickness, np.inf
+    for i in range(h.shape[0]):
+        even = wedge[0] - wedge[1] * grid.cos[i] - wedge[2] * grid.sin[i]
+        for j in range(h.shape[1]):
+            h[i, j] = even + work.extra[i, j]
+            low = min(low, h[i, j])
     return low
 
 
@@ -150,11 +152,11 @@ def _active_set(grid: FilmGrid, work: FilmWork, faces: Faces, source: FloatArray
 @inner
 def _update_active_set(grid: FilmGrid, work: FilmWork, faces: Faces, source: FloatArray) -> int:
     """Let nodes rupture whose pressure is negative, and the film reform where more flows in than out."""
-    ruptured, changed = work.ruptured.reshape(-1), 0
+    p, ruptured, changed = work.pressure.reshape(-1), work.ruptured.reshape(-1), 0
     for k in range(len(source)):
         n, wrong = grid.node[k], work.unknown[k] < 0.0
         if ruptured[n]:
-            wrong = source[k] + poiseuille_inflow(grid, work, faces, n) > 0.0
+            wrong = source[k] + poiseuille_inflow(p, faces.conductance, grid.steps[0], n) > 0.0
         if wrong:
             ruptured[n] = not ruptured[n]
             changed += 1
@@ -164,12 +166,9 @@ def _update_active_set(grid: FilmGrid, work: FilmWork, faces: Faces, source: Flo
 @inner
 def integrate(grid: FilmGrid, work: FilmWork, weight: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Forces and their derivatives; `weight` is the area that a node's perturbed pressure stands for."""
-    force, stiffness, damping = np.empty(2), np.empty((2, 2)), np.empty((2, 2))
-    force[0], force[1] = force_of(grid, grid.area, work.unknown)
+    force = force_of(grid, grid.area, work.unknown.reshape((-1, 1)))[:, 0].copy()
     for j in range(grid.first, grid.steps[0] - 1):
         force[0] += grid.cos[0] * grid.area[0, j] * work.pressure[0, j]
         force[1] += grid.sin[0] * grid.area[0, j] * work.pressure[0, j]
-    for m in range(2):
-        stiffness[0, m], stiffness[1, m] = force_of(grid, weight, work.slopes[:, m])
-        damping[0, m], damping[1, m] = force_of(grid, weight, work.slopes[:, 2 + m])
-    return force, stiffness, damping
+    slopes = force_of(grid, weight, work.slopes)
+    return force, slopes[:, :2].copy(), slopes[:, 2:].copy()

@@ -37,12 +37,12 @@ def rupture_line(grid: FilmGrid, work: FilmWork, faces: Faces, source: FloatArra
     `source` (unknowns,) [kg/s]; gives area (nt + 1, nz + 1) [m^2].
     """
     area, ruptured, width = grid.area.copy(), work.ruptured.reshape(-1), work.band.shape[1] - 1
-    sizes, line = area.reshape(-1), grid.steps[0]
+    p, sizes, line = work.pressure.reshape(-1), area.reshape(-1), grid.steps[0]
     for k in range(len(source)):
         n = grid.node[k]
         if not ruptured[n] or source[k] >= 0.0:
             continue
-        wet = min(1.0, poiseuille_inflow(grid, work, faces, n) / -source[k])
+        wet = min(1.0, poiseuille_inflow(p, faces.conductance, line, n) / -source[k])
         ghost = (wet - 0.5) / (wet + 0.5)
         if k >= width and not ruptured[n - line]:
             work.band[k - width, 0] -= faces.conductance[0, n - line] * ghost
@@ -81,7 +81,7 @@ def derivatives(grid: FilmGrid, work: FilmWork, faces: Faces) -> None:
     net_inflow(grid, by_b, rhs[:, 1])
     for k in range(len(rhs)):
         n = grid.node[k]
-        squeeze = density[n] * grid.dx * grid.height[n % grid.steps[0]]
+        squeeze = density[n] * grid.dx * grid.drags[0, n]
         rhs[k, 2] = squeeze * grid.cos_face[1, n]
         rhs[k, 3] = squeeze * grid.sin_face[1, n]
     keep_ruptured(grid, work, rhs)
@@ -147,7 +147,8 @@ def change_by_oil(
     net_inflow(grid, flow_changes(grid, work, speed, None, oil[0], oil[1]), change)
     keep_ruptured(grid, work, change)
     substitute(work.band, change)
-    return force_of(grid, grid.area, change)
+    force = force_of(grid, grid.area, change.reshape((-1, 1)))
+    return force[0, 0], force[1, 0]
 
 
 @inner
@@ -179,15 +180,17 @@ def flow_changes(
 
 
 @inner
-def force_of(grid: FilmGrid, weight: FloatArray, pressure: Any) -> tuple[Any, Any]:
-    """Radial and tangential force of the pressure at the unknown nodes, which stand for these areas; real or complex.
+def force_of(grid: FilmGrid, weight: FloatArray, pressure: Any) -> Any:
+    """Radial and tangential forces, (2, m), of pressures at the unknown nodes, which stand for these areas.
 
-    `weight` (nt + 1, nz + 1) [m^2], `pressure` (unknowns,).
+    `weight` (nt + 1, nz + 1) [m^2], `pressure` (unknowns, m), real or complex.
     """
-    area = weight.reshape(-1)
-    radial = tangential = 0.0 * pressure[0]
-    for k in range(len(pressure)):
-        n = grid.node[k]
-        radial += grid.cos_face[1, n] * (area[n] * pressure[k])
-        tangential += grid.sin_face[1, n] * (area[n] * pressure[k])
-    return radial, tangential
+    force, width = np.zeros((2, pressure.shape[1]), dtype=pressure.dtype), len(grid.dz) - grid.first
+    for m in range(pressure.shape[1]):
+        for i in range(1, len(grid.cos) - 1):
+            total = 0.0 * pressure[0, 0]
+            for j in range(width):
+                total += weight[i, grid.first + j] * pressure[(i - 1) * width + j, m]
+            force[0, m] += grid.cos[i] * total
+            force[1, m] += grid.sin[i] * total
+    return force

@@ -86,13 +86,13 @@ def resist(grid: FilmGrid, work: FilmWork, speed: float, faces: Faces) -> None:
 @inner
 def heat_beyond(grid: FilmGrid, work: FilmWork, speed: float) -> None:
     """Heat beyond that of a laminar film in the same state, per station of length dx and control-volume height [W]."""
+    heat = dissipated(grid, work, speed)
     for i in range(work.gained.shape[0]):
         for j in range(work.gained.shape[1]):
             reynolds = work.density[i, j] * speed * work.thickness[i, j] / work.viscosity[i, j]
             along, across = excess(reynolds, ALONG)[0], excess(reynolds, ACROSS)[0]
-            sheared, downstream, sideways = dissipated(grid, work, speed, i, j)
-            less = along / (12.0 + along) * downstream + across / (12.0 + across) * sideways
-            work.gained[i, j] = excess(reynolds, SHEAR)[0] * sheared - less
+            less = along / (12.0 + along) * heat[1, i, j] + across / (12.0 + across) * heat[2, i, j]
+            work.gained[i, j] = excess(reynolds, SHEAR)[0] * heat[0, i, j] - less
 
 
 def shear_factor(work: FilmWork, speed: float) -> FloatArray:

@@ -136,8 +136,7 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
             right[r, 2] += value * work.slopes[q, 1]
             for s in range(count):
                 matrix[r, s] -= value * slopes[q, s]
-    for r in range(count):
-        felt[0, r], felt[1, r] = force_of(grid, grid.area, slopes[:, r])
+    felt[:] = force_of(grid, grid.area, slopes)
     solve(matrix, right)
     for r in range(count):
         for axis in range(2):
