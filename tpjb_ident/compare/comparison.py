@@ -341,7 +341,7 @@ def _loci(static: StaticTests, predictions: Predictions) -> pd.DataFrame | None:
     for rows in predictions.values():
         places = rows.loc[_stations(static)][["x_m", "y_m"]].to_numpy(float)
         if static.clearance is None:
-            places += (measured[["x_m", "y_m"]] - places).mean().to_numpy()
+            places = places + (measured[["x_m", "y_m"]] - places).mean().to_numpy()
         frames.append(measured.assign(x_m_predicted=places[:, 0], y_m_predicted=places[:, 1]))
     table = pd.concat(frames, ignore_index=True)
     table.insert(0, "pivots", np.repeat(list(predictions), len(measured)))
