@@ -196,8 +196,8 @@ def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
         held = unknowns.width.copy()
         held[unknowns.tolerances] = Deciding.held
         coarse = problem.errors.coarse
-        # those from before the jump say nothing behind it
-        linear = _renewed(run, unknowns, linear, np.flatnonzero(~np.array(unknowns.is_reading)).tolist())
+        # those from before the jump say nothing behind it; of tolerances that are held little is asked
+        linear = _renewed(run, unknowns, linear, [i for at in unknowns.slices for i in range(at.start, at.stop)])
         linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
         linear = _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
     return _settled(run, unknowns, linear)
