@@ -59,13 +59,13 @@ def records_tab(campaign: Campaign) -> Any:
         load = amount(p.static_load, "load")
         text = f"{run.kind}, {load} at {p.static_load_direction_deg:g} deg, {p.shaft_speed_hz:g} Hz"
         text += f", excitation {p.excitation_hz:g} Hz" if p.excitation else ""
-        for source in data.values():
-            source.data = _nothing()
         try:
             records = [run.record(channel.value), *(run.record(n) for n in further.value if n != channel.value)]
             message = _show_channels(records, plots, data)
         except RigDataError as error:
             message = str(error)
+            for source in data.values():
+                source.data = _nothing()
         facts.text = html.escape(printable(f"{text}. {message}"))
         orbit_of_run.text = _orbit(run)
 
