@@ -40,9 +40,7 @@ def find_disturbances(samples: Samples, speed: float, mains: float, top: float) 
     settings = LineSettings(supply, harmonics, mains_harmonics=_MAINS_HARMONICS)
     resolved: list[Line] = []
     for line in strong_lines((), shaft, settings):
-        is_resolved = all(
-            abs(line.frequency - neighbour.frequency) > samples.rate / samples.length for neighbour in resolved
-        )
+        is_resolved = all(abs(line.frequency - near.frequency) > samples.rate / samples.length for near in resolved)
         if line.frequency < reach and is_resolved:
             resolved.append(line)
     return tuple(resolved)

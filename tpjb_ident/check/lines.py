@@ -45,27 +45,31 @@ class RecordLines:
 
 def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel]) -> RecordLines:
     """One excitation line as identification has it."""
-    names = [channel.name for channel in phasors.channels]
-    places = np.array([names.index(c.name) if c.name in names else -1 for c in channels], dtype=int)
-    medians = []
-    for values in (phasors.mean, np.abs(phasors.residual[line]), phasors.scale):
-        median = np.ma.median(np.ma.masked_invalid(values), axis=0)
-        medians.append(np.append(np.ma.filled(median, np.nan), np.nan)[places])
-    row = np.append(phasors.record[line], np.nan)[places]
+    values = phasors.mean, np.abs(phasors.residual[line]), phasors.scale
+    mean, floor, scatter = (_by_channel(_window_median(rows), phasors, channels) for rows in values)
+    row = _by_channel(phasors.record[line], phasors, channels)
     omega = 2 * np.pi * phasors.lines.excitation[line].frequency
-    mean, floor, scatter = medians
     return RecordLines(mean, floor, scatter, np.array([omega]), row[None])
 
 
 def shaft_line(phasors: RunPhasors, channels: Sequence[Channel]) -> FloatArray:
     """Size of what turns with the shaft in every channel (m,); NaN where it is not told from the excitation."""
     place = phasors.lines.place("1X")
-    sizes = np.full(len(channels), np.nan)
     if place is None:
-        return sizes
-    shown = np.ma.median(np.ma.masked_invalid(np.abs(phasors.z[:, place])), axis=0).filled(np.nan)
-    by_name = {channel.name: size for channel, size in zip(phasors.channels, shown)}
-    return np.array([by_name.get(channel.name, np.nan) for channel in channels])
+        return np.full(len(channels), np.nan)
+    return _by_channel(_window_median(np.abs(phasors.z[:, place])), phasors, channels)
+
+
+def _window_median(values: FloatArray) -> FloatArray:
+    """Median over the windows (n, m) that have a value, NaN where none has, (m,)."""
+    return np.asarray(np.ma.filled(np.ma.median(np.ma.masked_invalid(values), axis=0), np.nan))
+
+
+def _by_channel(values: np.ndarray, phasors: RunPhasors, channels: Sequence[Channel]) -> np.ndarray:
+    """Values of a run's phasors by channel, of the channels asked for; NaN of those that it has not."""
+    names = [channel.name for channel in phasors.channels]
+    places = np.array([names.index(c.name) if c.name in names else -1 for c in channels], dtype=int)
+    return np.asarray(np.append(values, np.nan)[places])
 
 
 def steady_level(values: FloatArray, rate: float, frequencies: Sequence[float]) -> RecordLines:

@@ -53,9 +53,8 @@ class Observation:
     digest: str = ""
     speed: float = math.nan
     other_line: float = math.nan
-    shaft_line: FloatArray = field(
-        default_factory=lambda: np.empty(0), repr=False
-    )  #: (m,): size at 1X, SI; empty: unknown
+    #: (m,): size of what turns with the shaft, SI; empty where nothing tells it
+    shaft_line: FloatArray = field(default_factory=lambda: np.empty(0), repr=False)
     shaft_force: float = math.nan  #: see `tpjb_ident.check.rotation`
 
     def pick(self, quantity: str) -> list[int]:
@@ -133,8 +132,8 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
     if phasors is None:
         return observation
     astray = [k for k in range(len(phasors.lines.excitation)) if not _near_set_point(run, phasors, k)]
-    observation = replace(observation, shaft_line=shaft_line(phasors, live), shaft_force=shaft_force(phasors))
-    return replace(observation, other_line=other_line(phasors, astray))
+    size, force = shaft_line(phasors, live), shaft_force(phasors)
+    return replace(observation, other_line=other_line(phasors, astray), shaft_line=size, shaft_force=force)
 
 
 def _is_timed(report: Reporter, run: Run, length: int) -> bool:

@@ -11,12 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import stdtrit
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import Rig, film_force, vector
 from tpjb_ident.estimate.noise import GAIN_OR_LOAD, UNKNOWN_EXPONENT
-from tpjb_ident.estimate.scatter import Scatter
+from tpjb_ident.estimate.scatter import Scatter, student_widening
 from tpjb_ident.estimate.shape import MODELS, Shape, nearest, over_frequency
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.estimate.term import Term
@@ -136,8 +135,7 @@ def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution,
         solution = task.solved(start, shape)
         term = next(t for t in task.terms if isinstance(t, RunGain))
         size, freedom = term.scatter(solution.fitted[term.name], by_load, _USUAL)
-    # a scatter of few runs is uncertain by itself: Student's t over the normal quantile
-    wide = float(stdtrit(freedom, 0.975) / stdtrit(np.inf, 0.975)) if np.isfinite(freedom) else 1.0
+    wide = student_widening(freedom)
     task = task.with_gains(np.hypot(by_load, size * wide * spare))
     solution = task.solved(start, shape)
     rig = learnt_rig(task.rig, solution)

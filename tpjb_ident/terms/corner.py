@@ -59,8 +59,6 @@ class Corner(Factor):
         """Accelerometers whose corner would have to be negative: something else turns them, no filter does."""
         for parameter, value, error in zip(self.parameters, fitted.value, fitted.deviation):
             if parameter.name == "accelerometers" and value < -_CLEAR * error:
-                text = (
-                    f"the accelerometers lag the more the lower the frequency, as if their corner were {value:.2g} Hz"
-                )
-                return (Condition(OUT_OF_STEP, text),)
+                text = "the accelerometers lag the more the lower the frequency, as if their corner were"
+                return (Condition(OUT_OF_STEP, f"{text} {value:.2g} Hz"),)
         return ()

@@ -8,6 +8,7 @@ accelerometers have another gain, axis or delay than is stated. A shaft's lag gr
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -59,7 +60,7 @@ class Housing(Term):
         super().__init__(rig, blocks)
         self._omega = float(np.median(blocks.omega)) if len(blocks) else 1.0
         self._inertia = _inertia_share(rig, blocks)
-        self._foundation = rig.mount == "cells" and _is_on_foundation(rig, blocks)
+        self._blocks = blocks
         usual, across, loss = _CELLS
         if len(rig.of("acceleration")) < 2:
             usual = 0.0  # the inertia stays in F, as is said of the point
@@ -90,9 +91,13 @@ class Housing(Term):
         else:
             state.floating, state.compliance = _kappa(value)
 
+    @cached_property
+    def _foundation(self) -> bool:
+        return _is_on_foundation(self.rig, self._blocks)
+
     def is_on_foundation(self, fitted: Fitted) -> bool:
         """Whether no one spring, but a support all the same carries the housing."""
-        return self._foundation and fitted.unexplained > _UNEXPLAINED
+        return fitted.unexplained > _UNEXPLAINED and self.rig.mount == "cells" and self._foundation
 
     def acceleration(self, blocks: Blocks, fitted: Fitted) -> ComplexArray:
         """What every block's cells, or probes where the housing floats, let the accelerometers show, (n, 2) [m/s^2]."""
@@ -222,8 +227,7 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
     rows = rig.of("acceleration")
     noise = np.sqrt(np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real)
     lines[~(np.linalg.norm(acceleration, axis=1) > 2 * _CLEAR * noise)] = np.nan
-    supports: list[ComplexArray] = []
-    left, judged = 0.0, 0.0
+    supports, left, judged = [], 0.0, 0.0
     for line in np.unique(lines[np.isfinite(lines)]):
         pushes, shown = design[lines == line].reshape(-1, 3), acceleration[lines == line].ravel()
         support, _, rank, _ = np.linalg.lstsq(np.nan_to_num(pushes), shown, rcond=1e-3)
@@ -235,9 +239,8 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
         return not (blocks.windows > 1).any()
     xx, yy, xy = np.mean(supports[: (len(supports) + 3) // 4], axis=0)
     springs = np.array([[xx, xy], [xy, yy]])
-    is_spring = np.linalg.eigvalsh(springs.real)[0] > 0
-    is_spring &= np.abs(springs.imag).max() < 2 * _LOSS * np.abs(springs).max()
-    return bool(is_spring and left < _LEFT**2 * judged)
+    has_loss = np.abs(springs.imag).max() >= 2 * _LOSS * np.abs(springs).max()
+    return bool(np.linalg.eigvalsh(springs.real)[0] > 0 and not has_loss and left < _LEFT**2 * judged)
 
 
 def _compliance(value: FloatArray) -> ComplexArray:

@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import stdtrit
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State, entry_forces, film_force_rows
+from tpjb_ident.estimate.scatter import student_widening
 from tpjb_ident.estimate.term import Additive, Parameter, of_groups
 from tpjb_ident.terms.load_turn import PLAUSIBLE, LoadTurn
 
 #: Entries of k and of omega c.
 _ENTRIES = 8
-
 #: Scatter of a run's load against its set point before the runs tell it (relative, and rad), as of usual actuators, and
 #: the degrees of freedom that it counts as.
 _USUAL, _FREEDOM = 3e-3, 4.0
@@ -61,4 +60,4 @@ def _mean_error(misses: FloatArray) -> float:
     n = max(len(misses), 1)
     spare = _FREEDOM + n - 1
     variance = (_FREEDOM * _USUAL**2 + float(np.sum((misses - misses.mean()) ** 2))) / spare
-    return math.sqrt(variance / n) * float(stdtrit(spare, 0.975) / stdtrit(np.inf, 0.975))
+    return math.sqrt(variance / n) * student_widening(spare)
