@@ -99,7 +99,8 @@ def test_effects_on_records_go_to_the_instruments_only(bearing):
     effects = (Effect("probe_gain", factor=1.05), Effect("housing_mass", mass_error=2.0))
     truth = rig_truth(bearing, ModelSettings("kirk", "isothermal", effects))
     plain = rig_truth(bearing, ModelSettings("kirk", "isothermal"))
-    assert np.array_equal(truth.h(point(5000.0, 25.0)), plain.h(point(5000.0, 25.0)))
+    # to rounding: where arrays lie in memory decides the order of a library's sums
+    assert np.allclose(truth.h(point(5000.0, 25.0)), plain.h(point(5000.0, 25.0)), rtol=1e-9)
     erring = erring_instruments(Instruments.like_paper(), effects)
     assert erring.named("X1A").error.gain == 1.05
     assert erring.true_mass == erring.housing_mass + 2.0
