@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -140,6 +142,20 @@ def test_a_folder_that_a_killed_run_left_beside_is_cleared_and_a_living_one_stan
         fill(out, "identify", ["a.csv"])  # begins and ends between the other's record and its end
     assert names_in(tmp_path) == ["out/a.csv", "out/b.csv", "out/p.csv", "out/run.json"]
     assert set(former_runs(out)) == {"predict", "pivot", "identify"}
+
+
+def test_a_folder_that_another_run_clears_away_before_it_is_locked_is_made_anew(tmp_path, monkeypatch):
+    made = tempfile.mkdtemp
+
+    def cleared_once(**options):
+        monkeypatch.setattr(tempfile, "mkdtemp", made)
+        folder = made(**options)
+        os.rmdir(folder)
+        return folder
+
+    monkeypatch.setattr(tempfile, "mkdtemp", cleared_once)
+    fill(tmp_path / "out", "pivot", ["a.csv"])
+    assert names_in(tmp_path) == ["out/a.csv", "out/run.json"]
 
 
 def test_every_output_is_recorded_with_its_fingerprint_and_where_the_inputs_lie(tmp_path):

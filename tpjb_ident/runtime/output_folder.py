@@ -36,9 +36,12 @@ def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Ite
     target = _checked(out, inputs)
     staging = None
     try:
-        with interrupts_held():  # a folder that has no name here yet would stay
-            staging = _new_folder(target, out)
-        with locked(staging):
+        with contextlib.ExitStack() as locks:
+            while staging is None or not staging.exists():  # before it is locked, another run may take it for abandoned
+                with interrupts_held():  # a folder that has no name here yet would stay
+                    staging = _new_folder(target, out)
+                with contextlib.suppress(FileNotFoundError):
+                    locks.enter_context(locked(staging))
             _clear_abandoned(target)
             yield staging
             staging.chmod(0o755)
