@@ -19,6 +19,7 @@ from tpjb_ident.identification.point import PointTask, finished_point, point_sha
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.phasors.mains_frequency import mains_frequency
+from tpjb_ident.results.frequency_outliers import with_frequency_outliers
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.results.quality import with_probe_doubts
 from tpjb_ident.runs.baseline import DryTest, dry_test
@@ -90,6 +91,7 @@ def identify(
         finished = all_runs(sines, settings.phasors, report, workers, store)
         identification = assemble(sines, finished, settings, report, workers, dry)
     identification = identification if bands is None else _joined(identification, bands)
+    identification = replace(identification, points=with_frequency_outliers(identification.points))
     return _with_zero_uncertainty(identification, campaign)
 
 

@@ -1,0 +1,68 @@
+"""A point whose runs are all wrong alike stands apart from the other frequencies of its load."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from model.bearing_file import load_bearing
+from model.dynamics import bearing_impedance
+from model.pivots import pivot_laws
+from model.predict import predict_setup
+from model.setup import Setup
+from tpjb_ident.estimators.stiffness import DynamicStiffness
+from tpjb_ident.results.frequency_outliers import frequency_outlier
+
+K, C = 1e6 * np.array([[80.0, 6.0], [-5.0, 250.0]]), 1e5 * np.array([[6.5, 0.1], [0.1, 11.0]])
+
+
+def estimates(frequencies, h, error=1e5, seed=0):
+    """Estimates of h (n, 2, 2) with a random error of every entry [N/m]."""
+    rng = np.random.default_rng(seed)
+    noisy = h + error * (rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape))
+    none = np.ones((1, 2))
+    omega = 2 * np.pi * np.array(frequencies)
+    return [
+        DynamicStiffness(value, w, error**2 * np.eye(8), np.full(8, 20.0), "mm-eiv", none)
+        for value, w in zip(noisy, omega.tolist())
+    ]
+
+
+def film(frequencies, mass=0.0):
+    omega = 2 * np.pi * np.array(frequencies)[:, None, None]
+    return K + 1j * omega * C - omega**2 * mass * np.eye(2)
+
+
+@pytest.mark.parametrize("mass", [0.0, 300.0])
+@pytest.mark.parametrize(
+    "fault", [np.diag([0.5, 0.5]), np.diag([1.0, 0.85]), np.exp(1j * 2 * np.pi * 35.0 * 1e-3) * np.eye(2)]
+)
+def test_a_gain_a_range_or_a_delay_of_one_frequency_is_told(fault, mass):
+    frequencies = [15.0, 25.0, 35.0, 45.0]
+    h = film(frequencies, mass)
+    assert frequency_outlier(estimates(frequencies, h)) is None
+    h[2] = h[2] @ fault
+    place, share = frequency_outlier(estimates(frequencies, h))
+    assert place == 2
+    assert share > 0.05
+
+
+def test_noise_and_few_frequencies_tell_nothing():
+    frequencies = [15.0, 25.0, 35.0, 45.0]
+    h = film(frequencies)
+    h[2] *= 0.9
+    assert frequency_outlier(estimates(frequencies, h, error=3e7)) is None
+    assert frequency_outlier(estimates(frequencies, h)[:3]) is None
+
+
+@pytest.mark.parametrize(
+    "frequencies", [[15.0, 25.0, 35.0, 45.0], [5.0, 120.0, 140.0, 155.0], [10.0, 30.0, 60.0, 90.0, 180.0]]
+)
+def test_a_film_that_bends_over_frequency_has_no_outlier(rocker_file, frequencies):
+    bearing = load_bearing(rocker_file)
+    for pivots in ("rigid", "kirk", 1e8):
+        setup = Setup(bearing, pivot_laws(pivots, bearing), "isothermal")
+        omega = 2 * np.pi * np.array(frequencies)
+        prediction = predict_setup(setup, 8000.0, -np.pi / 2, 138.0, omega)
+        h = bearing_impedance(setup, prediction.equilibrium, omega)
+        assert frequency_outlier(estimates(frequencies, h, error=1e3)) is None
