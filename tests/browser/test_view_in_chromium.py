@@ -6,6 +6,7 @@ import contextlib
 import http.client
 import os
 import re
+import signal
 import socket
 import subprocess
 import sys
@@ -40,7 +41,7 @@ def viewing(*arguments):
     process = subprocess.Popen(
         [sys.executable, "-m", "tpjb_ident", "view", *map(str, arguments), "--no-browser", "--seconds", "600"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"},
     )  # fmt: skip
     try:
         line = process.stdout.readline()
@@ -49,7 +50,11 @@ def viewing(*arguments):
         yield found[0], int(found[1])
     finally:
         process.terminate()
-        process.communicate(timeout=30)
+        try:
+            process.communicate(timeout=30)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGABRT)
+            pytest.fail(f"did not end on SIGTERM; it was here:\n{process.communicate()[1]}")
 
 
 @pytest.fixture(scope="module")

@@ -41,10 +41,9 @@ _LOSS = 0.04
 _STIFFEST = 0.01
 #: Ratio of the springs along X and Y that no rig has: a sensitivity is ten times off.
 _ALIKE = 1 / 6
-#: Share of the acceleration that the housing's equations leave where sensors are right, at most: rigs have 0.05.
-_UNEXPLAINED = 0.2
-#: The same of a floating stator, whose inertia is most of the force: a pedestal under its shaft leaves 0.13.
-_UNEXPLAINED_FLOATING = 0.1
+#: Share of the acceleration that the housing's equations leave where sensors are right, at most: rigs have 0.05. Of a
+#: floating stator inertia is most of the force, and a pedestal under its shaft leaves 0.13.
+_UNEXPLAINED = {"cells": 0.2, "floating": 0.1, "unknown": 0.1}
 #: The same of a support with another compliance at every frequency; logarithm by which frequencies differ.
 _LEFT, _ONE_LINE = 0.1, 0.01
 #: Inertia's share of the force below which wrong accelerometers do no harm worth refusing a point for.
@@ -95,9 +94,12 @@ class Housing(Term):
     def _foundation(self) -> bool:
         return _is_on_foundation(self.rig, self._blocks)
 
+    def _is_unexplained(self, fitted: Fitted) -> bool:
+        return fitted.unexplained > _UNEXPLAINED[self.rig.mount]
+
     def is_on_foundation(self, fitted: Fitted) -> bool:
         """Whether no one spring, but a support all the same carries the housing."""
-        return fitted.unexplained > _UNEXPLAINED and self.rig.mount == "cells" and self._foundation
+        return self._is_unexplained(fitted) and self.rig.mount == "cells" and self._foundation
 
     def acceleration(self, blocks: Blocks, fitted: Fitted) -> ComplexArray:
         """What every block's cells, or probes where the housing floats, let the accelerometers show, (n, 2) [m/s^2]."""
@@ -145,8 +147,7 @@ class Housing(Term):
     def _shown(self, fitted: Fitted) -> tuple[Condition, ...]:
         """What these numbers say of the accelerometers."""
         share = f"inertia is {100 * self._inertia:.2g} % of the force"
-        most = _UNEXPLAINED if self.rig.mount == "cells" else _UNEXPLAINED_FLOATING
-        if fitted.unexplained > most and fitted.unexplained * self._inertia > HARMLESS:
+        if self._is_unexplained(fitted) and fitted.unexplained * self._inertia > HARMLESS:
             moves = "springs under it make of the cells' force" if self.rig.mount == "cells" else "the probes show"
             text = f"{min(100 * fitted.unexplained, 100):.0f} % of the housing's motion is not what {moves}; {share}"
             return (Condition("accelerometers-contradict-cells", text),)
@@ -203,7 +204,7 @@ class Housing(Term):
         if self.rig.mount == "cells":
             compared, sound = "force", all(condition == OUT_OF_STEP for condition in self.conditions(fitted))
         else:
-            compared, sound = "displacement", fitted.unexplained < _UNEXPLAINED and not _otherwise(fitted, _GROSS)
+            compared, sound = "displacement", not (self._is_unexplained(fitted) or _otherwise(fitted, _GROSS))
         widened = []
         for s in sensors:
             late = -lag / self._omega if s.quantity == compared else 0.0
