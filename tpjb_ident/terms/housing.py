@@ -228,20 +228,27 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
     rows = rig.of("acceleration")
     noise = np.sqrt(np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real)
     lines[~(np.linalg.norm(acceleration, axis=1) > 2 * _CLEAR * noise)] = np.nan
-    supports, left, judged = [], 0.0, 0.0
-    for line in np.unique(lines[np.isfinite(lines)]):
+    supports, places, left, judged = [], [], 0.0, 0.0
+    usable = np.unique(lines[np.isfinite(lines)])
+    for place, line in enumerate(usable):
         pushes, shown = design[lines == line].reshape(-1, 3), acceleration[lines == line].ravel()
         support, _, rank, _ = np.linalg.lstsq(np.nan_to_num(pushes), shown, rcond=1e-3)
         if rank == 3 and len(pushes) > 3:
             supports.append(support)
+            places.append(place)
             left += float(np.linalg.norm(shown - pushes @ support)) ** 2 * len(pushes) / (len(pushes) - 3)
             judged += float(np.linalg.norm(shown)) ** 2
     if len(supports) < 2 or not judged > 0.5 * float(np.linalg.norm(np.nan_to_num(acceleration))) ** 2:
         return not (blocks.windows > 1).any()
-    xx, yy, xy = np.mean(supports[: (len(supports) + 3) // 4], axis=0)
+    if not left < _LEFT**2 * judged:
+        return False
+    low = [support for support, place in zip(supports, places) if 4 * place <= len(usable)]
+    if not low:  # nothing tells what the support is below its resonance
+        return True
+    xx, yy, xy = np.mean(low[: (len(supports) + 3) // 4], axis=0)
     springs = np.array([[xx, xy], [xy, yy]])
     has_loss = np.abs(springs.imag).max() >= 2 * _LOSS * np.abs(springs).max()
-    return bool(np.linalg.eigvalsh(springs.real)[0] > 0 and not has_loss and left < _LEFT**2 * judged)
+    return bool(np.linalg.eigvalsh(springs.real)[0] > 0 and not has_loss)
 
 
 def _compliance(value: FloatArray) -> ComplexArray:
