@@ -40,6 +40,11 @@ def merged(*groups: tuple[Condition, ...]) -> tuple[Condition, ...]:
     return tuple(seen.values())
 
 
+def holding(*rows: tuple[object, str, str]) -> tuple[Condition, ...]:
+    """Conditions from rows of test, name and sentence: those whose test holds."""
+    return tuple(Condition(name, detail) for test, name, detail in rows if test)
+
+
 def untrusted(conditions: Iterable[Condition]) -> tuple[Condition, ...]:
     """Those that forbid trust in the number that they belong to: a command that has one ends with exit code 3."""
     return tuple(condition for condition in conditions if condition.severity == "error")
@@ -48,6 +53,11 @@ def untrusted(conditions: Iterable[Condition]) -> tuple[Condition, ...]:
 def sentences(conditions: Iterable[Condition]) -> tuple[str, ...]:
     """Every condition as one line, name and detail."""
     return tuple(condition.sentence() for condition in conditions)
+
+
+def quality_cell(conditions: Iterable[str]) -> str:
+    """Names for a cell of a column `quality`."""
+    return "; ".join(map(str, conditions)) or "ok"
 
 
 def errors_in(quality: object) -> list[str]:

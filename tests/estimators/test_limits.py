@@ -17,9 +17,10 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import RigStiffness
 from tpjb_ident.phasors.lines import Line, LineSet, LineSettings, known_lines
 from tpjb_ident.phasors.windows import WindowSettings, line_design, plan_windows, variance_inflation
-from tpjb_ident.results.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
 from tpjb_ident.results.frequency_model import REFUSED, fit_over_frequency, fits_over_frequency
+from tpjb_ident.results.linearity import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
 from tpjb_ident.runs.baseline import DryTest
+from tpjb_ident.runs.point_data import PointData
 
 K = np.array([[2.0e8, 1e7], [-3e7, 4.0e8]])
 C = np.array([[4e5, 2e4], [-1e4, 6e5]])
@@ -308,7 +309,7 @@ def data_of(*groups):
     runs = [run for g in groups for run in g[0]]
     D, F = (np.array([row for g in groups for row in g[k]]) for k in (1, 2))
     repeated = np.repeat(np.arange(len(runs)), 3)
-    return SimpleNamespace(runs=runs, D=D[repeated], F=F[repeated], run_index=repeated)
+    return PointData(None, tuple(runs), (0,) * len(runs), D[repeated], F[repeated], repeated)
 
 
 def test_a_stiffening_with_amplitude_is_found_exactly_and_units_do_not_matter():
@@ -317,7 +318,7 @@ def test_a_stiffening_with_amplitude_is_found_exactly_and_units_do_not_matter():
     assert found.stiffening == pytest.approx(0.05, rel=1e-9)
     assert found.standard_error < 1e-9
     assert found.runs == 5
-    data.D, data.F = 1e3 * data.D, 1e-2 * data.F
+    data = replace(data, D=1e3 * data.D, F=1e-2 * data.F)
     assert amplitude_slope(data, 1e-5 * H, np.ones(15)).stiffening == pytest.approx(0.05, rel=1e-9)
 
 
@@ -343,20 +344,20 @@ def test_its_error_is_that_of_a_slope_within_directions():
 @pytest.mark.parametrize(("ratio", "told"), [(MIN_RATIO * 1.01, True), (MIN_RATIO * 0.99, False)])
 def test_amplitudes_must_differ_to_tell_anything(ratio, told):
     data = data_of(shaken((1.0, ratio), 0.2), shaken((1.0, ratio), 1.1))
-    assert (amplitude_slope(data, H, np.ones(12)) is not None) is told
+    assert (amplitude_slope(data, H, np.ones(12)).runs > 0) is told
 
 
 def test_too_few_runs_and_windows_without_weight_tell_nothing():
-    assert amplitude_slope(data_of(shaken((1.0, 2.0), 0.2)), H, np.ones(6)) is None
+    assert not amplitude_slope(data_of(shaken((1.0, 2.0), 0.2)), H, np.ones(6)).runs
     data = data_of(shaken((1.0, 2.0, 4.0), 0.2, 0.05), shaken((1.0, 2.0), 1.1, 0.05))
     weights = np.where(data.run_index == 1, 0.0, 1.0)
     assert amplitude_slope(data, H, weights).runs == 4
     spoilt = np.where(np.arange(15) % 3 == 0, 0.0, 1.0)
-    data.F = data.F + 1e4 * (spoilt == 0)[:, None]
+    data = replace(data, F=data.F + 1e4 * (spoilt == 0)[:, None])
     assert amplitude_slope(data, H, spoilt).stiffening == pytest.approx(0.05, rel=1e-9)
     data.runs[0].direction = None
     assert amplitude_slope(data, H, spoilt).runs == 4
-    assert amplitude_slope(data, np.full((2, 2), np.nan), spoilt) is None
+    assert not amplitude_slope(data, np.full((2, 2), np.nan), spoilt).runs
 
 
 def test_a_slope_is_pointed_out_beyond_chance_and_one_per_cent():

@@ -16,7 +16,7 @@ from tpjb_ident.identification.plain import PlainSettings, plain_frame, plain_po
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.compensation import SlowerChannel, slower_channel
 from tpjb_ident.results.frequency_model import chance_of
-from tpjb_ident.runs.static_load import cell_zero
+from tpjb_ident.runs.static_load import StaticLoads, cell_zero
 
 QUICK = Rig(frequencies=(25.0,), seconds=2.0)
 SLOW = Acquisition(rate=1000.0, uncertainty=EXACT)
@@ -80,12 +80,12 @@ def test_a_zero_of_the_cells_is_told_from_a_gain_by_the_loads():
     rng = np.random.default_rng(3)
     loads = np.repeat([2500.0, 5000.0, 8750.0], 6) * -1j
     means = 1.01 * loads * (1 + 0.003 * rng.standard_normal(18)) + (120 - 300j)
-    found = cell_zero(means, loads)
-    assert abs(found.force - (120 - 300j)) < 40
-    assert found.conditions() == ("cells-not-tared",)
-    assert cell_zero(means, loads, uncertainty=5.0).force == 0  # a load that is really off
-    assert cell_zero(1.01 * loads * (1 + 0.003 * rng.standard_normal(18)), loads).force == 0
-    assert cell_zero(means[:6], loads[:6]).force == 0  # one load
+    zero, error = cell_zero(means, loads)
+    assert abs(zero - (120 - 300j)) < 40
+    assert StaticLoads([np.zeros(1, complex)], 1.0, zero, error).conditions(0) == ("cells-not-tared",)
+    assert cell_zero(means, loads, uncertainty=5.0) == (0, 0)  # a load that is really off
+    assert cell_zero(1.01 * loads * (1 + 0.003 * rng.standard_normal(18)), loads) == (0, 0)
+    assert cell_zero(means[:6], loads[:6]) == (0, 0)  # one load
 
 
 def test_cells_without_static_part_are_no_cells_of_wrong_gain():

@@ -12,7 +12,7 @@ from tests.rigs.acquisition import EXACT, Acquisition
 from tests.rigs.closed_form import USUAL, Rig, write_rig
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.results.harmonics import MAX_AMPLITUDE, NEVER_LINEAR, FilmChange, change_conditions
+from tpjb_ident.results.linearity import MAX_AMPLITUDE, NEVER_LINEAR, FilmChange, change_conditions
 
 
 @pytest.mark.parametrize(

@@ -13,11 +13,13 @@ from tpjb_ident.conditions import Condition, merged, sentences, untrusted
 
 
 def stated_names(source):
-    """Names that a module states in calls of `Condition(..)`."""
+    """Names that a module states in calls of `Condition(name, ..)`, and in rows of `holding((test, name, ..), ..)`."""
     for node in imports_and_calls(source):
-        made = isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Condition" and node.args
-        if made and isinstance(getattr(node.args[0], "value", None), str):
-            yield node.args[0].value
+        called = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
+        named = node.args[:1] if called == "Condition" else []
+        if called == "holding":
+            named = [row.elts[1] for row in node.args if isinstance(row, ast.Tuple)]
+        yield from (name.value for name in named if isinstance(getattr(name, "value", None), str))
 
 
 def test_every_condition_of_the_code_is_in_the_registry_and_the_registry_holds_no_other():

@@ -30,6 +30,7 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.vector import directions
 from tpjb_ident.clearance.sweep import ContactIntervals
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.estimate.robust_constants import huber_weight, reweighted
 from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 from tpjb_ident.pivot.curve import PivotCurve
@@ -59,17 +60,10 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
         raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
     error = _EQUAL_WITHIN * np.sqrt(np.maximum(np.diag(covariance), 1e-20))
-    weights = np.ones(len(angles))
-    gain: FloatArray = np.zeros((3, len(angles)))
-    solution: FloatArray = np.zeros(3)
-    for _ in range(400):
-        gain = np.asarray(np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights), dtype=float)
-        previous, solution = solution, gain @ distances
-        if np.max(np.abs(solution - previous)) < 1e-12:
-            break
-        # Huber's weights with the bend at the measurement error: absolute beyond it, square within
-        weights = 1.0 / np.maximum(np.abs(distances - design @ solution) / error, 1.0)
-    return Centre(solution[:2], float(solution[2]), gain)
+    # Huber's weights with the bend at the measurement error: absolute beyond it, square within
+    solution, weights, _, _ = reweighted(design, distances, lambda u: huber_weight(u, 1.0), error, 1e-12, 400)
+    gain = np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights)
+    return Centre(solution[:2], float(solution[2]), np.asarray(gain, dtype=float))
 
 
 def corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:

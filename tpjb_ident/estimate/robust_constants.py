@@ -1,4 +1,4 @@
-"""Tuning constants of the complex robust estimators, computed instead of quoted.
+"""Weights of the robust estimators, the loop that they share, and tuning constants, computed instead of quoted.
 
 For a q-dimensional complex circular Gaussian residual with covariance S, u = sqrt(2 r^H S^-1 r) follows
 a chi distribution with 2 q degrees of freedom; everything below is an expectation over it.
@@ -7,13 +7,17 @@ a chi distribution with 2 q degrees of freedom; everything below is an expectati
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from math import comb
+from typing import Any
 
 import numpy as np
 from scipy.special import chdtr, gammaincinv
 
 from rigdata.arrays import FloatArray
 
+#: Median of the absolute value of a standard normal variable.
+_NORMAL_MAD = 0.6744897501960817
 #: Probabilities beyond which a window begins to lose weight, and beyond which none is left.
 _BEGIN, _END = 0.99, 0.9999
 
@@ -21,6 +25,38 @@ _BEGIN, _END = 0.99, 0.9999
 def bisquare_weight(u: FloatArray, c: float) -> FloatArray:
     """Tukey's weight psi(u) / u; `u` (n,)."""
     return np.asarray(np.maximum(1 - (u / c) ** 2, 0.0) ** 2)
+
+
+def huber_weight(u: FloatArray, c: float) -> FloatArray:
+    """Huber's weight psi(u) / u; `u` (n,), not negative."""
+    return np.asarray(c / np.maximum(u, c))
+
+
+def reweighted(
+    design: Any,
+    response: Any,
+    weigh: Callable[[FloatArray], FloatArray],
+    scale: float | FloatArray | None = None,
+    tolerance: float = 1e-10,
+    most: int = 200,
+) -> tuple[Any, FloatArray, Any, int]:
+    """Regression by iteratively reweighted least squares: coefficients (p,), weights (m,), scale and rounds.
+
+    `design` (m, p), `response` (m,), real or complex; `weigh` takes absolute residuals over their scale, that of their
+    median where none is known.
+    """
+    values, weights = np.linalg.pinv(design).dot(response), np.ones(len(response))
+    rounds, step = 1, np.full(1, np.inf)
+    while True:
+        residual = np.abs(response - design.dot(values))
+        size = np.median(residual / _NORMAL_MAD) if scale is None else scale
+        if rounds >= most or not np.any(step > tolerance) or not np.all(size):
+            return values, weights, size, rounds
+        weights = weigh(residual / size)
+        half = np.sqrt(weights)
+        updated = np.linalg.pinv(half[:, None] * design).dot(half * response)
+        step, values = np.abs(updated - values), updated
+        rounds += 1
 
 
 def half_shrinkage(dimension: int, share: float) -> float:

@@ -22,7 +22,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import ArgumentError, TpjbError
-from tpjb_ident.estimate.robust_constants import bisquare_weight
+from tpjb_ident.estimate.robust_constants import bisquare_weight, huber_weight, reweighted
 from tpjb_ident.estimators.r_matrix import TableFit, real_rows
 
 #: Names of the norms and the statsmodels class behind each.
@@ -39,10 +39,8 @@ NORMS = {
     "mquantile": "MQuantileNorm",
     "least-squares": "LeastSquares",
 }
-#: Thresholds in scales, statsmodels' own.
-_HUBER, _TUKEY = 1.345, 4.685
-#: Median of the absolute value of a standard normal variable.
-_NORMAL_MAD = 0.6744897501960817
+#: Weight and threshold in scales, statsmodels' own, of the norms that are solved without it.
+_QUICK = {"huber": (huber_weight, 1.345), "tukey": (bisquare_weight, 4.685), "bisquare": (bisquare_weight, 4.685)}
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ class RlmSolution:
     weights: FloatArray  #: (m,)
     scale: float
     iterations: int
-    covariance: FloatArray  #: (p, p): H1, scaled; NaN where it is not asked for
+    covariance: FloatArray | float = np.nan  #: (p, p): H1, scaled; NaN where it is not asked for
     conditions: tuple[Condition, ...] = ()
 
 
@@ -80,8 +78,10 @@ def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | 
             "RLM solves real systems; complex data would come back with false standard errors. "
             "Stack real and imaginary parts first (tpjb_ident.estimators.r_matrix.real_rows)"
         )
-    if settings.quick and settings.norm in _WEIGHTS and settings.scale == "mad":
-        fit = _reweighted(design, response, settings)
+    if settings.quick and settings.norm in _QUICK and settings.scale == "mad":
+        weight, threshold = _QUICK[settings.norm]
+        tolerance, most = settings.tolerance, settings.max_iterations
+        fit = RlmSolution(*reweighted(design, response, lambda u: weight(u, threshold), None, tolerance, most))
     else:
         fit = _statsmodels(design, response, settings)
     if fit.iterations >= settings.max_iterations:
@@ -127,36 +127,3 @@ def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = Non
         weights[:, axis] = np.minimum(solution.weights[:n], solution.weights[n:])
         conditions += solution.conditions
     return TableFit(h, weights, covariance, np.full(8, max(2.0 * n - 4.0, 1.0)), conditions)
-
-
-def _reweighted(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RlmSolution:
-    """Robust regression by iteratively reweighted least squares; `design` (m, p), `response` (m,)."""
-    params, weights = np.linalg.pinv(design).dot(response), np.ones(len(response))
-    residual = response - design.dot(params)
-    scale, iterations = _mad(residual), 1
-    while scale != 0.0:
-        weights = _WEIGHTS[settings.norm](residual / scale)
-        half = np.sqrt(weights)
-        before, params = params, np.linalg.pinv(half[:, None] * design).dot(half * response)
-        residual = response - design.dot(params)
-        scale = _mad(residual)
-        iterations += 1
-        if iterations >= settings.max_iterations or not np.any(np.abs(params - before) > settings.tolerance):
-            break
-    return RlmSolution(params, weights, scale, iterations, np.full((len(params), len(params)), np.nan))
-
-
-def _mad(residual: FloatArray) -> float:
-    return float(np.median(np.abs(residual) / _NORMAL_MAD))
-
-
-def _huber(z: FloatArray) -> FloatArray:
-    return np.asarray(_HUBER / np.maximum(np.abs(z), _HUBER))
-
-
-def _tukey(z: FloatArray) -> FloatArray:
-    return bisquare_weight(z, _TUKEY)
-
-
-#: Weight psi(z) / z of residuals z over their scale.
-_WEIGHTS: dict[str, Callable[[FloatArray], FloatArray]] = {"huber": _huber, "tukey": _tukey, "bisquare": _tukey}

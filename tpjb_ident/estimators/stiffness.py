@@ -56,7 +56,7 @@ class DynamicStiffness:
     attenuation : (2,) ndarray
         Share by which noise on the displacements would pull a plain regression of F on X towards
         zero, along the weaker displacement direction first; NaN when not known.
-    systematic : (8, 8) ndarray or None
+    systematic : (8, 8) ndarray
         Covariance from calibration, common to all points of a campaign.
 
     Examples
@@ -77,7 +77,7 @@ class DynamicStiffness:
     chi_square: float = np.nan
     spare_equations: int = 0
     attenuation: FloatArray = field(default_factory=lambda: np.full(2, np.nan), repr=False)
-    systematic: FloatArray | None = field(default=None, repr=False)
+    systematic: FloatArray = field(default_factory=lambda: np.zeros((8, 8)), repr=False)
 
     @property
     def direct(self) -> tuple[float, float]:
@@ -118,10 +118,8 @@ class DynamicStiffness:
             raise ArgumentError(f"level must lie in (0, 1), got {level}")
         quantile = 0.5 + 0.5 * level
         random = stdtrit(self.dof, quantile) * self.standard_error
-        if not systematic or self.systematic is None:
-            return np.asarray(random)
         calibration = stdtrit(np.inf, quantile) * np.sqrt(np.diag(self.systematic))
-        return np.hypot(random, calibration)
+        return np.hypot(random, calibration) if systematic else np.asarray(random)
 
     def interval(self, level: float = 0.95, systematic: bool = True) -> Interval:
         """Interval of the eight entries; see `half_width` for the arguments.
@@ -141,6 +139,13 @@ class DynamicStiffness:
         half = self.half_width(level, systematic)
         return Interval(self.vector - half, self.vector + half)
 
+    def figures(self) -> FloatArray:
+        """Value, ends of the 95 % interval, standard errors and half widths, random and systematic ones, (8, 7)."""
+        value, half, random = self.vector, self.half_width(), self.half_width(systematic=False)
+        systematic = np.sqrt(np.maximum(half**2 - random**2, 0.0))
+        errors = self.standard_error, np.sqrt(np.diag(self.systematic))
+        return np.stack([value, value - half, value + half, *errors, random, systematic], axis=1)
+
     def direct_coefficients(self) -> str:
         """Direct coefficients with half their 95 % intervals, in MN/m and kN s/m."""
         cells, order = self.cells(), ((0, STIFFNESS), (4, DAMPING), (3, STIFFNESS), (7, DAMPING))
@@ -159,13 +164,9 @@ class DynamicStiffness:
         return f"<DynamicStiffness {at}: {self.direct_coefficients()}>"
 
     def __str__(self) -> str:
-        half = self.half_width().reshape(2, 4)
+        half = self.half_width()
         rows = [f"dynamic stiffness at {self.omega / (2 * np.pi):.4g} Hz, {self.method}"]
-        for j, entry in enumerate(ENTRIES):
-            k, c = self.k.ravel()[j], self.c.ravel()[j]
-            rows.append(
-                f"  k{entry} {k: .4e} +- {half[0, j]:.1e} N/m    "
-                f"c{entry} {c: .4e} +- {half[1, j] / self.omega:.1e} N s/m"
-            )
-        rows.extend(f"  {condition.sentence()}" for condition in self.status)
-        return "\n".join(rows)
+        for i, entry in enumerate(ENTRIES):
+            k, c = (f"{self.vector[j] / s: .4e} +- {half[j] / s:.1e}" for j, s in ((i, 1.0), (i + 4, self.omega)))
+            rows.append(f"  k{entry} {k} N/m    c{entry} {c} N s/m")
+        return "\n".join([*rows, *(f"  {condition.sentence()}" for condition in self.status)])

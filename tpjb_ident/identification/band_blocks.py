@@ -17,7 +17,7 @@ from tpjb_ident.estimate.sensors import alive, axes_of
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.campaign_blocks import calibration_numbers
 from tpjb_ident.identification.point_means import warm_gain
-from tpjb_ident.runs.static_load import LoadMiss
+from tpjb_ident.runs.static_load import missed_load
 from tpjb_ident.terms.distortion import band_change, line_scatter
 
 #: F ratio from which an excitation tells the displacements from their noise,
@@ -46,7 +46,7 @@ class BandBlocks:
 def band_blocks(
     points: Sequence[BandPoint],
     sensors: tuple[Sensor, ...],
-    misses: Sequence[LoadMiss],
+    misses: Sequence[ComplexArray],
     temperatures: Mapping[str, float],
     clearance: float | None,
     turn: int = 0,
@@ -67,7 +67,7 @@ def band_blocks(
             warmth = temperatures.get(names[0], np.nan)
             channels = _described(spectra[0], sensors)
             row = {"calibration": calibration_numbers(channels, calibrations), "along": axes_of(channels)}
-            row |= {"run": len(runs), "temperature": warmth, "miss": miss.of(members)}
+            row |= {"run": len(runs), "temperature": warmth, "miss": missed_load(miss, members)}
             for place, response in enumerate(_run_rows(point, spectra, channels, warmth, turn)):
                 at = {"point": groups[b] + place, "omega": 2 * np.pi * point.plan.middles[place]}
                 rows += [values | row | at for values in response]

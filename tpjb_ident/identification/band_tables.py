@@ -18,7 +18,7 @@ from tpjb_ident.identification.band_solution import BandSolution
 from tpjb_ident.identification.shared_changes import shared_changes, sources_of, total
 from tpjb_ident.results.band_result import BandLine, BandResult
 from tpjb_ident.results.frequency_model import FrequencyModel, fit_over_frequency, supported
-from tpjb_ident.results.harmonics import FilmChange, change_conditions
+from tpjb_ident.results.linearity import FilmChange, change_conditions
 from tpjb_ident.results.point_result import PointResult, mean_position
 from tpjb_ident.results.quality import feeds_motion
 from tpjb_ident.runs.excluded_runs import ExcludedRun

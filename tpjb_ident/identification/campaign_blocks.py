@@ -15,7 +15,7 @@ from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.sensors import axes_of, sensors_of
 from tpjb_ident.identification.point_means import PointMeans
 from tpjb_ident.runs.point_data import PointData
-from tpjb_ident.runs.static_load import LoadMiss
+from tpjb_ident.runs.static_load import missed_load
 
 #: Degrees of freedom below which the noise of a point is taken together with the other points'.
 _FREEDOM = 60.0
@@ -42,7 +42,7 @@ def run_temperatures(campaign: Campaign, measured: Iterable[tuple[str, Mapping[i
 def campaign_blocks(
     points: Sequence[PointData],
     means: Sequence[PointMeans],
-    misses: Sequence[LoadMiss],
+    misses: Sequence[ComplexArray],
     bent: FloatArray,
     temperatures: Mapping[str, float],
 ) -> Blocks:
@@ -75,7 +75,7 @@ def campaign_blocks(
                 "windows": w.count[g],
                 "time": w.time[g],
                 "temperature": temperatures.get(run.run, np.nan),
-                "miss": miss.of([g]),
+                "miss": missed_load(miss, [g]),
                 "miss_error": point.load_error[g] / max(load, 1e-9) if load > 0 else _LOAD_ERROR,
                 "shaft": point.shaft[g],
             }

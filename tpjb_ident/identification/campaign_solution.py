@@ -15,7 +15,7 @@ from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures
 from tpjb_ident.identification.clocks import solved_with_clocks
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means, sensor_axes
-from tpjb_ident.results.harmonics import FilmChange, film_change
+from tpjb_ident.results.linearity import FilmChange, film_change
 from tpjb_ident.runs.finished_runs import RunDigest
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.runs.static_load import StaticLoads, static_loads

@@ -17,6 +17,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
 from tpjb_ident.bands.run_spectra import is_broadband
+from tpjb_ident.conditions import quality_cell
 from tpjb_ident.estimators.r_matrix import r_matrix
 from tpjb_ident.estimators.rlm import RlmSettings, rlm_fit
 from tpjb_ident.phasors.extraction import extract
@@ -89,7 +90,7 @@ def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.Dat
         values = np.concatenate([p.h.real.ravel(), p.h.imag.ravel()]) * factor
         for name, value, error in zip(COEFFICIENT_COLUMNS, values, p.standard_error * factor):
             row[name], row[f"{name}_se"] = value, error
-        figures = (settings.norm, settings.window, len(p.data.runs), len(p.f) // 2, "; ".join(p.status) or "ok")
+        figures = (settings.norm, settings.window, len(p.data.runs), len(p.f) // 2, quality_cell(p.status))
         rows.append(row | dict(zip(_FIGURES, figures)))
     columns = [c for name in COEFFICIENT_COLUMNS for c in (name, f"{name}_se")]
     return pd.DataFrame(rows, columns=[*POINT_KEY, *columns, *_FIGURES])

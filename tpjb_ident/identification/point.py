@@ -19,8 +19,7 @@ from tpjb_ident.identification.point_means import MeansTask, channel_windows, cl
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.identification.shared_changes import sources_of, total
 from tpjb_ident.phasors.run_data import RunPhasors
-from tpjb_ident.results.amplitude import amplitude_slope
-from tpjb_ident.results.harmonics import FilmChange, change_conditions
+from tpjb_ident.results.linearity import FilmChange, amplitude_slope, change_conditions
 from tpjb_ident.results.point_result import PointResult, mean_position
 from tpjb_ident.results.quality import (
     amplitude,
@@ -33,7 +32,6 @@ from tpjb_ident.results.quality import (
 from tpjb_ident.runs.baseline import DryTest
 from tpjb_ident.runs.checked_runs import check_conditions
 from tpjb_ident.runs.point_data import PointData, pad_means
-from tpjb_ident.runs.static_load import LoadMiss
 
 #: Name of the method that the solve stands for in the tables.
 SOLVED = "mm-eiv"
@@ -50,7 +48,7 @@ class PointShare:
     budget: dict[str, FloatArray]
     conditions: tuple[Condition, ...]
     shaft: bool
-    miss: LoadMiss
+    miss: ComplexArray
     film: FilmChange
     mains_in_cells: float  #: N
 
@@ -159,7 +157,7 @@ def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> P
         flags(data, best, coherent),
         directional_pattern(data, weights),
         disagreeing_runs(data, best.h, weights, share.mains_in_cells),
-        () if linearity is None else linearity.condition(),
+        linearity.condition(),
         disagreement(by_method, settings.method),
         share.conditions,
         task.dry.missing(recorded.omega),

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, quality_cell
 from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.results.frequency_model import MODEL_COLUMNS, FrequencyModel
 from tpjb_ident.results.point_result import PointResult
@@ -109,24 +109,18 @@ def frf_frame(results: Sequence[BandResult], every_method: bool = False) -> pd.D
 
 
 def _line_row(result: BandResult, line: BandLine, method: str, est: DynamicStiffness) -> list[Any]:
-    value, half, se = est.vector, est.half_width(), est.standard_error
-    shared = np.zeros(8) if est.systematic is None else np.sqrt(np.diag(est.systematic))
-    numbers = np.stack([value, value - half, value + half, se, shared], axis=1)
-    quality = "; ".join(str(c) for c in result.quality) or "ok"
     figures = [*line.coherence, method, float(np.min(est.dof)), len(result.runs), line.n_rows]
-    figures += [result.resolution, est.condition, quality]
-    return [*result.key().values(), line.frequency, *numbers.ravel(), *figures]
+    figures += [result.resolution, est.condition, quality_cell(result.quality)]
+    return [*result.key().values(), line.frequency, *est.figures()[:, :5].ravel(), *figures]
 
 
 def models_frame(results: Sequence[BandResult]) -> pd.DataFrame:
     """One row per operating point and model: ``frf_models.csv``."""
     import pandas as pd
 
-    rows = [_model_row(result, model) for result in results for model in result.models.values()]
+    rows = []
+    for result in results:
+        common = {**result.key(), "supported": result.supported, "method": result.method}
+        common["quality"] = quality_cell(result.quality)
+        rows += [{**common, "model": model.model, **model.columns()} for model in result.models.values()]
     return pd.DataFrame(rows, columns=_MODEL_COLUMNS)
-
-
-def _model_row(result: BandResult, model: FrequencyModel) -> dict[str, Any]:
-    row = {**result.key(), "model": model.model, "supported": result.supported, "method": result.method}
-    quality = "; ".join(str(c) for c in result.quality) or "ok"
-    return {**row, **model.columns(), "quality": quality}

@@ -166,14 +166,13 @@ def fit_over_frequency(
 
 def _shared(gains: FloatArray, estimates: Sequence[DynamicStiffness], changes: FloatArray | None) -> FloatArray:
     """Covariance (p, p) that systematic errors leave; `gains` (n, p, 8), `changes` (q, n, 8) of what all share."""
-    systematic = [np.zeros((8, 8)) if e.systematic is None else e.systematic for e in estimates]
     if changes is None:
         changes = np.zeros((1, len(estimates), 8))
     together = np.einsum("npa,qna->qp", gains, changes)
     covariance = together.T @ together / len(changes)
-    for n, total in enumerate(systematic):
+    for n, estimate in enumerate(estimates):
         # what no source explains is the point's own: of its baseline, of mains on the cells
-        separate = total - changes[:, n].T @ changes[:, n] / len(changes)
+        separate = estimate.systematic - changes[:, n].T @ changes[:, n] / len(changes)
         covariance = covariance + gains[n] @ separate @ gains[n].T
     return np.asarray(covariance)
 
@@ -190,6 +189,7 @@ class StaticFits:
     """All models of one static point."""
 
     points: tuple[PointResult, ...] = field(repr=False)
+    places: tuple[int, ...]  #: of the points among all of them
     fits: dict[str, FrequencyModel]
 
     @property
@@ -203,14 +203,12 @@ def fits_over_frequency(points: Sequence[PointResult], changes: FloatArray | Non
 
     Points with mains on the excitation line take part: their intervals say what they are worth.
     """
-    place = {id(p): i for i, p in enumerate(points)}
-    rows = None if changes is None else changes.reshape(len(changes), -1, 8)
     fits = []
-    for members in by_static_point(points):
+    for places in by_static_point(points):
+        members = tuple(points[i] for i in places)
         estimates = [p.stiffness for p in members]
-        if len({round(e.omega, 6) for e in estimates}) < 2:
-            continue
-        mine = None if rows is None else rows[:, [place[id(p)] for p in members]].reshape(len(rows), -1)
-        models = {model: fit_over_frequency(estimates, model, mine) for model in MODELS}
-        fits.append(StaticFits(tuple(members), models))
+        if len({round(e.omega, 6) for e in estimates}) > 1:
+            rows = None if changes is None else changes.reshape(len(changes), -1, 8)[:, places]
+            models = {model: fit_over_frequency(estimates, model, rows) for model in MODELS}
+            fits.append(StaticFits(members, tuple(places), models))
     return fits

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, quality_cell, sentences
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.presentation import Presented
 from tpjb_ident.results.frequency_model import MODEL_COLUMNS, StaticFits, fits_over_frequency
 from tpjb_ident.results.point_result import PointResult
-from tpjb_ident.schema import DAMPING, POINT_KEY, STATIC_KEY, STIFFNESS
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from tpjb_ident.results.band_result import BandResult
 
 _WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_KEY)
+#: Of a coefficient in ``coefficients.csv``.
+_ENDINGS = ("", "_lo", "_hi", "_se", "_se_systematic", "_random95", "_systematic95")
 #: Sources that scatter from run to run; all others are common to the runs.
 _RANDOM = ("random", "load miss", "load direction", "mains")
 _BUDGET_COLUMNS = ("coefficient", "unit", "source", "kind", "standard_uncertainty", "share", "dof")
@@ -71,8 +73,8 @@ class Identification(Presented):
         """Systematic covariance over all P points, (8 P, 8 P) [N^2/m^2]; made when asked for: it grows with P^2."""
         joint = np.asarray(self.calibration_changes.T @ self.calibration_changes / len(self.calibration_changes))
         for p, point in enumerate(self.points):
-            if point.stiffness.systematic is not None:  # what no point shares stands with its own alone
-                joint[8 * p : 8 * p + 8, 8 * p : 8 * p + 8] = point.stiffness.systematic
+            # what no point shares stands with its own alone
+            joint[8 * p : 8 * p + 8, 8 * p : 8 * p + 8] = point.stiffness.systematic
         return joint
 
     def summary(self) -> str:
@@ -94,36 +96,30 @@ class Identification(Presented):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per operating point, by the default method: ``coefficients.csv``."""
-        import pandas as pd
-
-        groups = self._groups()
-        return pd.DataFrame([_estimate_row(p, p.stiffness, groups.get(i)) for i, p in enumerate(self.points)])
+        return self._table(lambda point: [point.stiffness])
 
     def estimators_frame(self) -> pd.DataFrame:
         """The same table for every method: ``estimators.csv``."""
+        return self._table(lambda point: point.by_method.values())
+
+    def _table(self, estimates: Callable[[PointResult], Iterable[DynamicStiffness]]) -> pd.DataFrame:
         import pandas as pd
 
-        groups = self._groups()
-        return pd.DataFrame(
-            [_estimate_row(p, est, groups.get(i)) for i, p in enumerate(self.points) for est in p.by_method.values()]
-        )
+        models = {place: group.supported for group in self.frequency_fits() for place in group.places}
+        rows = []
+        for place, point in enumerate(self.points):
+            model = {"frequency_model": models.get(place, "single line")}
+            rows += [_estimate_row(point, estimate, model) for estimate in estimates(point)]
+        return pd.DataFrame(rows)
 
     def windows_frame(self) -> pd.DataFrame:
         """Rejected windows with run, time and reason: ``windows.csv``."""
         import pandas as pd
 
-        rows = [
-            {
-                "run": w.run,
-                "time_s": w.time,
-                "excitation_direction_deg": float(np.degrees(w.direction)),
-                "weight": w.weight,
-                "reason": w.reason,
-                **point_columns(p),
-            }
-            for p in self.points
-            for w in p.rejected
-        ]
+        rows = []
+        for p in self.points:
+            key = p.point.key
+            rows += [[w.run, w.time, float(np.degrees(w.direction)), w.weight, w.reason, *key] for w in p.rejected]
         return pd.DataFrame(rows, columns=list(_WINDOW_COLUMNS))
 
     def budget_frame(self) -> pd.DataFrame:
@@ -152,24 +148,17 @@ class Identification(Presented):
         """What somebody should read beside the numbers: each condition once, with the places where it was found."""
         remarks = [condition.sentence() for condition in self.conditions]
         places: dict[str, list[str]] = {}
-        for p in self.points:
-            for condition in p.quality:
-                place = f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz"
-                places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
-        for band in self.bands:
-            for condition in () if band.points else band.quality:
-                place = f"{band.point.static_load / 1e3:g} kN, {band.kind}"
-                places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
-        for name, sentences in places.items():
-            count = len(sentences) - 1
+        flagged = [(p.point.static_load, f"{p.point.excitation_hz:g} Hz", p.quality) for p in self.points]
+        flagged += [(band.point.static_load, band.kind, band.quality) for band in self.bands if not band.points]
+        for load, at, quality in flagged:
+            for condition in quality:
+                sentence = f"{load / 1e3:g} kN, {at}: {condition.detail or 'found'}"
+                places.setdefault(str(condition), []).append(sentence)
+        for name, listed in places.items():
+            count = len(listed) - 1
             more = f" (and at {count} more point{'s' if count > 1 else ''})" if count else ""
-            remarks.append(f"{name} at {sentences[0]}{more}")
+            remarks.append(f"{name} at {listed[0]}{more}")
         return tuple(remarks)
-
-    def _groups(self) -> dict[int, StaticFits]:
-        """Models over frequency by the index of the points that they belong to."""
-        index = {id(p): i for i, p in enumerate(self.points)}
-        return {index[id(p)]: group for group in self.frequency_fits() for p in group.points}
 
 
 def point_columns(p: PointResult) -> dict[str, object]:
@@ -177,58 +166,43 @@ def point_columns(p: PointResult) -> dict[str, object]:
     return dict(zip(POINT_KEY, p.point.key))
 
 
-def _estimate_row(p: PointResult, est: DynamicStiffness, group: StaticFits | None) -> dict[str, Any]:
+def _estimate_row(p: PointResult, est: DynamicStiffness, model: dict[str, str]) -> dict[str, Any]:
     """One method's answer at one point, with everything needed to believe it or not."""
-    row: dict[str, Any] = dict(point_columns(p))
-    row["static_load_measured_N"] = p.static_load_measured
-    row.update(coefficient_columns(est))
     weights = est.weights.min(axis=1)
+    rejected = int((weights < REJECTED_WEIGHT).sum())
     conditions = p.quality if est is p.stiffness else est.status
-    row.update(
-        method=est.method,
-        n_records=p.n_records,
-        n_windows=p.n_windows,
-        condition_number=est.condition,
-        outlier_fraction=float((weights < REJECTED_WEIGHT).sum()) / max(len(weights), 1),
-        quality="; ".join(str(c) for c in conditions) or "ok",
-        quality_detail="; ".join(c.sentence() for c in conditions),
-        n_windows_rejected=int((weights < REJECTED_WEIGHT).sum()),
-        coherence=p.coherence,
-        amplitude_m=p.amplitude,
-        amplitude_over_clearance=p.amplitude / p.clearance if p.clearance else np.nan,
-        amplitude_slope=np.nan if p.linearity is None else p.linearity.stiffening,
-        amplitude_slope_se=np.nan if p.linearity is None else p.linearity.standard_error,
-        chi_square=est.chi_square,
-        attenuation=float(est.attenuation[0]),
-        inertia_corrected=p.inertia_corrected,
-        baseline_subtracted="baseline" in p.budget,
-        frequency_model="single line" if group is None else group.supported,
-        x_m=p.position[0],
-        y_m=p.position[1],
-        x_m_se=p.position_se[0],
-        y_m_se=p.position_se[1],
-    )
-    row.update({f"temperature_{pad}_K": value for pad, value in p.temperatures.items()})
-    return row
+    return {
+        **point_columns(p),
+        "static_load_measured_N": p.static_load_measured,
+        **coefficient_columns(est),
+        "method": est.method,
+        "n_records": p.n_records,
+        "n_windows": p.n_windows,
+        "condition_number": est.condition,
+        "outlier_fraction": float(rejected) / max(len(weights), 1),
+        "quality": quality_cell(conditions),
+        "quality_detail": "; ".join(sentences(conditions)),
+        "n_windows_rejected": rejected,
+        "coherence": p.coherence,
+        "amplitude_m": p.amplitude,
+        "amplitude_over_clearance": p.amplitude / p.clearance if p.clearance else np.nan,
+        "amplitude_slope": p.linearity.stiffening,
+        "amplitude_slope_se": p.linearity.standard_error,
+        "chi_square": est.chi_square,
+        "attenuation": float(est.attenuation[0]),
+        "inertia_corrected": p.inertia_corrected,
+        "baseline_subtracted": "baseline" in p.budget,
+        **model,
+        **dict(zip(("x_m", "y_m", "x_m_se", "y_m_se"), (*p.position, *p.position_se))),
+        **{f"temperature_{pad}_K": value for pad, value in p.temperatures.items()},
+    }
 
 
 def coefficient_columns(est: DynamicStiffness) -> dict[str, float]:
     """K and C with their intervals under the names of ``coefficients.csv``."""
-    half, random, se = est.half_width(0.95), est.half_width(0.95, systematic=False), est.standard_error
-    systematic = np.zeros(8) if est.systematic is None else np.sqrt(np.diag(est.systematic))
-    row: dict[str, float] = {}
-    for kind, offset, factor in ((STIFFNESS, 0, 1.0), (DAMPING, 4, 1 / est.omega)):
-        for j, entry in enumerate(ENTRIES):
-            name, i = kind.column(entry), offset + j
-            value = est.vector[i]
-            row[name] = value * factor
-            row[f"{name}_lo"] = (value - half[i]) * factor
-            row[f"{name}_hi"] = (value + half[i]) * factor
-            row[f"{name}_se"] = se[i] * factor
-            row[f"{name}_se_systematic"] = systematic[i] * factor
-            row[f"{name}_random95"] = random[i] * factor
-            row[f"{name}_systematic95"] = float(np.sqrt(max(half[i] ** 2 - random[i] ** 2, 0.0))) * factor
-    return row
+    numbers = est.figures() * np.repeat([1.0, 1 / est.omega], 4)[:, None]
+    names = [name + ending for name in COEFFICIENT_COLUMNS for ending in _ENDINGS]
+    return dict(zip(names, numbers.ravel().tolist()))
 
 
 def _budget_rows(
@@ -239,24 +213,18 @@ def _budget_rows(
     The intervals are its sum: the random sources together with Student's t of their degrees of freedom, the systematic
     ones normal, the two added as root sum of squares.
     """
-    variances = {name: np.maximum(np.diag(part), 0.0) for name, part in parts.items()}
-    total = np.sum(list(variances.values()), axis=0) if variances else np.zeros(8)
+    factor = np.repeat([1.0, 1 / est.omega], 4)
+    names = [f"{symbol}{entry}" for symbol in "kc" for entry in ENTRIES]
+    variances = np.array([np.maximum(np.diag(part), 0.0) for part in parts.values()]).reshape(-1, 8)
+    shares = np.nan_to_num(variances / np.maximum(variances.sum(axis=0), np.finfo(float).tiny))
+    errors = np.sqrt(variances) * factor
     rows = []
-    for i in range(8):
-        symbol, unit, factor = ("k", "N/m", 1.0) if i < 4 else ("c", "Ns/m", 1 / est.omega)
-        for name, variance in variances.items():
-            rows.append(
-                {
-                    **point,
-                    "coefficient": f"{symbol}{ENTRIES[i % 4]}",
-                    "unit": unit,
-                    "source": name,
-                    "kind": "random" if name in _RANDOM else "systematic",
-                    "standard_uncertainty": float(np.sqrt(variance[i])) * factor,
-                    "share": float(variance[i] / total[i]) if total[i] > 0 else 0.0,
-                    "dof": float(est.dof[i]) if name in _RANDOM else np.inf,
-                }
-            )
+    for i, name in enumerate(names):
+        for j, source in enumerate(parts):
+            kind, dof = ("random", float(est.dof[i])) if source in _RANDOM else ("systematic", np.inf)
+            unit = "N/m" if i < 4 else "Ns/m"
+            values = (name, unit, source, kind, float(errors[j, i]), float(shares[j, i]), dof)
+            rows.append({**point, **dict(zip(_BUDGET_COLUMNS, values))})
     return rows
 
 

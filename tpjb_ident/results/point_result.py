@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimators.stiffness import DynamicStiffness
-from tpjb_ident.results.amplitude import AmplitudeSlope
-from tpjb_ident.runs.static_load import LoadMiss
+from tpjb_ident.results.linearity import AmplitudeSlope
 
 
 @dataclass(frozen=True)
@@ -54,10 +53,10 @@ class PointResult:
         Everything that a reader of the numbers should know; empty when all is well.
     rejected : tuple of WindowVerdict
     runs : tuple of str
-    load_miss : LoadMiss or None
-        How far each run's static load was off.
-    linearity : AmplitudeSlope or None
-        Change of h with amplitude, where directions were run at several.
+    load_miss : (n_runs,) complex ndarray or None
+        How far each run's static load was off: relative size + i turn [rad].
+    linearity : AmplitudeSlope
+        Change of h with amplitude, where directions were run at several; NaN where not.
     inertia_corrected : bool
         Whether the housing's inertia was added to the cells' force.
     clearance : float or None
@@ -81,8 +80,8 @@ class PointResult:
     quality: tuple[Condition, ...]
     rejected: tuple[WindowVerdict, ...] = field(repr=False)
     runs: tuple[str, ...] = field(repr=False)
-    load_miss: LoadMiss | None = field(default=None, repr=False)
-    linearity: AmplitudeSlope | None = field(default=None, repr=False)
+    load_miss: ComplexArray | None = field(default=None, repr=False)
+    linearity: AmplitudeSlope = field(default_factory=AmplitudeSlope, repr=False)
     inertia_corrected: bool = False
     clearance: float | None = field(default=None, repr=False)
     budget: dict[str, FloatArray] = field(default_factory=dict, repr=False)
@@ -96,12 +95,12 @@ class PointResult:
         return f"<PointResult: {self}>"
 
 
-def by_static_point(points: Sequence[PointResult]) -> list[list[PointResult]]:
-    """The points that have a stiffness, those of one load and speed together."""
-    groups: dict[tuple[object, ...], list[PointResult]] = {}
-    for p in points:
+def by_static_point(points: Sequence[PointResult]) -> list[list[int]]:
+    """Places of the points that have a stiffness, those of one load and speed together."""
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for i, p in enumerate(points):
         if np.isfinite(p.stiffness.h).all():
-            groups.setdefault(p.point.static_key, []).append(p)
+            groups.setdefault(p.point.static_key, []).append(i)
     return list(groups.values())
 
 

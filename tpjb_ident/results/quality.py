@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import bdtrc
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition, merged
+from rigdata.vector import directions
+from tpjb_ident.conditions import Condition, holding, merged
 from tpjb_ident.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.phasors.run_data import RunPhasors
@@ -46,14 +48,10 @@ def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatA
 
 def amplitude(data: PointData, weights: FloatArray) -> float:
     """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m]; `weights` (n,)."""
-    largest = 0.0
-    for i in range(len(data.runs)):
-        selected = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
-        if selected.any():
-            z = np.average(data.D[selected], axis=0, weights=weights[selected])
-            sizes = np.linalg.svd(np.stack([z.real, z.imag]), compute_uv=False)
-            largest = max(largest, float(sizes[0]))
-    return largest
+    means = [np.average(data.D[places], axis=0, weights=weights[places]) for _, places in data.counted(weights)]
+    orbits = np.array(means, complex).reshape(-1, 2)
+    sizes = np.linalg.svd(np.stack([orbits.real, orbits.imag], axis=1), compute_uv=False)
+    return float(sizes.max(initial=0.0))
 
 
 def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> tuple[WindowVerdict, ...]:
@@ -92,35 +90,32 @@ def _shift(z: ComplexArray, repeats: ComplexArray) -> float:
 
 def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tuple[Condition, ...]:
     """Conditions that the point's figures give rise to."""
-    conditions = []
-    if not coherence >= MIN_COHERENCE and np.isfinite(stiffness.h).all():
-        conditions.append(Condition("low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}"))
-    conditions += _missing(data)
-    if len(data.runs) and data.runs[0].acceleration is None and np.isfinite(stiffness.h).all():
-        conditions.append(_inertia_left(data.runs[0].housing_mass, stiffness.omega))
-    return (*conditions, *feeds_motion(stiffness))
-
-
-def _inertia_left(mass: float, omega: float) -> Condition:
-    """What the housing's inertia may come to where nothing measures it: on soft cells."""
-    share = mass * omega**2 * SOFT * 1e-9
+    answered, first = bool(np.isfinite(stiffness.h).all()), data.runs[0]
+    low = answered and not coherence >= MIN_COHERENCE
+    # where nothing measures the housing's inertia: on soft cells
+    share = first.housing_mass * stiffness.omega**2 * SOFT * 1e-9
+    name = "inertia-not-corrected" if share > HARMLESS else "inertia-negligible"
     text = f"no accelerometers: the housing's inertia stays in F, {100 * share:.2g} % of it on soft cells"
-    return Condition("inertia-not-corrected" if share > HARMLESS else "inertia-negligible", text)
+    return (
+        *holding((low, "low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}")),
+        *_missing(data),
+        *holding((answered and first.acceleration is None, name, text)),
+        *feeds_motion(stiffness),
+    )
 
 
-def _missing(data: PointData) -> list[Condition]:
+def _missing(data: PointData) -> tuple[Condition, ...]:
     """Windows of the excitation without phasors, pointed out when they are many or a whole run's."""
-    complete = data.whole
-    driven = np.concatenate([_in_stretch(run) for run in data.runs])
-    empty = [run.run for i, run in enumerate(data.runs) if not complete[data.run_index == i].any()]
-    if empty:
-        return [Condition("run-without-data", f"no usable window in {', '.join(empty)}")]
-    complete = complete[driven]
-    lost = 1 - complete.mean()
-    if not lost > 0.1:
-        return []
-    text = f"{int((~complete).sum())} of {len(complete)} windows gave no phasors"
-    return [Condition("most-windows-lost" if lost > _MAX_LOST else "windows-missing", text)]
+    used = {run.run for run, _ in data.counted(np.ones(len(data.D)))}
+    empty = [run.run for run in data.runs if run.run not in used]
+    driven = data.whole[np.concatenate([_in_stretch(run) for run in data.runs])]
+    lost = 1 - driven.mean()
+    text = f"{int((~driven).sum())} of {len(driven)} windows gave no phasors"
+    return holding(
+        (empty, "run-without-data", f"no usable window in {', '.join(empty)}"),
+        (not empty and 0.1 < lost <= _MAX_LOST, "windows-missing", text),
+        (not empty and lost > _MAX_LOST, "most-windows-lost", text),
+    )
 
 
 def _in_stretch(run: RunPhasors) -> BoolArray:
@@ -132,14 +127,12 @@ def _in_stretch(run: RunPhasors) -> BoolArray:
 
 def feeds_motion(stiffness: DynamicStiffness) -> tuple[Condition, ...]:
     """Say where damping, the symmetric part of Im h, is negative beyond doubt: no cross-coupled stiffness is in it."""
-    h = stiffness.h
-    if not np.isfinite(h).all():
+    damping = stiffness.h.imag + stiffness.h.imag.T
+    if not np.isfinite(stiffness.h).all():
         return ()
-    doubt = 3 * float(stiffness.standard_error[4:].max())
-    if not np.linalg.eigvalsh((h.imag + h.imag.T) / 2)[0] < -doubt:
-        return ()
+    negative = np.linalg.eigvalsh(damping / 2)[0] < -3 * float(stiffness.standard_error[4:].max())
     text = "the film would feed the motion instead of damping it: check polarity, axes and sign of forces"
-    return (Condition("negative-damping", text),)
+    return holding((negative, "negative-damping", text))
 
 
 def directional_pattern(data: PointData, weights: FloatArray) -> tuple[Condition, ...]:
@@ -148,23 +141,17 @@ def directional_pattern(data: PointData, weights: FloatArray) -> tuple[Condition
     A binomial test per run: more rejected windows than chance gives once in a thousand, in a run
     with at least three of them.
     """
-    from scipy.special import bdtrc
-
-    complete = data.whole
-    bad = (weights < REJECTED_WEIGHT) & complete
-    total = int(bad.sum())
+    bad = (weights < REJECTED_WEIGHT) & data.whole
+    total, count = int(bad.sum()), int(data.whole.sum())
     named = []
-    for i, run in enumerate(data.runs):
-        selected = (data.run_index == i) & complete
-        n, hits = int(selected.sum()), int(bad[selected].sum())
-        chance = (total - hits + 0.5) / (int(complete.sum()) - n + 1.0)
+    for run, places in data.counted(np.ones(len(weights))):
+        n, hits = len(places), int(bad[places].sum())
+        chance = (total - hits + 0.5) / (count - n + 1.0)
         if hits >= 3 and hits > 0.4 * n and bdtrc(hits - 1, n, min(chance, 1.0)) < 1e-3:
             angle = "" if run.direction is None else f" at {np.degrees(run.direction):.0f} deg"
             named.append(f"{run.run}{angle} ({hits} of {n})")
-    if not named:
-        return ()
     text = f"rejected windows gather in {', '.join(named)}: look before discarding"
-    return (Condition("directional-rejection", text),)
+    return holding((named, "directional-rejection", text))
 
 
 def disagreeing_runs(
@@ -172,30 +159,23 @@ def disagreeing_runs(
 ) -> tuple[Condition, ...]:
     """Runs whose mean forces H does not explain: noise averages out of means, other faults do not.
 
-    `known` [N]: force of random phase that the runs hold.
+    `scatter` [N]: force of random phase that the runs hold.
     """
-    if not np.isfinite(h).all():
-        return ()
-    good = data.whole & (weights > 0)
     shares, sizes = [], []
-    for i in range(len(data.runs)):
-        selected = good & (data.run_index == i)
-        if selected.any():
-            # repeats of one motion, whatever phase the drive had in each
-            gram = data.D[selected].conj().T @ data.D[selected]
-            first = np.linalg.eigh(gram)[1][:, -1]
-            along = data.D[selected] @ first.conj()
-            residual = (data.F[selected] - data.D[selected] @ h.T) * np.exp(-1j * np.angle(along))[:, None]
-            sizes.append(float(np.linalg.norm(data.F[selected], axis=1).mean()))
-            shares.append(float(np.linalg.norm(residual.mean(axis=0))) / sizes[-1])
+    for _, places in data.counted(weights) if np.isfinite(h).all() else ():
+        D, F = data.D[places], data.F[places]
+        # repeats of one motion, whatever phase the drive had in each
+        along = D @ np.linalg.eigh(D.conj().T @ D)[1][:, -1].conj()
+        residual = (F - D @ h.T) * np.exp(-1j * np.angle(along))[:, None]
+        sizes.append(float(np.linalg.norm(F, axis=1).mean()))
+        shares.append(float(np.linalg.norm(residual.mean(axis=0))) / sizes[-1])
     if len(shares) < 3:
         return ()
     # two runs fix H: what is left over is shared by all of them
     share = float(np.sqrt(np.mean(np.square(shares)) * len(shares) / (len(shares) - 2)))
-    if share <= np.hypot(_MAX_DISAGREEMENT, _KNOWN_SCATTERS * scatter / float(np.mean(sizes))):
-        return ()
+    limit = np.hypot(_MAX_DISAGREEMENT, _KNOWN_SCATTERS * scatter / float(np.mean(sizes)))
     text = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * _MAX_DISAGREEMENT:.0f} %)"
-    return (Condition("runs-disagree", text),)
+    return holding((share > limit, "runs-disagree", text))
 
 
 def with_probe_doubts(
@@ -212,61 +192,39 @@ def with_probe_doubts(
     - a film stiffens as it is loaded, so that the load W moved the shaft by more than W / K, which the clearance must
       hold.
     """
-    if clearance is None or not clearance > 0:
+    if not clearance or not clearance > 0:
         return tuple(points)
-    sentences = [*_sweeps(swept, clearance), *_positions(points, clearance), *_stiffness(points, clearance)]
-    if not sentences:
-        return tuple(points)
+    sentences = list(_sweeps(swept, clearance).values())
+    places = np.array([p.position for p in points if np.isfinite(p.position).all()]).reshape(-1, 2)
+    distance = float(np.hypot(*np.ptp(places, axis=0))) if len(places) else 0.0
+    if distance > _APART * clearance:
+        sentences.append(f"the shaft's mean positions lie {1e6 * distance:.3g} um apart")
+    load, value = min(_static_stiffness(points), key=lambda pair: pair[1] / pair[0], default=(0.0, 0.0))
+    if load * _LEAST_STIFF > value * clearance:
+        softest = f"{load / 1e3:g} kN on a stiffness of {value / 1e6:.3g} MN/m"
+        sentences.append(f"{softest} would move the shaft by more than {1e6 * load / value:.3g} um")
     cure = "is the probes' sensitivity right in the manifest?"
-    doubt = Condition(
-        "probes-contradict-clearance", f"{'; '.join(sentences)} (clearance {1e6 * clearance:.0f} um): {cure}"
-    )
-    return tuple(replace(point, quality=merged(point.quality, (doubt,))) for point in points)
+    text = f"{'; '.join(sentences)} (clearance {1e6 * clearance:.0f} um): {cure}"
+    doubts = holding((sentences, "probes-contradict-clearance", text))
+    return tuple(replace(point, quality=merged(point.quality, doubts)) for point in points)
 
 
-def _sweeps(swept: Mapping[tuple[str, str], float], clearance: float) -> list[str]:
+def _sweeps(swept: Mapping[tuple[str, str], float], clearance: float) -> dict[str, str]:
+    """By probe, what it says of a sweep in which it travels too little or too far."""
     table: dict[str, str] = {}
     for (run, name), half in swept.items():
-        if half <= _TRAVEL[0] * clearance or half >= _TRAVEL[1] * clearance:
+        if not _TRAVEL[0] * clearance < half < _TRAVEL[1] * clearance:
             table[name] = f"{name} travels {1e6 * half:.3g} um to either side in the sweep {run}"
-    return list(table.values())
+    return table
 
 
-def _positions(points: Sequence[PointResult], clearance: float) -> list[str]:
-    places = np.array([p.position for p in points if np.isfinite(p.position).all()]).reshape(-1, 2)
-    if len(places) < 2:
-        return []
-    distance = float(np.hypot(*np.ptp(places, axis=0)))
-    return [f"the shaft's mean positions lie {1e6 * distance:.3g} um apart"] if distance > _APART * clearance else []
-
-
-def _stiffness(points: Sequence[PointResult], clearance: float) -> list[str]:
-    soft_points = []
-    for load, direction, stiffness in _static_stiffness(points):
-        along = np.array([np.cos(direction), np.sin(direction)])
-        value = float(along @ stiffness @ along)
-        if load > 0 and 0 < value < _LEAST_STIFF * load / clearance:
-            soft_points.append((value * clearance / load, load, value))
-    if not soft_points:
-        return []
-    _, load, value = min(soft_points)
-    return [
-        f"{load / 1e3:g} kN on a stiffness of {value / 1e6:.3g} MN/m would move the shaft by more than "
-        f"{1e6 * load / value:.3g} um"
-    ]
-
-
-def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float, FloatArray]]:
-    """Load, direction and stiffness (2, 2) at rest: Re h = K - omega^2 M, extrapolated over the frequencies of a load.
-
-    With a single frequency Re h itself stands in.
-    """
+def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float]]:
+    """Loads, and the stiffness along each [N/m], where it is one: Re h at the lowest frequency of the load."""
     result = []
-    for members in by_static_point(points):
-        load, direction = members[0].point.static_load, members[0].point.static_load_direction
-        square = np.array([p.stiffness.omega**2 for p in members])
-        k = np.array([p.stiffness.k.ravel() for p in members])
-        several = len(members) > 1 and np.ptp(square) > 0
-        at_rest = np.polynomial.polynomial.polyfit(square, k, 1)[0] if several else k[0]
-        result.append((load, direction, at_rest.reshape(2, 2)))
+    for places in by_static_point(points):
+        first = min((points[i] for i in places), key=lambda p: p.stiffness.omega)
+        along = directions(np.array([first.point.static_load_direction]))[0]
+        load, value = first.point.static_load, float(along @ first.stiffness.k @ along)
+        if load > 0 and value > 0:
+            result.append((load, value))
     return result

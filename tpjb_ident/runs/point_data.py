@@ -55,6 +55,12 @@ class PointData:
         """Mean displacement of every run, shape (n_runs, 2) [m]."""
         return np.array([finite_mean(run.displacement.mean) for run in self.runs])
 
+    def counted(self, weights: FloatArray) -> list[tuple[RunPhasors, IntArray]]:
+        """Runs with the places of their whole windows of some weight (n,), those that have any."""
+        good = self.whole & (weights > 0)
+        places = [np.flatnonzero(good & (self.run_index == i)) for i in range(len(self.runs))]
+        return [(run, rows) for run, rows in zip(self.runs, places) if len(rows)]
+
     def says(self, condition: str) -> bool:
         """Whether one of the runs carries a condition of this name."""
         return any(condition in run.conditions for run in self.runs)

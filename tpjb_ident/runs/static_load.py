@@ -25,7 +25,8 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.check.set_points import without_static_part
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.estimate.robust_constants import huber_weight, reweighted
 
 #: Misses beyond this share are no scatter: the set point or the cells are wrong.
 MAX_MISS = 0.05
@@ -43,40 +44,13 @@ _ONE_HALF = 1e-3
 _MIDDLES = 500
 #: Set points must differ by this share for a zero to be told from a gain.
 _MIN_RANGE = 0.15
+#: Standard deviations from which a run loses weight when the zero is looked for, and rounds of weighing.
+_BEND, _ROUNDS = 1.5, 10
 #: Standard errors beyond which an intercept is one,
 _CLEAR = 5.0
 #: and share of the smallest load that it must have.
 _NOTABLE = 0.004
 _MIN_RUNS = 4
-
-
-@dataclass(frozen=True)
-class LoadMiss:
-    """Relative deviation of each run's static load from its set point."""
-
-    size: FloatArray  #: (n_runs,)
-    sideways: FloatArray  #: (n_runs,), rad: the same across it
-
-    def of(self, members: Sequence[int]) -> complex:
-        """Missed load of some runs together, relative size + i turn [rad]; none where no scatter explains it."""
-        size, turn = float(np.mean(self.size[members])), float(np.mean(self.sideways[members]))
-        return complex(size, turn) if abs(size) < _LARGEST_MISS and abs(turn) < MAX_SIDEWAYS else 0j
-
-
-@dataclass(frozen=True)
-class CellZero:
-    """What the cells read at no load."""
-
-    force: complex = 0.0
-    error: float = 0.0
-
-    def conditions(self) -> tuple[Condition, ...]:
-        """What to say of it at the points."""
-        if not self.force:
-            return ()
-        size, angle = abs(self.force), np.degrees(np.angle(self.force))
-        text = f"over the loads of the campaign the cells' mean holds a constant of {size:.0f} N at {angle:.0f} deg "
-        return (Condition("cells-not-tared", f"{text}(standard error {self.error:.0f} N); it was taken off"),)
 
 
 class LoadCase(Protocol):
@@ -91,36 +65,62 @@ class LoadCase(Protocol):
         """Mean cell force of every run, (n_runs, 2) [N]."""
 
 
-def load_ratio(data: LoadCase, zero: complex = 0.0) -> ComplexArray:
-    """Measured mean load (less the cells' zero) over set point for every run: size and direction, complex."""
-    loads = data.mean_loads
-    set_point = _set_point(data)
-    if data.point.static_load <= 0:
-        return np.full(len(loads), np.nan + 0j)
-    return np.asarray((loads[:, 0] + 1j * loads[:, 1] - zero) / set_point)
+@dataclass(frozen=True)
+class StaticLoads:
+    """What the cells say of the static load of all runs."""
+
+    misses: list[ComplexArray]  #: by point, (n_runs,): deviation from the set point, relative size + i turn [rad]
+    common: complex  #: cells over set points, all runs together
+    zero: complex = 0j  #: N: what the cells read at no load
+    zero_error: float = 0.0
+
+    def conditions(self, point: int) -> tuple[Condition, ...]:
+        """What to say of one point."""
+        size, angle = abs(self.zero), np.degrees(np.angle(self.zero))
+        text = f"over the loads of the campaign the cells' mean holds a constant of {size:.0f} N at {angle:.0f} deg "
+        text += f"(standard error {self.zero_error:.0f} N); it was taken off"
+        return load_conditions(self.misses[point], self.common) + holding((size, "cells-not-tared", text))
+
+
+def missed_load(misses: ComplexArray, members: Sequence[int]) -> complex:
+    """Missed load of some runs together, relative size + i turn [rad]; none where no scatter explains it."""
+    miss = complex(np.mean(misses[list(members)]))
+    return miss if abs(miss.real) < _LARGEST_MISS and abs(miss.imag) < MAX_SIDEWAYS else 0j
+
+
+def static_loads(campaign: Campaign, points: Sequence[LoadCase]) -> StaticLoads:
+    """Zero of the cells, and the misses of all runs of a campaign's points."""
+    cells = [channel for channel in campaign.channels.values() if channel.quantity == "force"]
+    stated = float(max((getattr(cell, "zero_uncertainty", 0.0) for cell in cells), default=0.0))
+    set_points = np.concatenate([np.full(len(data.mean_loads), _set_point(data)) for data in points])
+    zero, error = cell_zero(np.concatenate([_measured(data) for data in points]), set_points, stated)
+    return StaticLoads(*load_misses(points, zero), zero, error)
+
+
+def _measured(data: LoadCase) -> ComplexArray:
+    return np.asarray(data.mean_loads @ [1.0, 1j])
 
 
 def _set_point(data: LoadCase) -> complex:
     return complex(data.point.static_load * np.exp(1j * data.point.static_load_direction))
 
 
-def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[LoadMiss], complex]:
+def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[ComplexArray], complex]:
     """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation).
 
     The ratio is the mean of the runs about the half that agrees best; of two such halves the one nearer to the set
     points. Cells that show no static force have none: it is zero then.
     """
-    ratios = [load_ratio(data, zero) for data in points]
+    scales = [1 / set_point if set_point else np.nan for set_point in map(_set_point, points)]
+    ratios = [(_measured(data) - zero) * scale for data, scale in zip(points, scales)]
     measured = np.concatenate(ratios)
     measured = measured[np.isfinite(measured)]
     common = _common_ratio(measured) if len(measured) else complex(1.0)
-    none = [LoadMiss(np.zeros(len(r)), np.zeros(len(r))) for r in ratios]
     if without_static_part(measured):
-        return none, 0j
-    if not len(measured) or not 0.5 < abs(common.real) < 2.0:
-        return none, common  # nothing to correct by such cells, but the ratio itself must be told
-    relative = [np.nan_to_num(ratio / common - 1.0) for ratio in ratios]
-    return [LoadMiss(r.real, r.imag) for r in relative], common
+        common = 0j
+    if not len(measured) or not 0.5 < abs(common.real) < 2.0:  # such cells correct nothing, but are told
+        return [np.zeros(len(ratio), complex) for ratio in ratios], common
+    return [np.nan_to_num(ratio / common - 1.0) for ratio in ratios], common
 
 
 def _common_ratio(ratios: ComplexArray) -> complex:
@@ -134,102 +134,59 @@ def _common_ratio(ratios: ComplexArray) -> complex:
     return complex(ratios[np.abs(ratios - middles[place]) <= 4 * reach[place] + 1e-12].mean())
 
 
-def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
-    """Point out loads that are off by more than scatter."""
-    conditions = []
-    worst = float(np.abs(miss.size).max(initial=0.0))
-    if worst > MAX_MISS:
-        conditions.append(
-            Condition("static-load-off", f"a run's measured static load is {100 * worst:.1f} % off its set point")
-        )
-    sideways = float(np.abs(miss.sideways).max(initial=0.0))
-    if sideways > MAX_SIDEWAYS:
-        conditions.append(
-            Condition(
-                "static-load-turned",
-                f"a run's measured static load points {np.degrees(sideways):.1f} deg away from its set direction",
-            )
-        )
-    return (*conditions, *_common_conditions(common))
+def load_conditions(miss: ComplexArray, common: complex) -> tuple[Condition, ...]:
+    """Loads that are off by more than scatter, and what all runs share: a gain of the cells, or what no gain explains.
 
-
-def _common_conditions(common: complex) -> tuple[Condition, ...]:
-    """What all runs share: a gain of the cells, or what no gain explains."""
+    `miss` (n,): of a point's runs.
+    """
+    off, aside = (float(np.abs(part).max(initial=0.0)) for part in (miss.real, miss.imag))
     size, turn = abs(common), float(np.angle(common))
-    if size == 0.0:
-        text = (
+    is_size = _CONTRADICTS[0] <= size <= _CONTRADICTS[1]
+    is_gain = is_size and abs(turn) <= _CONTRADICTS_TURN
+    one_run = f"points {np.degrees(aside):.1f} deg away from its set direction"
+    text = f"the static load by the cells points {np.degrees(turn):+.1f} deg away from its set direction in all runs"
+    return holding(
+        (off > MAX_MISS, "static-load-off", f"a run's measured static load is {100 * off:.1f} % off its set point"),
+        (aside > MAX_SIDEWAYS, "static-load-turned", f"a run's measured static load {one_run}"),
+        (
+            not size,
+            "no-static-force",
             "the cells show no static force: whether the loads meet their set points is not known, nor, unless it is "
-            'stated, the cells\' low corner, for which C is widened (filter = "butterworth 1 high 0.1 Hz")'
-        )
-        return (Condition("no-static-force", text),)
-    if not _CONTRADICTS[0] <= size <= _CONTRADICTS[1]:
-        return (
-            Condition(
-                "cells-contradict-set-points",
-                f"the cells read {size:.3g} times the static load of the set points in all runs: every "
-                "coefficient is off by about as much if their sensitivity is wrong",
-            ),
-        )
-    aside = f"the static load by the cells points {np.degrees(turn):+.1f} deg away from its set direction in all runs"
-    if abs(turn) > _CONTRADICTS_TURN:
-        return (Condition("cells-contradict-set-points", f"{aside}: a cell is inverted, or the cells are exchanged"),)
-    conditions = []
-    if abs(turn) > MAX_SIDEWAYS:
-        conditions.append(Condition("static-load-turned", aside))
-    if abs(size - 1) > 0.01:
-        conditions.append(
-            Condition(
-                "cells-against-set-points",
-                f"the cells read {100 * (size - 1):+.2f} % against the set points in all runs alike "
-                "(gain of the cells or of the actuators' transducers)",
-            )
-        )
-    return tuple(conditions)
+            'stated, the cells\' low corner, for which C is widened (filter = "butterworth 1 high 0.1 Hz")',
+        ),
+        (
+            size and not is_size,
+            "cells-contradict-set-points",
+            f"the cells read {size:.3g} times the static load of the set points in all runs: every "
+            "coefficient is off by about as much if their sensitivity is wrong",
+        ),
+        (
+            is_size and not is_gain,
+            "cells-contradict-set-points",
+            f"{text}: a cell is inverted, or the cells are exchanged",
+        ),
+        (is_gain and abs(turn) > MAX_SIDEWAYS, "static-load-turned", text),
+        (
+            is_gain and abs(size - 1) > 0.01,
+            "cells-against-set-points",
+            f"the cells read {100 * (size - 1):+.2f} % against the set points in all runs alike "
+            "(gain of the cells or of the actuators' transducers)",
+        ),
+    )
 
 
-@dataclass(frozen=True)
-class StaticLoads:
-    """What the cells say of the static load of all runs."""
-
-    misses: list[LoadMiss]  #: by point
-    common: complex  #: cells over set points, all runs together
-    zero: CellZero
-
-    def conditions(self, point: int) -> tuple[Condition, ...]:
-        """What to say of one point."""
-        return load_conditions(self.misses[point], self.common) + self.zero.conditions()
-
-
-def static_loads(campaign: Campaign, points: Sequence[LoadCase]) -> StaticLoads:
-    """Zero of the cells, and the misses of all runs of a campaign's points."""
-    cells = [channel for channel in campaign.channels.values() if channel.quantity == "force"]
-    zero_uncertainty = float(max((getattr(cell, "zero_uncertainty", 0.0) for cell in cells), default=0.0))
-    means, set_points = [], []
-    for data in points:
-        means += list(data.mean_loads @ [1.0, 1j])
-        set_points += [_set_point(data)] * len(data.mean_loads)
-    zero = cell_zero(np.array(means, complex), np.array(set_points, complex), zero_uncertainty)
-    return StaticLoads(*load_misses(points, zero.force), zero)
-
-
-def cell_zero(means: ComplexArray, set_points: ComplexArray, uncertainty: float = 0.0) -> CellZero:
-    """Zero of the cells from all runs; `means` (n,), `set_points` (n,) [N]."""
+def cell_zero(means: ComplexArray, set_points: ComplexArray, uncertainty: float = 0.0) -> tuple[complex, float]:
+    """Zero of the cells from all runs, with its standard error; `means` (n,), `set_points` (n,) [N]."""
     good = np.isfinite(means) & (np.abs(set_points) > 0)
     y, x = means[good], set_points[good]
     if len(y) < _MIN_RUNS or (np.abs(x - x[0]) < _MIN_RANGE * np.abs(x).max()).all():
-        return CellZero()
+        return 0j, 0.0
     size = np.abs(x)
-    design = np.stack([x, np.ones_like(x)], axis=1) / size[:, None]
-    answer, weight = y / size, np.ones(len(y))
-    for _ in range(10):
-        root = np.sqrt(weight)[:, None]
-        coefficients = np.linalg.lstsq(design * root, answer * root[:, 0], rcond=None)[0]
-        residual = np.abs(answer - design @ coefficients)
-        scale = 1.4826 * float(np.median(residual)) + 1e-9
-        weight = np.minimum(1.0, 1.5 * scale / np.maximum(residual, 1e-300))
-    spread = float(np.sum(weight * residual**2) / max(float(weight.sum()) - 2.0, 1.0))
-    covariance = np.linalg.inv((design * weight[:, None]).conj().T @ design).real * spread
-    zero, error = complex(coefficients[1]), float(np.sqrt(covariance[1, 1]))
+    design, shares = np.stack([x, np.ones_like(x)], axis=1) / size[:, None], y / size
+    values, weights, _, _ = reweighted(design, shares, lambda u: huber_weight(u, _BEND), most=_ROUNDS)
+    spread = float(np.sum(weights * np.abs(shares - design @ values) ** 2) / max(float(weights.sum()) - 2.0, 1.0))
+    covariance = np.linalg.inv((design * weights[:, None]).conj().T @ design).real * spread
+    zero, error = complex(values[1]), float(np.sqrt(covariance[1, 1]))
     is_clear = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()
     allowed = uncertainty == 0.0 or abs(zero) < 3 * uncertainty + 3 * error
-    return CellZero(zero, error) if is_clear and allowed else CellZero()
+    return (zero, error) if is_clear and allowed else (0j, 0.0)

@@ -1,4 +1,4 @@
-"""How far from linear the film was shaken: what it makes of the motion at 3f and at 2X - f.
+"""How far from linear the film was shaken: what runs of several amplitudes show, and lines at 3f and 2X - f in one.
 
 A film that hardens with the square of the motion answers a motion of amplitude a at f, beside a shaft's own of b at 1X,
 with 3/4 kappa (a^2 + 2 b^2) more at f, and with lines at 3f and 2X - f of 1/4 kappa a^2 and 3/4 kappa b^2::
@@ -16,11 +16,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
-from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Condition
+from rigdata.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.phasors.line_means import FilmLines
+from tpjb_ident.runs.point_data import PointData
+
+#: Runs of one direction must differ in amplitude by this factor to tell anything.
+MIN_RATIO = 1.3
+#: A slope is pointed out beyond this probability and this size (relative change per doubling).
+SIGNIFICANCE = 0.01
+NOTABLE = 0.01
 
 #: Change of h per share of the force at 3f and at 2X - f, and per squared share at 2f.
 _WEIGHTS = {"3f": 3.0, "2X-f": 2.0}
@@ -38,6 +46,45 @@ NEVER_LINEAR = 0.3
 
 
 @dataclass(frozen=True)
+class AmplitudeSlope:
+    """Relative change of the dynamic stiffness when the amplitude doubles."""
+
+    stiffening: float = np.nan
+    standard_error: float = np.nan
+    runs: int = 0
+
+    def condition(self) -> tuple[Condition, ...]:
+        """What to say about it in the point's quality, where it is more than noise."""
+        limit = -float(stdtrit(max(self.runs - 2, 1), SIGNIFICANCE / 2)) * self.standard_error
+        change, error = 100 * self.stiffening, 100 * self.standard_error
+        text = f"h changes by {change:+.1f} % when the amplitude doubles (standard error {error:.1f} %)"
+        return holding((abs(self.stiffening) > max(limit, NOTABLE), "nonlinear-amplitude", text))
+
+
+def amplitude_slope(data: PointData, h: ComplexArray, weights: FloatArray) -> AmplitudeSlope:
+    """Slope of h over the logarithm of the amplitude, from directions run at several amplitudes; NaN without such."""
+    groups: dict[float, list[tuple[float, float]]] = {}
+    for run, places in data.counted(weights) if np.isfinite(h).all() else ():
+        if run.direction is not None:
+            D, F = (np.average(z[places], axis=0, weights=weights[places]) for z in (data.D, data.F))
+            fitted = h @ D
+            excess = float((fitted.conj() @ (F - fitted)).real / np.linalg.norm(fitted) ** 2)
+            angle = round(float(np.degrees(run.direction)) % 180.0, 1)
+            groups.setdefault(angle, []).append((np.log2(float(np.linalg.norm(D))), excess))
+    # Differences within a direction only: what a direction as a whole is off by is no amplitude effect.
+    centred = [np.array(g) - np.mean(g, axis=0) for g in groups.values()]
+    centred = [g for g in centred if np.ptp(g[:, 0]) > np.log2(MIN_RATIO)]
+    runs = sum(len(g) for g in centred)
+    if runs - len(centred) < 2:
+        return AmplitudeSlope()
+    x, y = np.concatenate(centred).T
+    slope = float(x @ y / (x @ x))
+    spare = max(runs - len(centred) - 1, 1)
+    error = float(np.sqrt(np.sum((y - slope * x) ** 2) / spare / (x @ x)))
+    return AmplitudeSlope(slope, error, runs)
+
+
+@dataclass(frozen=True)
 class FilmChange:
     """What the film's lines say of a point."""
 
@@ -47,26 +94,22 @@ class FilmChange:
 
 def film_change(runs: Sequence[FilmLines], h: ComplexArray) -> FilmChange:
     """Share by which h (2, 2) [N/m] may be off through the amplitude of the motion, by its runs' lines."""
-    usable = [run for run in runs if run.force > 0]
-    if not np.isfinite(h).all() or not usable:
+    usable = [run for run in runs if run.force > 0] if np.isfinite(h).all() else []
+    sizes = {name: _size(usable, name, h) for name in ("2f", *_WEIGHTS)}
+    rows = [weight * sizes[name] for name, weight in _WEIGHTS.items()]
+    parts = np.array(rows if np.isfinite(sizes["3f"]).all() else [_SECOND * sizes["2f"] ** 2])
+    parts = parts[np.isfinite(parts).all(axis=1)]
+    if not len(parts):
         return FilmChange()
-    change = hidden = 0.0
-    third = _size(usable, "3f", h)
-    if third is None:
-        second = _size(usable, "2f", h)
-        if second is None:
-            return FilmChange()
-        change, hidden = _SECOND * second[0] ** 2, _SECOND * second[1] ** 2
-    for name, weight in _WEIGHTS.items() if third is not None else ():
-        size = _size(usable, name, h)
-        if size is not None:
-            change, hidden = change + weight * size[0], hidden + weight * size[1]
-    share = _ALLOWED * change
-    return FilmChange(share if share > _NOTHING else 0.0, _ALLOWED * hidden)
+    share, hidden = (_ALLOWED * parts.sum(axis=0)).tolist()
+    return FilmChange(share if share > _NOTHING else 0.0, hidden)
 
 
-def _size(runs: Sequence[FilmLines], name: str, h: ComplexArray) -> tuple[float, float] | None:
-    """Force at a line beyond what h makes of its motion, over that at the excitation; and what noise could hide."""
+def _size(runs: Sequence[FilmLines], name: str, h: ComplexArray) -> FloatArray:
+    """Force at a line beyond what h makes of its motion, over that at the excitation; and what noise could hide, (2,).
+
+    NaN where fewer than half of the runs show the line.
+    """
     squares, noises = [], []
     for run in runs:
         line = run.lines.get(name)
@@ -78,9 +121,8 @@ def _size(runs: Sequence[FilmLines], name: str, h: ComplexArray) -> tuple[float,
         squares.append((excess - noise) / run.force**2)
         noises.append(noise / run.force**2)
     if 2 * len(squares) < len(runs) or not squares:
-        return None
-    size = float(np.sqrt(max(float(np.median(squares)), 0.0)))
-    return size, float(np.sqrt(np.median(noises) / len(squares)))
+        return np.full(2, np.nan)
+    return np.sqrt([max(float(np.median(squares)), 0.0), np.median(noises) / len(squares)])
 
 
 def change_conditions(
