@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtr, fdtrc, fdtri, stdtrit
+from scipy.special import chdtr, fdtrc, fdtri
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import totals
@@ -177,11 +177,6 @@ def _alike(moment: FloatArray, freedom: FloatArray) -> FloatArray:
 def _by_point(group: IntArray, values: FloatArray, points: int) -> FloatArray:
     """Sums of the columns of values (n, 4) by point, (P, 4)."""
     return np.stack([totals(group, column, points) for column in values.T], axis=1)
-
-
-def student_widening(freedom: float) -> float:
-    """Width of Student's 95 % interval over that of the normal one: a scatter of few is uncertain by itself."""
-    return float(stdtrit(freedom, 0.975) / stdtrit(np.inf, 0.975))
 
 
 def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:

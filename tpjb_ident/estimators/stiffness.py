@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import stdtrit
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.rounding import with_interval
 from tpjb_ident.schema import DAMPING, STIFFNESS
+from tpjb_ident.statistics import half_width
 
 #: Order of the eight real unknowns everywhere: Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...
 ENTRIES = ("xx", "xy", "yx", "yy")
@@ -116,10 +116,8 @@ class DynamicStiffness:
         """
         if not 0.0 < level < 1.0:
             raise ArgumentError(f"level must lie in (0, 1), got {level}")
-        quantile = 0.5 + 0.5 * level
-        random = stdtrit(self.dof, quantile) * self.standard_error
-        calibration = stdtrit(np.inf, quantile) * np.sqrt(np.diag(self.systematic))
-        return np.hypot(random, calibration) if systematic else np.asarray(random)
+        shared = np.sqrt(np.diag(self.systematic)) if systematic else np.zeros(8)
+        return half_width(level, self.standard_error, self.dof, shared)
 
     def interval(self, level: float = 0.95, systematic: bool = True) -> Interval:
         """Interval of the eight entries; see `half_width` for the arguments.

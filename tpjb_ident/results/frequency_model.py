@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc, stdtrit
+from scipy.special import chdtrc
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
@@ -20,6 +20,7 @@ from tpjb_ident.estimate.shape import MODELS, over_frequency
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.point_result import PointResult, by_static_point
 from tpjb_ident.schema import KINDS
+from tpjb_ident.statistics import half_width
 
 #: A model is refused below this probability of its chi-square.
 REFUSED = 0.01
@@ -69,9 +70,7 @@ class FrequencyModel:
 
     def half_width(self, level: float = 0.95) -> FloatArray:
         """Half the interval of every parameter: Student's t of the random part and normal of the shared one."""
-        quantile = 0.5 + 0.5 * level
-        random = stdtrit(self.dof, quantile) * self.standard_error
-        return np.hypot(random, stdtrit(np.inf, quantile) * np.sqrt(np.maximum(np.diag(self.systematic), 0.0)))
+        return half_width(level, self.standard_error, self.dof, np.sqrt(np.maximum(np.diag(self.systematic), 0.0)))
 
     def h(self, omega: float | FloatArray) -> ComplexArray:
         """Dynamic stiffness of the model, (2, 2) or (n, 2, 2) [N/m]; `omega` (n,) [rad/s]."""

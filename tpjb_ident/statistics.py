@@ -1,4 +1,4 @@
-"""Weights of the robust estimators, the loop that they share, and tuning constants, computed instead of quoted.
+"""Widths of intervals; weights of the robust estimators with their constants, computed, and the loop that they share.
 
 For a q-dimensional complex circular Gaussian residual with covariance S, u = sqrt(2 r^H S^-1 r) follows
 a chi distribution with 2 q degrees of freedom; everything below is an expectation over it.
@@ -12,7 +12,7 @@ from math import comb
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtr, gammaincinv
+from scipy.special import chdtr, gammaincinv, stdtrit
 
 from rigdata.arrays import FloatArray
 
@@ -20,6 +20,17 @@ from rigdata.arrays import FloatArray
 _NORMAL_MAD = 0.6744897501960817
 #: Probabilities beyond which a window begins to lose weight, and beyond which none is left.
 _BEGIN, _END = 0.99, 0.9999
+
+
+def student_widening(freedom: float) -> float:
+    """Width of Student's 95 % interval over that of the normal one: a scatter of few is uncertain by itself."""
+    return float(stdtrit(freedom, 0.975) / stdtrit(np.inf, 0.975))
+
+
+def half_width(level: float, random: FloatArray, dof: FloatArray, systematic: FloatArray) -> FloatArray:
+    """Half the width of intervals (n,): Student's t of random standard errors, normal of systematic ones."""
+    quantile = 0.5 + 0.5 * level
+    return np.hypot(stdtrit(dof, quantile) * random, stdtrit(np.inf, quantile) * systematic)
 
 
 def bisquare_weight(u: FloatArray, c: float) -> FloatArray:
