@@ -8,16 +8,16 @@ from statsmodels.robust.scale import HuberScale
 
 from tests.phasors.phasor_cases import H, complex_normal
 from tpjb_ident.estimate.scatter import mixed_dof
-from tpjb_ident.estimators.mm import mm_fit
-from tpjb_ident.estimators.r_matrix import real_rows
-from tpjb_ident.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
-from tpjb_ident.statistics import (
+from tpjb_ident.estimate.statistics import (
     bisquare_weight,
     efficiency_constant,
     half_shrinkage,
     trimming_limits,
     trimming_weight,
 )
+from tpjb_ident.estimators.mm import mm_fit
+from tpjb_ident.estimators.r_matrix import real_rows
+from tpjb_ident.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
 
 
 def test_bisquare_constant_is_the_published_one():

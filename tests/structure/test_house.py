@@ -29,7 +29,7 @@ MAY_IMPORT = {
     "phasors": {"rigdata"},
     "check": {"rigdata", "phasors", "estimate", "terms", "pivot", "clearance"},  # what their own reading refuses
     "pivot": {"rigdata", "runtime", "phasors"},
-    "clearance": {"rigdata", "runtime", "phasors", "pivot"},
+    "clearance": {"rigdata", "runtime", "phasors", "estimate", "pivot"},  # its statistics
     "estimators": {"rigdata", "estimate"},
     "runs": {"rigdata", "runtime", "phasors", "check", "estimate", "estimators"},
     "bands": {"rigdata", "phasors", "check", "estimate", "estimators", "runs"},

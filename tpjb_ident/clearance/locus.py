@@ -9,16 +9,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import ndimage, special
+from scipy import ndimage
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
-from rigdata.problem import Problem, RigDataError, refuse
+from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
-from tpjb_ident.conditions import Condition, sentences
+from tpjb_ident.conditions import Condition, holding, sentences
+from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
-from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples
+from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples, usable_runs
 from tpjb_ident.phasors.windows import line_design
 from tpjb_ident.presentation import Presented
 
@@ -153,36 +154,26 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     runs = campaign.of_kind("locus")
     if not runs:
         raise refuse("campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
-    records, refused = _usable(runs)
-    noise = _noise(list(records.values()))
-    centre = np.zeros(2) if polygon is None else polygon.centre
-    repeats = _repeats(records, noise, centre)
+    usable, problems = usable_runs(runs, _read)
+    if 2 * len(usable) <= len(runs):
+        raise RigDataError(problems)
+    records = [record for _, record in usable]
+    orders = np.array([runs.index(run) for run, _ in usable], dtype=float)
+    noise = _noise(records)
+    centre = np.zeros(2) if polygon is None else np.asarray(polygon.centre)
+    repeats = _repeats(records, orders, noise, centre)
     # with the bearing's centre from the same probes their zero falls out
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
     centre_covariance = zero if polygon is None else polygon.centre_covariance
     points = []
-    for order, record in records.items():
+    for (run, record), order in zip(usable, orders, strict=True):
         position = record.position - np.nan_to_num(repeats.drift) * order - centre
         variance = noise.mean_variance(record.span) + repeats.scatter + order**2 * repeats.drift_variance
         covariance = variance * np.eye(2) + centre_covariance
-        points.append(LocusPoint(runs[order].id, record.point, record.load, record.direction, position, covariance))
+        points.append(LocusPoint(run.id, record.point, record.load, record.direction, position, covariance))
     points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
-    status = (*_status(points, polygon, repeats.count), *refused)
-    return Locus(tuple(points), np.asarray(centre), repeats.drift, status)
-
-
-def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Record], tuple[Condition, ...]]:
-    """Runs that can be used, by their number in the order of testing, and a condition that names the others."""
-    records: dict[int, _Record] = {}
-    problems: list[Problem] = []
-    for order, run in enumerate(runs):
-        try:
-            records[order] = _read(run)
-        except RigDataError as error:
-            problems += error.problems
-    if 2 * len(records) <= len(runs):
-        raise RigDataError(problems)
-    return records, refused_runs(problems)
+    status = (*_status(points, polygon, repeats.count), *refused_runs(problems))
+    return Locus(tuple(points), centre, repeats.drift, status)
 
 
 @dataclass(frozen=True)
@@ -245,7 +236,7 @@ def _blocks(time: FloatArray, place: FloatArray) -> tuple[NoiseSeries, NoiseSeri
     return x, y
 
 
-def _noise(records: list[_Record]) -> NoiseModel:
+def _noise(records: Sequence[_Record]) -> NoiseModel:
     """Noise of the probes, pooled over all runs."""
     chosen = records[:: max(1, len(records) // _NOISE_RUNS)]
     series = list(itertools.chain.from_iterable(record.blocks for record in chosen))
@@ -256,7 +247,7 @@ def _noise(records: list[_Record]) -> NoiseModel:
     return estimate_noise(series, _DRIFT_RATE)
 
 
-def _repeats(records: dict[int, _Record], noise: NoiseModel, centre: FloatArray) -> _Repeats:
+def _repeats(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, centre: FloatArray) -> _Repeats:
     """Drift and scatter by least squares, with a place of its own for every set point.
 
     Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number. A
@@ -264,33 +255,26 @@ def _repeats(records: dict[int, _Record], noise: NoiseModel, centre: FloatArray)
     may stand elsewhere without any drift. What two repeats or more leave beyond that and the noise is scatter; with
     few of them it is as much larger as Student's interval is wider than the normal one.
     """
-    firsts: list[int] = []
-    variances = []
-    for record in records.values():
-        first = next(k for k, other in records.items() if _same_set_point(other.point, record.point))
-        turn = math.remainder(record.direction - records[first].direction, 2 * math.pi)
-        miss = math.hypot(record.load / max(records[first].load, 1e-300) - 1.0, turn)
-        elsewhere = miss * float(np.hypot(*(records[first].position - centre)))
-        firsts.append(first)
-        variances.append(noise.mean_variance(record.span) + elsewhere**2)
-    member = (np.array(firsts)[:, None] == np.unique(firsts)).astype(float)
-    count = len(member) - member.shape[1]
+    same = np.array([[_same_set_point(a.point, b.point) for b in records] for a in records])
+    firsts = same.argmax(axis=0)
+    count = len(records) - len(np.unique(firsts))
     if count == 0:
         return _Repeats(0, np.full(2, np.nan))
-    places = np.array([record.position for record in records.values()])
+    places, loads = np.array([r.position for r in records]), np.array([r.load for r in records])
+    pull = loads * np.exp([1j * r.direction for r in records])
+    met = pull / np.where(pull[firsts] == 0, 1e-300, pull[firsts])
+    miss = np.hypot(np.abs(met) - 1, np.angle(met))
+    elsewhere = miss * np.hypot(*(places[firsts] - centre).T)
+    variance = np.array([noise.mean_variance(r.span) for r in records]) + elsewhere**2
+    member = (firsts[:, None] == np.unique(firsts)).astype(float)
     within = np.eye(len(member)) - member @ (member / member.sum(axis=0)).T
-    since = within @ np.array(list(records), dtype=float)
+    since = within @ orders
     weight = since / (since @ since)
-    remainder, variance, scatter = within - np.outer(since, weight), np.array(variances), 0.0
+    remainder, scatter = within - np.outer(since, weight), 0.0
     if count > 1:
-        left = 0.5 * float(np.sum((remainder @ places) ** 2)) * _student(2 * (count - 1)) ** 2
+        left = 0.5 * float(np.sum((remainder @ places) ** 2)) * student_widening(2 * (count - 1)) ** 2
         scatter = max(left - float(np.diag(remainder) @ variance), 0.0) / (count - 1)
     return _Repeats(count, weight @ places, float(weight**2 @ (variance + scatter)), scatter)
-
-
-def _student(freedom: int) -> float:
-    """Width of Student's 95 % interval over that of the normal one."""
-    return float(special.stdtrit(freedom, 0.975) / special.ndtri(0.975))
 
 
 def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
@@ -311,11 +295,10 @@ def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, repeats:
         if polygon and np.nanmax(directions(polygon.angles) @ p.position - 1.5 * polygon.clearance) > 0.0:
             behind.append(p.run)
     not_held = "intervals do not hold how well the shaft comes back to a place"
-    conditions = [
+    return holding(
         (polygon is None, "no-centre", "positions from the probes' zero, no clearance polygon given"),
         (repeats == 0, "drift-unknown", f"no load direction was repeated; {not_held}"),
         (repeats == 1, "scatter-unknown", f"one load direction was repeated; {not_held}"),
         (missed, "load-off-set-point", ", ".join(missed)),
         (behind, "outside-polygon", ", ".join(behind)),
-    ]
-    return tuple(Condition(kind, detail) for holds, kind, detail in conditions if holds)
+    )

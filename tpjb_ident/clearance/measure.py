@@ -13,7 +13,7 @@ from rigdata.problem import refuse
 from rigdata.vector import directions
 from tpjb_ident.clearance.polygon import SideFit, corners, find_centre, fit_sides, gain_ratio
 from tpjb_ident.clearance.sweep import ContactIntervals, read_sweep
-from tpjb_ident.conditions import Condition, sentences
+from tpjb_ident.conditions import Condition, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.curve import PivotCurve
@@ -287,15 +287,14 @@ def _status(fit: SideFit, polygon: ClearancePolygon) -> tuple[Condition, ...]:
     listed = ", ".join(f"pad #{k + 1} {1e6 * offsets[k]:+.1f} µm" for k in deviating)
     turn = float(np.mean(fit.tilt))
     is_turned = abs(turn) > max(_IRREGULAR * np.sqrt(np.mean(fit.tilt_se**2) / len(fit.pads)), 5e-3)
-    conditions = [
+    return holding(
         (missing, "pads-not-reached", missing),
         (np.isnan(fit.scale), "give-from-sweep", "no pivot curves, zero load extrapolated from the sweep alone"),
         (disagrees, "pivots-disagree", give),
         (listed, "irregular", f"{listed} from the median of all: worn, damaged or wrongly assembled"),
         (is_turned, "frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"),
         (fit.misfit > 4.0, "misfit", "the scatter exceeds the noise"),
-    ]
-    return tuple(Condition(kind, detail) for holds, kind, detail in conditions if holds)
+    )
 
 
 def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> pd.DataFrame:

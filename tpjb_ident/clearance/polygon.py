@@ -30,10 +30,10 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.vector import directions
 from tpjb_ident.clearance.sweep import ContactIntervals
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 from tpjb_ident.pivot.curve import PivotCurve
-from tpjb_ident.statistics import huber_weight, reweighted
 
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
 _DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior

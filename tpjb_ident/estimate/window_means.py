@@ -14,7 +14,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import totals
 from tpjb_ident.estimate.motion import motion_in
-from tpjb_ident.statistics import trimming_limits, trimming_weight
+from tpjb_ident.estimate.statistics import trimming_limits, trimming_weight
 
 #: |sum| over sum of moduli of a run's windows below which its phase counts as wandering.
 LOCKED = 0.9

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.statistics import half_shrinkage, trimming_limits, trimming_weight
+from tpjb_ident.estimate.statistics import half_shrinkage, trimming_limits, trimming_weight
 
 STARTS = 60
 _KEPT = 4

@@ -16,8 +16,8 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.estimate.statistics import bisquare_weight, efficiency_constant
 from tpjb_ident.estimators.least_trimmed import Regression, distance2, evenly_chosen, robust_start
-from tpjb_ident.statistics import bisquare_weight, efficiency_constant
 
 #: A direction with less than this share of its windows accepted differs as a whole.
 _ACCEPTED = 0.2

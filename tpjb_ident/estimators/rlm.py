@@ -22,8 +22,8 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import ArgumentError, TpjbError
+from tpjb_ident.estimate.statistics import bisquare_weight, huber_weight, reweighted
 from tpjb_ident.estimators.r_matrix import TableFit, real_rows
-from tpjb_ident.statistics import bisquare_weight, huber_weight, reweighted
 
 #: Names of the norms and the statsmodels class behind each.
 NORMS = {

@@ -10,9 +10,9 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.estimate.statistics import half_width
 from tpjb_ident.rounding import with_interval
 from tpjb_ident.schema import DAMPING, STIFFNESS
-from tpjb_ident.statistics import half_width
 
 #: Order of the eight real unknowns everywhere: Re hxx, Re hxy, Re hyx, Re hyy, Im hxx, ...
 ENTRIES = ("xx", "xy", "yx", "yy")

@@ -18,9 +18,9 @@ from tpjb_ident.estimate.noise import GAIN_OR_LOAD, UNKNOWN_EXPONENT
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.shape import MODELS, Shape, nearest, over_frequency
 from tpjb_ident.estimate.solve import Solution, Solver
+from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.estimate.term import Term
 from tpjb_ident.identification.band_blocks import BandBlocks, line_products
-from tpjb_ident.statistics import student_widening
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.distortion import Distortion
 from tpjb_ident.terms.registry import campaign_terms, learnt_rig

@@ -8,9 +8,9 @@ corners of every ramp.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from scipy import ndimage, special
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rigdata.calibration import Channel
     from rigdata.campaign import Run
 
+T = TypeVar("T")
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
 _SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch
 _NOTHING = 1e-15  # [m] or [N]: below what any sensor knows
@@ -81,6 +82,18 @@ def spare_slopes(run: Run, along: FloatArray, longest: int = 60) -> dict[str, Fl
                 design = np.column_stack([moved[used], np.ones(used.sum())])
                 slopes[name] = np.linalg.lstsq(design, reading[used], rcond=None)[0][:-1]
     return slopes
+
+
+def usable_runs(runs: Sequence[Run], read: Callable[[Run], T]) -> tuple[list[tuple[Run, T]], list[Problem]]:
+    """Runs with what is read of each, and why the others cannot be used."""
+    records: list[tuple[Run, T]] = []
+    problems: list[Problem] = []
+    for run in runs:
+        try:
+            records.append((run, read(run)))
+        except RigDataError as error:
+            problems += error.problems
+    return records, problems
 
 
 def refused_runs(problems: Sequence[Problem]) -> tuple[Condition, ...]:

@@ -18,9 +18,9 @@ from scipy import linalg, special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError, refuse
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.slow_noise import NoiseModel
-from tpjb_ident.phasors.slow_samples import refused_runs
+from tpjb_ident.phasors.slow_samples import refused_runs, usable_runs
 from tpjb_ident.pivot.creep import without_creep
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop
 from tpjb_ident.pivot.dry_record import DryRecord, axial_channels, pooled_noise, read_dry_run, relative_calibration
@@ -38,7 +38,7 @@ from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.refusals import DISPLACEMENT_LIMIT, refused_records, structure_behind
 
 if TYPE_CHECKING:
-    from rigdata.campaign import Campaign
+    from rigdata.campaign import Campaign, Run
 
 REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest load
 MODEL_ERROR = 3e-4  # of the deflection: what averaging over a curved law leaves; matters in computed records only
@@ -184,17 +184,15 @@ def _read(campaign: Campaign, angles: FloatArray) -> tuple[list[DryRecord], list
     if not runs:
         cure = "Record dry pivot tests, one per pad"
         raise refuse("campaign.toml", "runs", "has no runs of kind dry_pivot", cure)
-    records: list[DryRecord] = []
-    problems: list[Problem] = []
-    for run in runs:
-        try:
-            if run.pad is None or not 1 <= run.pad <= len(angles):
-                what = f"run {run.id} names pad {run.pad}, the bearing has pads 1 to {len(angles)}"
-                raise refuse(run.file, "pad", what, "Correct the manifest", run.id)
-            records.append(read_dry_run(run, float(angles[run.pad - 1])))
-        except RigDataError as error:
-            problems += error.problems
-    return records, problems
+
+    def read(run: Run) -> DryRecord:
+        if run.pad is None or not 1 <= run.pad <= len(angles):
+            what = f"run {run.id} names pad {run.pad}, the bearing has pads 1 to {len(angles)}"
+            raise refuse(run.file, "pad", what, "Correct the manifest", run.id)
+        return read_dry_run(run, float(angles[run.pad - 1]))
+
+    records, problems = usable_runs(runs, read)
+    return [record for _, record in records], problems
 
 
 def _fit_pads(pads: Sequence[Sequence[DryRecord]], structure: str) -> list[PivotCurve]:
@@ -291,7 +289,7 @@ def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> 
     for fit, weight in zip(curve.fits, curve.weights, strict=True):
         shares[fit.name] = shares.get(fit.name, 0.0) + float(weight)
     listed = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
-    conditions = [
+    return holding(
         (bad > 0, "bad-steps", f"{bad} left out"),
         (abs(curve.load_direction.angle) > _ANGLE_WARNING, "load-off-pad", str(curve.load_direction)),
         (structure, "structure-gives", structure),
@@ -303,8 +301,7 @@ def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> 
         (_misfits(law), "misfit", "the scatter exceeds the noise"),
         (not any(record.holds for record in records), "no-holds", "drift cannot be told from deflection"),
         (any(record.lost > _MANY_LOST for record in records), "samples-lost", ""),
-    ]
-    return tuple(Condition(kind, detail) for holds, kind, detail in conditions if holds)
+    )
 
 
 def contact_onset(fit: LawFit) -> tuple[float, float]:

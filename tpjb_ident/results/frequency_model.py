@@ -17,10 +17,10 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.estimate.shape import MODELS, over_frequency
+from tpjb_ident.estimate.statistics import half_width
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.point_result import PointResult, by_static_point
 from tpjb_ident.schema import KINDS
-from tpjb_ident.statistics import half_width
 
 #: A model is refused below this probability of its chi-square.
 REFUSED = 0.01

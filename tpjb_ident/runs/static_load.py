@@ -26,7 +26,7 @@ from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.statistics import huber_weight, reweighted
+from tpjb_ident.estimate.statistics import huber_weight, reweighted
 
 #: Misses beyond this share are no scatter: the set point or the cells are wrong.
 MAX_MISS = 0.05

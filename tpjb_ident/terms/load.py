@@ -9,8 +9,8 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State, entry_forces, film_force_rows
+from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.estimate.term import Additive, Parameter, of_groups
-from tpjb_ident.statistics import student_widening
 from tpjb_ident.terms.load_turn import PLAUSIBLE, LoadTurn
 
 #: Entries of k and of omega c.
