@@ -34,7 +34,7 @@ REJECTED_WEIGHT = 0.3
 MIN_COHERENCE = 0.9
 #: Variance of a robust regression over that of the solve: 0.95 is the efficiency of its weights; with every run's mean
 #: for an instrument h goes 0.7 standard deviations away from the solve's (624 entries of samples; others 0.2 to 0.3).
-_VARIANCE = {"mm": 1 / 0.95, "iv": 1.5}
+_VARIANCE = {"mm": 1 / 0.95, "mm-eiv": 1 / 0.95, "iv": 1.5}
 
 
 def estimate_dynamic_stiffness(
@@ -111,21 +111,22 @@ def estimate_table(
     """
     if method not in METHODS:
         raise ArgumentError(unknown_name("method", method, METHODS))
-    settings = rlm_settings or RlmSettings()
+    settings = replace(rlm_settings or RlmSettings(), quick=reference is not None)
     name = f"rlm:{settings.norm}" if method == "rlm" else method
     obstacle = _obstacle(table, method)
     if obstacle is not None:
         nothing, condition = np.full((8, 8), np.nan), displacement_condition(table.D)
         none, weights = np.full((2, 2), np.nan + 0j), np.zeros((len(table.valid), 2))
         return DynamicStiffness(none, omega, nothing, nothing[0], name, weights, (obstacle,), condition)
-    fit = _exact(table) if len(table) == 2 else SOLVERS[method](table, settings, reference is None)
-    estimate = _in_units(table, omega, name, fit)
-    if reference is None:
-        return estimate
-    covariance, systematic = _VARIANCE.get(method, 1.0) * reference.covariance, reference.systematic
-    return replace(
-        estimate, covariance=covariance, dof=reference.dof, chi_square=reference.chi_square, systematic=systematic
-    )
+    fit, windows = (_exact(table), table) if len(table) == 2 else SOLVERS[method](table, settings)
+    if reference is not None:
+        covariance = _VARIANCE.get(method, 1.0) * reference.covariance
+        fit = replace(fit, dof=reference.dof, chi_square=reference.chi_square)
+        estimate = _in_units(table, omega, name, fit)
+        return replace(estimate, covariance=covariance, systematic=reference.systematic)
+    if np.isnan(fit.dof).any() and len(table) > 2:
+        fit = _with_scatter(windows, fit, _VARIANCE.get(method, 1.0))
+    return _in_units(table, omega, name, fit)
 
 
 def _si(value: Any, unit: str, name: str) -> Any:
@@ -158,31 +159,22 @@ def _exact(table: PhasorTable) -> TableFit:
     return TableFit(ols_fit(table.D, table.F), np.ones(2), conditions=(none,))
 
 
-def _rlm(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
-    return rlm_fit(table.D, table.F, replace(settings, quick=not scatter))
-
-
-def _ols(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
-    return _regression(table, TableFit(ols_fit(table.D, table.F), np.ones(len(table))), scatter)
-
-
-def _mm(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
+def _mm(table: PhasorTable) -> TableFit:
     fit = mm_fit(table.D, table.F, table.direction)
-    solution = TableFit(fit.coefficients, fit.weights, conditions=fit.conditions)
-    return _regression(table, solution, scatter, _VARIANCE["mm"])
+    return TableFit(fit.coefficients, fit.weights, conditions=fit.conditions)
 
 
-def _mm_eiv(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
+def _mm_eiv(table: PhasorTable, settings: RlmSettings) -> tuple[TableFit, PhasorTable]:
     start = mm_fit(table.D, table.F, table.direction, tolerance=1e-7)  # tells which windows are good, no more
     solved = solved_windows(table, start.coefficients, within_directions(start.weights, table.direction))
     if solved is not None:
-        return replace(solved, conditions=start.conditions + solved.conditions)
-    plain = _mm(table, settings, scatter)
+        return replace(solved, conditions=start.conditions + solved.conditions), table
+    plain = _mm(table)
     text = "too few repeats per direction for a noise covariance: plain MM, not corrected for displacement noise"
-    return replace(plain, conditions=merged(plain.conditions, (Condition("no-repeats", text),)))
+    return replace(plain, conditions=merged(plain.conditions, (Condition("no-repeats", text),))), table
 
 
-def instrumental_fit(table: PhasorTable, scatter: bool = True) -> tuple[TableFit, PhasorTable]:
+def instrumental_fit(table: PhasorTable) -> tuple[TableFit, PhasorTable]:
     """Robust instrumental variables: reference channels against noise on the displacements.
 
     All four measured phasors are regressed, robustly and jointly, on the two references; the noise of D then sits on
@@ -200,14 +192,11 @@ def instrumental_fit(table: PhasorTable, scatter: bool = True) -> tuple[TableFit
     h = plain + np.linalg.solve(B_D.T, B_left.T).T
     D = table.reference @ B_D.T
     explained = replace(table, D=D, F=table.F - (table.D - D) @ h.T)
-    solution = TableFit(h, fit.weights, conditions=fit.conditions)
-    return _regression(explained, solution, scatter, _VARIANCE["iv"]), explained
+    return TableFit(h, fit.weights, conditions=fit.conditions), explained
 
 
-def _regression(table: PhasorTable, fit: TableFit, scatter: bool, variance: float = 1.0) -> TableFit:
+def _with_scatter(table: PhasorTable, fit: TableFit, variance: float) -> TableFit:
     """A weighted regression with its scatter as the default method has it: that of the repeats and of the runs."""
-    if not scatter:
-        return fit
     solved = solved_windows(table, fit.h, fit.weights)
     if solved is not None:
         covariance = variance * solved.covariance
@@ -261,13 +250,13 @@ def fit_conditions(condition: float, weights: FloatArray, directions: int) -> li
     return conditions
 
 
-#: What solves Eq. (15) by each method, whether its scatter is asked for: a new estimator is a function here.
-SOLVERS: dict[str, Callable[[PhasorTable, RlmSettings, bool], TableFit]] = {
-    "ols": _ols,
-    "rlm": _rlm,
-    "mm": _mm,
+#: What solves Eq. (15) by each method, with the windows whose scatter tells how well: a new estimator is a line here.
+SOLVERS: dict[str, Callable[[PhasorTable, RlmSettings], tuple[TableFit, PhasorTable]]] = {
+    "ols": lambda table, _: (TableFit(ols_fit(table.D, table.F), np.ones(len(table))), table),
+    "rlm": lambda table, settings: (rlm_fit(table.D, table.F, settings), table),
+    "mm": lambda table, _: (_mm(table), table),
     "mm-eiv": _mm_eiv,
-    "iv": lambda table, settings, scatter: instrumental_fit(table, scatter)[0],
+    "iv": lambda table, _: instrumental_fit(table),
 }
 METHODS = tuple(SOLVERS)
 

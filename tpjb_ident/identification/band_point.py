@@ -20,7 +20,7 @@ from tpjb_ident.bands.classic import ClassicLine, classic_line
 from tpjb_ident.bands.run_spectra import OPEN_ENDS, RunSpectra, run_spectra
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.run_data import PhasorSettings
-from tpjb_ident.runs.excluded_runs import ExcludedRun
+from tpjb_ident.runs.finished_runs import ExcludedRun
 
 #: Lines over a band where a record resolves more, and bins that a line takes at least.
 _LINES, _BINS = 60, 18

@@ -21,7 +21,7 @@ from tpjb_ident.results.frequency_model import FrequencyModel, fit_over_frequenc
 from tpjb_ident.results.linearity import FilmChange, change_conditions
 from tpjb_ident.results.point_result import PointResult, mean_position
 from tpjb_ident.results.quality import feeds_motion
-from tpjb_ident.runs.excluded_runs import ExcludedRun
+from tpjb_ident.runs.finished_runs import ExcludedRun
 from tpjb_ident.runs.point_data import pad_means
 from tpjb_ident.runs.static_load import StaticLoads
 

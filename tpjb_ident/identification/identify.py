@@ -24,8 +24,7 @@ from tpjb_ident.results.identification import Identification
 from tpjb_ident.results.quality import with_probe_doubts
 from tpjb_ident.runs.baseline import DryTest, dry_test
 from tpjb_ident.runs.checked_runs import check_finished
-from tpjb_ident.runs.excluded_runs import lost_points, named_runs, without_runs
-from tpjb_ident.runs.finished_runs import FinishedRuns
+from tpjb_ident.runs.finished_runs import FinishedRuns, excluded_runs, without_runs
 from tpjb_ident.runs.point_data import campaign_points
 from tpjb_ident.runs.run_jobs import Progress, all_runs
 from tpjb_ident.runs.run_store import RunStore
@@ -161,8 +160,8 @@ def assemble(
         without = without_runs(point.point, excluded, several)
         points.append(replace(point, quality=merged(point.quality, without)))
         report("estimating", len(points), len(gathered))
-    lost = lost_points([data.point for data in gathered], excluded, several)
-    remarks = unstated(campaign) + named_runs(excluded, len(finished.outcomes)) + lost
+    places = [data.point for data in gathered]
+    remarks = unstated(campaign) + excluded_runs(excluded, len(finished.outcomes), places, several)
     named = with_probe_doubts(checked.swept, points, settings.clearance)
     changes, names = shared_changes(solved.solution, range(len(gathered)))
     springs = cell_stiffness(solved.solution)

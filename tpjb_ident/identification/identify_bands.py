@@ -22,7 +22,7 @@ from tpjb_ident.identification.clocks import solved_with_clocks
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.runs.checked_runs import campaign_verdicts, check_conditions
-from tpjb_ident.runs.excluded_runs import ExcludedRun, lost_points, named_runs, without_runs
+from tpjb_ident.runs.finished_runs import ExcludedRun, excluded_runs, without_runs
 from tpjb_ident.runs.run_jobs import Progress
 from tpjb_ident.runs.static_load import static_loads
 from tpjb_ident.terms.registry import cell_stiffness
@@ -63,8 +63,8 @@ def identify_bands(
         of_band = run_conditions(point, solved.first), band_conditions(point, solved, b)
         quality.append(merged(*of_runs, without, *of_band))
     results, changes, names = band_results(solved, quality, settings.clearance)
-    lost = lost_points([point.point for point in points], bad, any_excitation=True, kind="run over a band")
-    named = named_runs(bad, len(runs)) + lost + unstated(campaign)
+    places = [point.point for point in points]
+    named = excluded_runs(bad, len(runs), places, any_excitation=True, kind="run over a band") + unstated(campaign)
     identified = tuple(point for band in results for point in band.points)
     springs = cell_stiffness(solved.first.part)
     return Identification(campaign.id, settings.method, identified, changes, named, results, names, springs)

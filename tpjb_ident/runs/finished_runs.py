@@ -1,20 +1,25 @@
-"""Finished runs of one identification: what they say of their excitation lines, and of the campaign.
+"""Finished runs of one identification: what they say of their excitation lines, or why they take no part.
 
-What is kept of a run is small beside its records: some hundred bytes a window.
+What is kept of a run is small beside its records: some hundred bytes a window. A run with a damaged file or a dead
+channel says nothing, and nothing else suffers from that. A point keeps its answer as long as other runs excite it; one
+that loses all of its runs is told as lost.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from rigdata.arrays import ComplexArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.check.observation import Observation
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.line_means import FilmLines, film_lines, mains_lines
 from tpjb_ident.phasors.run_data import RunPhasors
-from tpjb_ident.runs.excluded_runs import ExcludedRun
+
+#: Runs named one by one; more are counted.
+_LISTED = 6
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,51 @@ def digest(
     lines = len(phasors.lines.excitation)
     excitation = replace(phasors, z=phasors.z[:, :lines].copy(), residual=phasors.residual[:lines])
     return RunDigest(excitation, *mains_lines(phasors), temperatures, film_lines(phasors), sample_rate, observations)
+
+
+@dataclass(frozen=True)
+class ExcludedRun:
+    """A dynamic run that takes no part."""
+
+    run: str
+    point: OperatingPoint
+    error: Exception
+
+    @property
+    def reason(self) -> str:
+        """The first reason, in one line."""
+        return str(self.error).partition("\n")[0]
+
+    def belongs(self, point: OperatingPoint, any_excitation: bool) -> bool:
+        """Whether the run is one of an operating point, whatever the run's lines are or only at its set point."""
+        alike = self.point.static_key == point.static_key
+        return alike and (any_excitation or self.point.excitation_hz == point.excitation_hz)
+
+
+def without_runs(point: OperatingPoint, excluded: Sequence[ExcludedRun], any_excitation: bool) -> tuple[Condition, ...]:
+    """What a point has to say of its runs that take no part."""
+    runs = [run.run for run in excluded if run.belongs(point, any_excitation)]
+    return holding((runs, "run-left-out", f"without {', '.join(runs)}, which cannot be used"))
+
+
+def excluded_runs(
+    excluded: Sequence[ExcludedRun], of: int, points: Sequence[OperatingPoint], any_excitation: bool, kind: str = "run"
+) -> tuple[Condition, ...]:
+    """Which of the campaign's `of` dynamic runs take no part, and why; which operating points have no run left.
+
+    A `kind` of run other than usual is one over a band.
+    """
+    listed = "; ".join(f"{run.run} ({run.reason})" for run in excluded[:_LISTED])
+    more = f"; and {len(excluded) - _LISTED} more" if len(excluded) > _LISTED else ""
+    lost = [run for run in excluded if not any(run.belongs(point, any_excitation) for point in points)]
+    places = [f"{run.point.static_load / 1e3:g} kN" for run in lost]
+    if kind == "run":
+        places = [f"{place}, {run.point.excitation_hz:g} Hz" for place, run in zip(places, lost)]
+    runs = ", ".join(run.run for run in lost[:_LISTED]) + (", ..." if len(lost) > _LISTED else "")
+    return holding(
+        (excluded, "runs-left-out", f"{len(excluded)} of {of} dynamic runs take no part: {listed}{more}"),
+        (lost, "point-lost", f"no usable {kind} at {'; '.join(dict.fromkeys(places))}: {runs}"),
+    )
 
 
 @dataclass(frozen=True)

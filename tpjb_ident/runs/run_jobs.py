@@ -17,19 +17,21 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.conditions import Condition, holding, merged
 from tpjb_ident.phasors.reading_cache import beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.phasors.shaft import shaft_phases
 from tpjb_ident.phasors.windows import RecordTooShortError
-from tpjb_ident.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
-from tpjb_ident.runs.finished_runs import FinishedRuns, RunDigest, digest
+from tpjb_ident.runs.finished_runs import ExcludedRun, FinishedRuns, RunDigest, digest
 from tpjb_ident.runs.point_data import mean_temperatures, point_of
 from tpjb_ident.runs.run_store import RunStore, fingerprint
 from tpjb_ident.runtime.executors import Workers
+from tpjb_ident.runtime.provenance import file_state
 
 Progress = Callable[[str, int, int], None]
+#: Condition of a run whose accelerometer is dead.
+_DEAD_ACCELEROMETER = "accelerometer-dead"
 
 
 def all_runs(
@@ -43,7 +45,11 @@ def all_runs(
     runs = campaign.of_kind("dynamic")
     mass = campaign.housing_mass
     progress(runs[0].id if runs else "", 0, len(runs))
-    jobs = [(_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs]
+    jobs = []
+    for run in runs:  # workers may stand in another folder
+        reader: Any = replace(run.reader, path=run.reader.path.absolute())
+        stored = None if store is None else store.known(run.id)
+        jobs.append((replace(run, reader=reader), mass, settings, stored))
     finished: dict[int, RunDigest | ExcludedRun] = {}
     outcomes = (workers or Workers()).outcomes(process_run, jobs)
     for done, (index, outcome) in enumerate(outcomes, start=1):  # nothing is held back to be put in order
@@ -65,7 +71,7 @@ def _dead_accelerometers(digests: Sequence[RunDigest]) -> dict[str, Problem]:
     dead = {}
     for run in digests:
         for condition in run.phasors.conditions:
-            if condition == DEAD_ACCELEROMETER:
+            if condition == _DEAD_ACCELEROMETER:
                 dead[run.run] = Problem("error", run.observations[0].run.file, "", condition.detail, cure, run.run)
     return dead if 2 * len(dead) < len(digests) else {}
 
@@ -85,30 +91,11 @@ def process_run(
             mark = fingerprint(run, housing_mass, settings)
             if mark and mark == stored:
                 return mark, None
-            before = _state(run)
+            before = file_state(run.reader.path)
             result = one_run(run, housing_mass, settings)
-        return (mark if before == _state(run) else ""), result
+        return (mark if before == file_state(run.reader.path) else ""), result
     except (RigDataError, RecordTooShortError) as error:
         return "", ExcludedRun(run.id, run.point, error)
-
-
-def _state(run: Run) -> tuple[int, int] | None:
-    path = getattr(getattr(run, "reader", None), "path", None)
-    if path is None:
-        return None
-    try:
-        state = path.stat()
-    except OSError:  # it has vanished: reading says so, with a better message
-        return None
-    return state.st_size, state.st_mtime_ns
-
-
-def _anywhere(run: Run) -> Any:
-    """The run with its file's absolute path: workers may stand in another folder."""
-    reader: Any = getattr(run, "reader", None)
-    if reader is None or reader.path.is_absolute():
-        return run
-    return replace(run, reader=replace(reader, path=reader.path.absolute()))
 
 
 def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDigest:
@@ -145,9 +132,8 @@ def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, 
 
 def _repaired(run: Run) -> tuple[Condition, ...]:
     """What the reader had to repair in the record."""
-    problems = run.reader.problems() if hasattr(run, "reader") else ()
-    repairs = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
-    return (Condition("record-damaged", "; ".join(repairs)),) if repairs else ()
+    repairs = [f"{p.file}, {p.place}: {p.what}" for p in run.reader.problems() if p.severity == "warning"]
+    return holding((repairs, "record-damaged", "; ".join(repairs)))
 
 
 def _without_dead(phasors: RunPhasors, observation: Observation) -> tuple[RunPhasors, tuple[Condition, ...]]:
@@ -164,7 +150,7 @@ def _without_dead(phasors: RunPhasors, observation: Observation) -> tuple[RunPha
         if problem.severity != "error":
             spare.append(k)
         elif channel.quantity == "acceleration":
-            conditions.append(Condition(DEAD_ACCELEROMETER, f"{problem.place} of {phasors.run} {problem.what}"))
+            conditions.append(Condition(_DEAD_ACCELEROMETER, f"{problem.place} of {phasors.run} {problem.what}"))
         else:
             grave.append(problem)
     if grave:

@@ -58,19 +58,14 @@ _MADE: dict[str, Any] = {kind.__name__: kind for kind in (*_RECORDS, tuple, list
 
 
 def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
-    """SHA-256 of everything that a run's phasors depend on.
-
-    "" where the run has no file of its own, or none any more.
-    """
-    reader = getattr(run, "reader", None)
-    if reader is None:
-        return ""
+    """SHA-256 of everything that a run's phasors depend on; "" where its file is gone."""
+    reader: Any = run.reader
     try:
         record = reader.stored_hash() if hasattr(reader, "stored_hash") else sha256(reader.path)
     except OSError:  # whoever reads it next says what is wrong with it
         return ""
     entry = (run.id, run.kind, run.point, run.excitation_direction, dict(run.channels), reader)
-    described = (dict(getattr(reader, "channels", {})), housing_mass, settings)
+    described = (dict(reader.channels), housing_mass, settings)
     text = "\n".join([record, repr(entry), repr(described), source_stamp()])
     return hashlib.sha256(text.encode()).hexdigest()
 

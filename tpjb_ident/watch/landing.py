@@ -17,18 +17,7 @@ from rigdata.problem import RigDataError
 from rigdata.run import Run
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
 from rigdata.vector import directions
-
-#: What tells whether a file is still the one that was read: size, time of its last change [ns], node.
-FileState = tuple[int, int, int]
-
-
-def file_state(path: Path) -> FileState | None:
-    """State of an ordinary file; None where there is none, or none that may be looked at."""
-    try:
-        status = path.stat()
-    except OSError:
-        return None
-    return (status.st_size, status.st_mtime_ns, status.st_ino) if path.is_file() else None
+from tpjb_ident.runtime.provenance import FileState, file_state
 
 
 class NewFiles:
