@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 from typing import Any, Self, get_args
 
@@ -33,11 +34,7 @@ class Condition(problem.Condition):
 
 def merged(*groups: tuple[Condition, ...]) -> tuple[Condition, ...]:
     """Conditions of several steps in order, each name once (the first detail counts)."""
-    seen: dict[str, Condition] = {}
-    for group in groups:
-        for condition in group:
-            seen.setdefault(str(condition), condition)
-    return tuple(seen.values())
+    return tuple(dict.fromkeys(itertools.chain(*groups)))
 
 
 def holding(*rows: tuple[object, str, str]) -> tuple[Condition, ...]:
@@ -52,15 +49,9 @@ def untrusted(conditions: Iterable[Condition]) -> tuple[Condition, ...]:
 
 def sentences(conditions: Iterable[Condition]) -> tuple[str, ...]:
     """Every condition as one line, name and detail."""
-    return tuple(condition.sentence() for condition in conditions)
-
-
-def quality_cell(conditions: Iterable[str]) -> str:
-    """Names for a cell of a column `quality`."""
-    return "; ".join(map(str, conditions)) or "ok"
+    return tuple(map(Condition.sentence, conditions))
 
 
 def errors_in(quality: object) -> list[str]:
     """Names in a cell of a column `quality` that forbid trust in its row."""
-    names = str(quality).split("; ")
-    return [name for name in names if name in KINDS and KINDS[name].severity == "error"]
+    return [name for name in str(quality).split("; ") if name in KINDS and KINDS[name].severity == "error"]

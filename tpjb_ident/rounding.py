@@ -77,10 +77,8 @@ def percent(share: float, digits: int = 1) -> str:
 
 def signed(value: float, digits: int = 1) -> str:
     """A number with its sign, none if it rounds to zero; a dash if there is none."""
-    if not math.isfinite(value):
-        return "–"
-    text = plain(value, digits)
-    return text if text.startswith(MINUS) or not float(text) else f"+{text}"
+    text = fixed(value, digits)
+    return text if text[0] in f"{MINUS}–" or not float(text) else f"+{text}"
 
 
 def fixed(value: float, digits: int = 1) -> str:

@@ -10,10 +10,10 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.conditions import Condition, quality_cell
+from tpjb_ident.conditions import Condition
 from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.results.frequency_model import MODEL_COLUMNS, FrequencyModel
-from tpjb_ident.results.point_result import PointResult
+from tpjb_ident.results.point_result import PointResult, quality_cell
 from tpjb_ident.schema import STATIC_KEY
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.conditions import Condition, quality_cell, sentences
+from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.presentation import Presented
 from tpjb_ident.results.frequency_model import MODEL_COLUMNS, StaticFits, fits_over_frequency
-from tpjb_ident.results.point_result import PointResult
+from tpjb_ident.results.point_result import PointResult, quality_cell
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:

@@ -104,6 +104,11 @@ def by_static_point(points: Sequence[PointResult]) -> list[list[int]]:
     return list(groups.values())
 
 
+def quality_cell(conditions: Sequence[str]) -> str:
+    """Names for a cell of a column ``quality``."""
+    return "; ".join(conditions) or "ok"
+
+
 def mean_position(positions: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Mean position of a point's runs and its standard error (2,); `positions` (n_runs, 2) [m]."""
     runs = len(positions)

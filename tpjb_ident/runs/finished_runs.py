@@ -17,6 +17,7 @@ from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.line_means import FilmLines, film_lines, mains_lines
 from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.rounding import listed
 
 #: Runs named one by one; more are counted.
 _LISTED = 6
@@ -89,15 +90,14 @@ def excluded_runs(
 
     A `kind` of run other than usual is one over a band.
     """
-    listed = "; ".join(f"{run.run} ({run.reason})" for run in excluded[:_LISTED])
-    more = f"; and {len(excluded) - _LISTED} more" if len(excluded) > _LISTED else ""
+    reasons = listed([f"{run.run} ({run.reason})" for run in excluded], _LISTED, "; ")
     lost = [run for run in excluded if not any(run.belongs(point, any_excitation) for point in points)]
     places = [f"{run.point.static_load / 1e3:g} kN" for run in lost]
     if kind == "run":
         places = [f"{place}, {run.point.excitation_hz:g} Hz" for place, run in zip(places, lost)]
-    runs = ", ".join(run.run for run in lost[:_LISTED]) + (", ..." if len(lost) > _LISTED else "")
+    runs = listed([run.run for run in lost], _LISTED)
     return holding(
-        (excluded, "runs-left-out", f"{len(excluded)} of {of} dynamic runs take no part: {listed}{more}"),
+        (excluded, "runs-left-out", f"{len(excluded)} of {of} dynamic runs take no part: {reasons}"),
         (lost, "point-lost", f"no usable {kind} at {'; '.join(dict.fromkeys(places))}: {runs}"),
     )
 

@@ -25,9 +25,8 @@ from tpjb_ident.phasors.shaft import shaft_phases
 from tpjb_ident.phasors.windows import RecordTooShortError
 from tpjb_ident.runs.finished_runs import ExcludedRun, FinishedRuns, RunDigest, digest
 from tpjb_ident.runs.point_data import mean_temperatures, point_of
-from tpjb_ident.runs.run_store import RunStore, fingerprint
+from tpjb_ident.runs.run_store import RunStore, file_state, fingerprint
 from tpjb_ident.runtime.executors import Workers
-from tpjb_ident.runtime.provenance import file_state
 
 Progress = Callable[[str, int, int], None]
 #: Condition of a run whose accelerometer is dead.

@@ -37,6 +37,8 @@ from tpjb_ident.runs.finished_runs import RunDigest
 from tpjb_ident.runtime.provenance import sha256, source_stamp
 from tpjb_ident.runtime.tables import write_atomic
 
+#: What tells whether a file is still the one that was read: size, time of its last change [ns], node.
+FileState = tuple[int, int, int]
 #: What reading says of an entry that is cut off, or that somebody else wrote.
 _NOT_OURS = (
     OSError,
@@ -55,6 +57,15 @@ _RECORDS = (
     Observation, RecordLines, Reporter, Finding, Problem,
 )  # fmt: skip
 _MADE: dict[str, Any] = {kind.__name__: kind for kind in (*_RECORDS, tuple, list, set)}
+
+
+def file_state(path: Path) -> FileState | None:
+    """State of an ordinary file; None where there is none, or none that may be looked at."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return (status.st_size, status.st_mtime_ns, status.st_ino) if path.is_file() else None
 
 
 def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:

@@ -14,9 +14,6 @@ from tpjb_ident.errors import BadInputError
 
 _PACKAGES = ("tpjb-ident", "numpy", "scipy", "pandas", "statsmodels", "h5py", "numba", "matplotlib")
 
-#: What tells whether a file is still the one that was read: size, time of its last change [ns], node.
-FileState = tuple[int, int, int]
-
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that results depend on."""
@@ -29,15 +26,6 @@ def versions() -> dict[str, str]:
         except importlib.metadata.PackageNotFoundError:
             installed[package] = "not installed"
     return installed
-
-
-def file_state(path: Path) -> FileState | None:
-    """State of an ordinary file; None where there is none, or none that may be looked at."""
-    try:
-        status = path.stat()
-    except OSError:
-        return None
-    return (status.st_size, status.st_mtime_ns, status.st_ino) if path.is_file() else None
 
 
 def sha256(path: Path) -> str:
