@@ -20,7 +20,7 @@ from rigdata.virtual_rig import (
 )
 from tests.clearance.cases import ANGLES, CLEARANCE, OtherRun, bearing_centre, rig, sphere
 from tpjb_ident.clearance.measure import (
-    coldest_run,
+    coldest_first,
     measure_clearance,
     measure_run,
     pairs_frame,
@@ -73,7 +73,7 @@ def test_clearance_and_centre_with_one_pad_off(whole):
 def test_two_push_loads_give_the_radial_stiffness_and_a_hot_sweep_what_the_bearing_grew(whole, measured, opened):
     source, curves = whole
     light, heavy = measured
-    assert coldest_run(source.of_kind("clearance")).id == light.run
+    assert coldest_first(source.of_kind("clearance"))[0].id == light.run
     warm = replace(heavy, run="warm", temperature=light.temperature + 20.0, clearance=light.clearance + 5e-6)
     grown = replace(measure_clearance(opened(rig(clearance=CLEARANCE + 6e-6)), ANGLES, curves), run="grown")
     assert np.abs(grown.centre - light.centre).max() < 1e-6
@@ -99,8 +99,8 @@ def test_the_cold_sweep_counts_however_small_the_hot_ones_push(whole):
     source, _ = whole
     light, heavy = source.of_kind("clearance")
     warm = OtherRun(light, id="warm", mean_temperature=lambda: light.mean_temperature() + 20.0)
-    assert coldest_run([warm, heavy]).id == heavy.id
-    assert coldest_run([warm]).id == "warm"
+    assert coldest_first([warm, heavy])[0].id == heavy.id
+    assert coldest_first([warm])[0].id == "warm"
 
 
 def test_the_push_below_the_dry_tests_is_marked_as_extrapolated(measured):

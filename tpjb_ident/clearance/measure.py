@@ -15,7 +15,7 @@ from tpjb_ident.clearance.polygon import SideFit, corners, find_centre, fit_side
 from tpjb_ident.clearance.sweep import ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
-from tpjb_ident.phasors.slow_samples import live_run
+from tpjb_ident.phasors.slow_samples import live_run, usable_runs
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.dry_record import axial_channels, relative_calibration
 from tpjb_ident.presentation import Presented
@@ -174,7 +174,16 @@ def measure_clearance(
     runs = campaign.of_kind("clearance")
     if not runs:
         raise refuse("campaign.toml", "runs", "has no run of kind clearance", "Record a clearance sweep")
-    return measure_run(coldest_run(runs), pivot_angles, curves)
+    return measure_run(coldest_first(runs)[0], pivot_angles, curves)
+
+
+def measure_sweeps(
+    runs: Sequence[Run], pivot_angles: Sequence[float], curves: Sequence[PivotCurve] | None, most: int | None = None
+) -> tuple[list[ClearancePolygon], list[Condition]]:
+    """Polygons of sweeps, the coldest first, at `most` so many, and what is wrong with those that are of no use."""
+    measured, problems = usable_runs(coldest_first(runs), lambda run: measure_run(run, pivot_angles, curves), most)
+    refused = [Condition("runs-refused", f"{problem.run} ({problem})") for problem in problems]
+    return [polygon for _, polygon in measured], refused
 
 
 def measure_run(
@@ -263,17 +272,14 @@ def _mean_temperature(run: Run) -> float:
     return float("nan") if temperature is None else temperature
 
 
-def coldest_run(runs: Sequence[Run]) -> Run:
-    """The sweep at rest, or at the lowest speed, that is cold; of several such the one with the smallest push."""
-    if len(runs) == 1:
-        return runs[0]
-    slowest = min(run.point.shaft_speed for run in runs)
-    slow = [run for run in runs if run.point.shaft_speed == slowest]
-    temperatures = [_mean_temperature(run) for run in slow]
-    coldest = min((t for t in temperatures if np.isfinite(t)), default=np.nan)
+def coldest_first(runs: Sequence[Run]) -> list[Run]:
+    """Sweeps in order of speed, the cold ones of a speed before the warm ones, and those by their push."""
+    temperature = {run.id: _mean_temperature(run) for run in runs}
+    speeds = {run.id: run.point.shaft_speed for run in runs}
+    slowest = [t for run, t in temperature.items() if speeds[run] == min(speeds.values()) and np.isfinite(t)]
+    warm = min(slowest, default=np.nan) + _SAME_TEMPERATURE
     # a temperature that nobody measured does not rule a sweep out
-    cold = [run for run, t in zip(slow, temperatures, strict=True) if not t > coldest + _SAME_TEMPERATURE]
-    return min(cold, key=lambda run: run.point.static_load)
+    return sorted(runs, key=lambda run: (speeds[run.id], temperature[run.id] > warm, run.point.static_load))
 
 
 def _status(fit: SideFit, polygon: ClearancePolygon) -> tuple[Condition, ...]:

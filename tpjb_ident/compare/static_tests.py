@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.problem import Problem, RigDataError
-from tpjb_ident.clearance.measure import measure_run
+from tpjb_ident.clearance.measure import measure_run, measure_sweeps
 from tpjb_ident.conditions import Condition
 
 if TYPE_CHECKING:
@@ -46,28 +46,11 @@ def measure_static(campaign: Campaign, bearing: Bearing, with_pivots: bool = Tru
     curves: tuple[PivotCurve, ...] = ()
     if with_pivots and campaign.of_kind("dry_pivot"):
         curves = fit_pivots(campaign, angles, on_refusal="few")
-    clearance, excluded = _clearance(campaign, angles, curves)
+    polygons, excluded = measure_sweeps(campaign.of_kind("clearance"), angles, curves or None, most=1)
+    clearance = polygons[0] if polygons else None
     locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
     excluded += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]
     return StaticTests(curves, clearance, locus, tuple(excluded))
-
-
-def _clearance(
-    campaign: Campaign, angles: Sequence[float], curves: tuple[PivotCurve, ...]
-) -> tuple[ClearancePolygon | None, list[Condition]]:
-    """Polygon of the coldest sweep that can be used; what is wrong with those before it."""
-    from tpjb_ident.clearance.measure import coldest_run, measure_run
-
-    runs = list(campaign.of_kind("clearance"))
-    excluded: list[Condition] = []
-    while runs:
-        try:
-            return measure_run(coldest_run(runs), angles, curves or None), excluded
-        except RigDataError as error:  # a damaged sweep may not even tell how warm it was
-            bad = next((run for run in runs if run.id == error.problems[0].run), runs[0])
-            excluded.append(Condition("runs-refused", f"{bad.id} ({error.problems[0]})"))
-            runs.remove(bad)
-    return None, excluded
 
 
 def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Problem] = ()) -> list[Problem]:

@@ -37,8 +37,6 @@ _TEMPLATES = jinja2.Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-#: Excitation frequencies that differ by less than this share are one.
-_SAME = 1e-6
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,24 +108,25 @@ def grids(points: pd.DataFrame, axes: str) -> list[Grid]:
     """Sort points by load and direction into files over ``"speed"``, ``"excitation"`` or ``"both"``."""
     parts = []
     for _, rows in points.groupby(["static_load_N", "static_load_direction_deg", "mirrored"]):
-        line = rows["excitation_Hz"].round(9)
-        line = line.mask(abs(line - rows["shaft_speed_Hz"]) < _SAME * line, _SYNCHRONOUS)
+        frequency, speed = (rows[name].map(_rounded) for name in ("excitation_Hz", "shaft_speed_Hz"))
+        line = frequency.mask(frequency == speed, _SYNCHRONOUS)
+        # all speeds were run at the same frequencies
+        is_grid = frequency.nunique() * speed.nunique() == len(rows)
         rows = rows.assign(line=line).sort_values(["shaft_speed_Hz", "excitation_Hz"])
-        if axes == "both" and ((line == _SYNCHRONOUS).all() or _alike(rows)):
+        if axes == "both" and (is_grid or (line == _SYNCHRONOUS).all()):
             parts.append(rows)
         else:
             parts += [part for _, part in rows.groupby("line" if axes == "speed" else "shaft_speed_Hz")]
     return [Grid(part) for part in parts]
 
 
+def _rounded(frequency: float) -> float:
+    """A frequency to the digits by which two are told apart."""
+    return float(f"{frequency:.7g}")
+
+
 #: Line of the running speed, at which files over speed are told apart from those at a frequency.
 _SYNCHRONOUS = -1.0
-
-
-def _alike(rows: pd.DataFrame) -> bool:
-    """Whether all speeds were run at the same frequencies."""
-    first, *rest = (axis.to_numpy() for _, axis in rows.groupby("shaft_speed_Hz")["excitation_Hz"])
-    return all(len(axis) == len(first) and np.allclose(axis, first, rtol=_SAME, atol=0.0) for axis in rest)
 
 
 def ross_version(chosen: int | None = None) -> tuple[int, str]:

@@ -84,13 +84,16 @@ def spare_slopes(run: Run, along: FloatArray, longest: int = 60) -> dict[str, Fl
     return slopes
 
 
-def usable_runs(runs: Sequence[Run], read: Callable[[Run], T]) -> tuple[list[tuple[Run, T]], list[Problem]]:
-    """Runs with what is read of each, and why the others cannot be used."""
+def usable_runs(
+    runs: Sequence[Run], read: Callable[[Run], T], most: int | None = None
+) -> tuple[list[tuple[Run, T]], list[Problem]]:
+    """Runs with what is read of each, the first few where `most` is given, and why others cannot be used."""
     records: list[tuple[Run, T]] = []
     problems: list[Problem] = []
     for run in runs:
         try:
-            records.append((run, read(run)))
+            if len(records) != most:
+                records.append((run, read(run)))
         except RigDataError as error:
             problems += error.problems
     return records, problems

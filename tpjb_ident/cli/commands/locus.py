@@ -63,26 +63,19 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
 
 def _other_polygons(
     c: Command, source: Campaign, angles: list[float], static: StaticTests
-) -> tuple[tuple[ClearancePolygon, ...], list[Condition]]:
+) -> tuple[list[ClearancePolygon], list[Condition]]:
     """Measure the sweeps besides the one that counts, and write their tables; what is wrong with those of no use."""
-    from rigdata.problem import RigDataError
-    from tpjb_ident.clearance.measure import measure_run, pairs_frame
+    from tpjb_ident.clearance.measure import measure_sweeps, pairs_frame
 
     first = static.clearance
-    polygons: list[ClearancePolygon] = []
-    refused: list[Condition] = []
     if first is None:
-        return (), []
-    for run in source.of_kind("clearance"):
-        try:
-            if run.id != first.run:
-                polygons.append(measure_run(run, angles, static.curves or None))
-        except RigDataError as error:
-            refused.append(Condition("runs-refused", f"{run.id} ({error.problems[0]})"))
+        return [], []
+    others = [run for run in source.of_kind("clearance") if run.id != first.run]
+    polygons, refused = measure_sweeps(others, angles, static.curves or None)
     if polygons:
         import pandas as pd
 
         frames = [polygon.to_frame() for polygon in (first, *polygons)]
         c.table("clearance_runs", pd.concat(frames, ignore_index=True))
-        c.table("clearance_pairs", pairs_frame(first, tuple(polygons)))
-    return tuple(polygons), refused
+        c.table("clearance_pairs", pairs_frame(first, polygons))
+    return polygons, refused
