@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.statistics import half_shrinkage, trimming_limits, trimming_weight
 
 STARTS = 60
@@ -35,7 +35,7 @@ class Regression:
         self._x, self._y = np.ascontiguousarray(X.T), np.ascontiguousarray(Y.T)
         #: Scatter of the forces themselves: any equivariant metric does for a first ordering, this one is at hand.
         #: A little of every component keeps it regular where some follow from the others exactly.
-        self.metric = scatter(self._y, np.ones(self.n))
+        self.metric = self._y @ self._y.conj().T / self.n
         self.metric += _METRIC_FLOOR * float(np.trace(self.metric).real) / self.q * np.eye(self.q)
 
     def _sums(self, weights: FloatArray) -> tuple[ComplexArray, ComplexArray]:
@@ -57,6 +57,16 @@ class Regression:
         leverage = _squares(self._x.conj(), np.asarray(np.linalg.inv(self._sums(weights)[0]), dtype=complex))
         return np.asarray(1 / (1 + np.maximum(leverage, 0.0)))
 
+    def scatter(self, rows: ComplexArray, weights: FloatArray, shrinkage: float = 1.0) -> ComplexArray:
+        """Weighted mean of r r^H over `shrinkage`, (..., q, q); `rows` (..., q, n), `weights` (..., n).
+
+        A trace of the metric, relative to its own size, lets it be inverted.
+        """
+        sums = (weights[..., None, :] * rows) @ rows.conj().swapaxes(-1, -2)
+        spread = sums / (shrinkage * weights.sum(axis=-1))[..., None, None]
+        size = np.einsum("...ii->...", spread).real / np.trace(self.metric).real
+        return np.asarray(spread + (1e-28 + 1e-13 * size)[..., None, None] * self.metric)
+
     def residual(self, B: ComplexArray) -> ComplexArray:
         """Y - X B' of every window, (..., q, n); `B` (..., q, 2)."""
         return np.asarray(self._y - B @ self._x)
@@ -66,12 +76,6 @@ def _squares(rows: ComplexArray, matrix: ComplexArray) -> FloatArray:
     """r^H A r of every window, (..., n); `rows` (..., q, n), `matrix` (..., q, q)."""
     moved = matrix @ rows
     return np.asarray((rows.real * moved.real + rows.imag * moved.imag).sum(axis=-2))
-
-
-def scatter(rows: ComplexArray, weights: FloatArray) -> ComplexArray:
-    """Weighted mean of r r^H, (..., q, q); `rows` (..., q, n), `weights` (..., n)."""
-    weighted = weights[..., None, :] * rows
-    return np.asarray(weighted @ rows.conj().swapaxes(-1, -2) / weights.sum(axis=-1)[..., None, None])
 
 
 def distance2(rows: ComplexArray, inner: ComplexArray) -> FloatArray:
@@ -97,19 +101,23 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Init
     and has windows in every direction is the better start. (A core in a few directions only would be two runs
     fitted exactly, so it does not count.)
     """
-    seeds = _first_fits(regression, _start_pairs(direction, seed))
-    repeats = len(direction) / len(np.unique(direction))
-    half, exact = _concentrated(regression, seeds, 0.5, repeats)
-    if exact:
-        return InitialFit(regression.fit(half), np.zeros((regression.q, regression.q), dtype=complex), True)
-    majority = InitialFit(*_reweighted(regression, half, 0.5))
-    few, exact = _concentrated(regression, seeds, _SMALL_CORE, repeats)
-    if exact:
-        return majority
-    core = InitialFit(*_reweighted(regression, few, _SMALL_CORE))
+    directions = len(np.unique(direction))
+    pairs = _start_pairs(direction, seed)
+    chosen = np.zeros((len(pairs), regression.n))
+    np.put_along_axis(chosen, pairs, 1.0, axis=1)
+    B = regression.fit(chosen)
+    seeds = B, regression.told(chosen) * distance2(regression.residual(B), regression.metric)
+    fits: list[InitialFit] = []
+    for share in (0.5, _SMALL_CORE):
+        weights, exact = _concentrated(regression, seeds, share, len(direction) / directions)
+        if exact:
+            none = np.zeros((regression.q, regression.q), dtype=complex)
+            return fits[0] if fits else InitialFit(regression.fit(weights), none, True)
+        fits.append(_reweighted(regression, weights, share))
+    majority, core = fits
     limit = trimming_limits(2 * regression.q)[0]
     accepted = distance2(regression.residual(core.coefficients), core.scatter) <= limit
-    everywhere = len(np.unique(direction[accepted])) == len(np.unique(direction))
+    everywhere = len(np.unique(direction[accepted])) == directions
     tighter = _log_det(core.scatter) < _log_det(majority.scatter) - np.log(4.0**regression.q)
     return core if everywhere and tighter else majority
 
@@ -138,30 +146,25 @@ def _core_size(regression: Regression, share: float) -> int:
     return int(share * regression.n + 0.5 * (2 + regression.q + 1))
 
 
-def _first_fits(regression: Regression, pairs: IntArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
-    """Fits through pairs of windows, their residuals, and the windows' distances from them."""
-    chosen = np.zeros((len(pairs), regression.n))
-    np.put_along_axis(chosen, pairs, 1.0, axis=1)
-    B = regression.fit(chosen)
-    rows = regression.residual(B)
-    return B, rows, regression.told(chosen) * distance2(rows, regression.metric)
-
-
 def _concentrated(
-    regression: Regression, seeds: tuple[ComplexArray, ComplexArray, FloatArray], share: float, repeats: float
+    regression: Regression, seeds: tuple[ComplexArray, FloatArray], share: float, repeats: float
 ) -> tuple[FloatArray, bool]:
-    """Weights (n,) of the core of the best of many concentrated two-window starts, and whether it fits exactly."""
+    """Weights (n,) of the core of the best of many concentrated two-window starts, and whether it fits exactly.
+
+    `seeds`: coefficients of the starts, and the windows' distances from them.
+    """
     h = _core_size(regression, share)
-    B, rows, distance = seeds
+    B, distance = seeds
+    nothing = 1e-26 * float(np.median(np.linalg.norm(regression.Y, axis=1))) ** 2
     for step in range(_STEPS):
         previous = B
         weights = _nearest(distance, h)
         told = regression.told(weights / repeats)  # windows of one direction may be off alike: they tell H once
         B = regression.fit(weights)
         rows = regression.residual(B)
-        spread = _regular(scatter(rows, weights), regression.metric)
-        exact = _fits_exactly(spread, regression.Y) & (told.min(axis=-1) > _UNDETERMINED)
-        if exact.any():
+        spread = regression.scatter(rows, weights)
+        exact = (np.einsum("...ii->...", spread).real <= nothing) & (told.min(axis=-1) > _UNDETERMINED)
+        if exact.any():  # nothing is left in any component: that is the answer
             return weights[int(np.argmax(exact))], True
         if step == 1:
             best = np.argsort(_log_det(spread), kind="stable")[:_KEPT]
@@ -179,38 +182,24 @@ def _nearest(distance: FloatArray, h: int) -> FloatArray:
     return weights
 
 
-def _fits_exactly(spread: ComplexArray, Y: ComplexArray) -> BoolArray:
-    """Which starts leave (numerically) nothing in any component: they are the answer."""
-    floor = 1e-26 * float(np.median(np.linalg.norm(Y, axis=1))) ** 2
-    return np.asarray(np.einsum("...ii->...", spread).real <= floor)
-
-
 def _log_det(spread: ComplexArray) -> FloatArray:
     return np.asarray(np.linalg.slogdet(spread)[1])
 
 
-def _regular(spread: ComplexArray, metric: ComplexArray) -> ComplexArray:
-    """A scatter that can be inverted: with a trace of `metric`, relative to its own size."""
-    size = np.einsum("...ii->...", spread).real / np.trace(metric).real
-    return np.asarray(spread + (1e-28 + 1e-13 * size)[..., None, None] * metric)
-
-
-def _reweighted(regression: Regression, core: FloatArray, share: float) -> tuple[ComplexArray, ComplexArray]:
+def _reweighted(regression: Regression, core: FloatArray, share: float) -> InitialFit:
     """Fit and scatter of the windows that belong together, from the weights (n,) of the concentrated core."""
-    n, q, metric = regression.n, regression.q, regression.metric
-    h = _core_size(regression, share)
+    n, h, dimension = regression.n, _core_size(regression, share), 2 * regression.q
     B, told = regression.fit(core), regression.told(core)
-    rows = regression.residual(B)
-    spread = _regular(scatter(rows, np.ones(n)), metric)
+    rows, members = regression.residual(B), np.ones(n)
     # The core's own scatter is self-consistent after a few looks at which windows it holds.
-    for _ in range(4):
-        spread = _regular(scatter(rows, _nearest(told * distance2(rows, spread), h)), metric)
-    spread = spread / half_shrinkage(2 * q, h / n)
-    lower, upper, shrinkage = trimming_limits(2 * q)
+    for _ in range(5):
+        spread = regression.scatter(rows, members)
+        members = _nearest(told * distance2(rows, spread), h)
+    spread = spread / half_shrinkage(dimension, h / n)
+    lower, upper, shrinkage = trimming_limits(dimension)
     for _ in range(2):
         weights = trimming_weight(told * distance2(rows, spread), lower, upper)
         B, told = regression.fit(weights), regression.told(weights)
         rows = regression.residual(B)
-        freedom = (weights.sum() - 2) / weights.sum()
-        spread = _regular(scatter(rows, weights) / (shrinkage * freedom), metric)
-    return B, spread
+        spread = regression.scatter(rows, weights, shrinkage * (1 - 2 / weights.sum()))
+    return InitialFit(B, spread)
