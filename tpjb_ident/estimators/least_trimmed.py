@@ -102,11 +102,7 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Init
     fitted exactly, so it does not count.)
     """
     directions = len(np.unique(direction))
-    pairs = _start_pairs(direction, seed)
-    chosen = np.zeros((len(pairs), regression.n))
-    np.put_along_axis(chosen, pairs, 1.0, axis=1)
-    B = regression.fit(chosen)
-    seeds = B, regression.told(chosen) * distance2(regression.residual(B), regression.metric)
+    seeds = _first_fits(regression, _start_pairs(direction, seed))
     fits: list[InitialFit] = []
     for share in (0.5, _SMALL_CORE):
         weights, exact = _concentrated(regression, seeds, share, len(direction) / directions)
@@ -144,6 +140,14 @@ def _start_pairs(direction: IntArray, seed: int) -> IntArray:
 def _core_size(regression: Regression, share: float) -> int:
     """Windows in the core: what leaves `share` of them out when the fit passes through as many as it can."""
     return int(share * regression.n + 0.5 * (2 + regression.q + 1))
+
+
+def _first_fits(regression: Regression, pairs: IntArray) -> tuple[ComplexArray, FloatArray]:
+    """Fits through pairs of windows, and the windows' distances from them."""
+    chosen = np.zeros((len(pairs), regression.n))
+    np.put_along_axis(chosen, pairs, 1.0, axis=1)
+    B = regression.fit(chosen)
+    return B, regression.told(chosen) * distance2(regression.residual(B), regression.metric)
 
 
 def _concentrated(
