@@ -25,7 +25,7 @@ from tpjb_ident.results.quality import with_probe_doubts
 from tpjb_ident.runs.baseline import DryTest, dry_test
 from tpjb_ident.runs.checked_runs import check_finished
 from tpjb_ident.runs.finished_runs import FinishedRuns, excluded_runs, without_runs
-from tpjb_ident.runs.point_data import campaign_points
+from tpjb_ident.runs.point_data import gather
 from tpjb_ident.runs.run_jobs import Progress, all_runs
 from tpjb_ident.runs.run_store import RunStore
 from tpjb_ident.runtime.executors import Workers, map_ordered
@@ -148,7 +148,7 @@ def assemble(
     finished, checked = check_finished(campaign, finished)
     digests = finished.digests
     dry = dry or DryTest()
-    gathered = campaign_points(finished)
+    gathered = gather([digest.phasors for digest in digests], digests)
     report("estimating", 0, len(gathered))
     solved = solve_campaign(campaign, gathered, digests, workers, settings.correct, dry.stiffness)
     temperatures = {digest.run: digest.temperatures for digest in digests}

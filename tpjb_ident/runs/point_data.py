@@ -11,7 +11,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.run import Run
 from tpjb_ident.phasors.run_phasors import RunPhasors
-from tpjb_ident.runs.finished_runs import FinishedRuns, RunDigest
+from tpjb_ident.runs.finished_runs import RunDigest
 
 #: Samples from which a run's temperatures are taken.
 _TEMPERATURE_SAMPLES = 2**17
@@ -79,12 +79,6 @@ def gather(runs: list[RunPhasors], digests: Sequence[RunDigest] = ()) -> list[Po
         data = point_data(point, [(runs[k], i) for k, i in members])
         points.append(replace(data, digests=tuple(digests[k] for k, _ in members) if digests else ()))
     return points
-
-
-def campaign_points(finished: FinishedRuns) -> list[PointData]:
-    """Operating points of all runs of a campaign that can be used."""
-    digests = finished.digests
-    return gather([digest.phasors for digest in digests], digests)
 
 
 def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:

@@ -31,7 +31,7 @@ class RunStatus:
 
     run: Run
     state: State
-    findings: tuple[Finding, ...] = field(default=(), repr=False)
+    findings: tuple[Finding, ...] = field(default=(), repr=False)  #: the most urgent first
     landed: str = ""
     planned: bool = True
 
@@ -39,12 +39,6 @@ class RunStatus:
     def counts(self) -> bool:
         """Whether the test that it stands for is done."""
         return self.state in ("good", "look")
-
-    @property
-    def first(self) -> Problem | None:
-        """The gravest finding that has a say in the state."""
-        grave = [finding for finding in self.findings if _forces_repeat(finding)]
-        return (*grave, *self.findings)[0].problem if self.findings else None
 
 
 def judge_states(
@@ -60,17 +54,17 @@ def judge_states(
     for status in expected:
         found = seen.get(status.run.id)
         if status.state == "to run" and found is not None:
-            findings = sorted((f for f in found if id(f) not in shared), key=_gravity)
+            findings = sorted((f for f in found if id(f) not in shared), key=_urgency)
             grave = [finding for finding in findings if finding.problem.severity != "note"]
-            repeat = any(map(_forces_repeat, findings))
-            state: State = "repeat" if repeat else "look" if grave else "good"
+            state: State = "repeat" if any(map(_forces_repeat, findings)) else "look" if grave else "good"
             status = replace(status, state=state, findings=tuple(findings))
         states.append(status)
     return _replaced(states), common
 
 
-def _gravity(finding: Finding) -> int:
-    return SEVERITIES.index(finding.problem.severity)
+def _urgency(finding: Finding) -> tuple[bool, int]:
+    """What has a say in the state of a run comes first, then the gravest."""
+    return not _forces_repeat(finding), SEVERITIES.index(finding.problem.severity)
 
 
 def _forces_repeat(finding: Finding) -> bool:
@@ -198,10 +192,9 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
     """Runs to be made again: first what the rig stands at, then what takes another set-up."""
     steps: list[tuple[bool, Step]] = []
     for status in states:
-        problem, run = status.first, status.run
-        if status.state != "repeat" or problem is None:
+        if status.state != "repeat":
             continue
-        is_later = False
+        problem, run, is_later = status.findings[0].problem, status.run, False
         when = f"({described(run)})"
         if run.kind in _TURNING:
             is_later = at is not None and _set_up(run) != _set_up(at)
