@@ -10,6 +10,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.near_names import unknown_name
+from rigdata.units import to_si
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.estimators.mm import mm_fit, within_directions
@@ -74,6 +75,8 @@ def estimate_dynamic_stiffness(
     ------
     ArgumentError
         Shapes that do not fit, an unknown method or norm, omega not positive.
+    UnitError
+        A pint quantity of another dimension.
 
     Examples
     --------
@@ -87,13 +90,13 @@ def estimate_dynamic_stiffness(
         raise ArgumentError(unknown_name("method", method, METHODS))
     if norm is not None and method != "rlm":
         raise ArgumentError(f'norm={norm!r} belongs to method="rlm", not to {method!r}')
-    frequency = float(_si(omega, "rad/s", "omega"))
+    frequency = float(to_si(omega, "speed", "omega"))
     if not (np.isfinite(frequency) and frequency > 0):
         raise ArgumentError(f"omega must be a positive number of rad/s, got {omega}")
     instruments = None if reference is None else getattr(reference, "magnitude", reference)
     if method == "iv" and reference is None:
         raise ArgumentError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')
-    table = phasor_table(_si(D, "m", "D"), _si(F, "N", "F"), direction, instruments)
+    table = phasor_table(to_si(D, "length", "D"), to_si(F, "force", "F"), direction, instruments)
     return estimate_table(table, frequency, method, RlmSettings(norm or "huber"))
 
 
@@ -127,16 +130,6 @@ def estimate_table(
     if np.isnan(fit.dof).any() and len(table) > 2:
         fit = _with_scatter(windows, fit, _VARIANCE.get(method, 1.0))
     return _in_units(table, omega, name, fit)
-
-
-def _si(value: Any, unit: str, name: str) -> Any:
-    """Plain SI numbers as they are, pint quantities converted."""
-    if not (hasattr(value, "to") and hasattr(value, "magnitude")):
-        return value
-    try:
-        return value.to(unit).magnitude
-    except Exception as error:  # pint's own class depends on the registry the value came from
-        raise ArgumentError(f"{name} must be convertible to {unit}, got {value.units}") from error
 
 
 def _obstacle(table: PhasorTable, method: str) -> Condition | None:

@@ -13,18 +13,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rigdata.calibration import DIMENSIONS
+from rigdata.units import SI_UNITS
+
 if TYPE_CHECKING:
     from rigdata.run import Run
 
-#: Unit of each quantity after calibration.
-_UNITS = {
-    "displacement": "m",
-    "force": "N",
-    "acceleration": "m/s^2",
-    "temperature": "K",
-    "pressure": "Pa",
-    "speed": "rad/s",
-}
 #: Steps of the clock that differ by less than this share of the mean step count as one rate.
 _EVEN = 1e-3
 
@@ -47,13 +41,13 @@ def sep005(run: Run) -> list[dict[str, Any]]:
 
     signals = []
     for name, channel in run.channels.items():
-        if channel.quantity not in _UNITS:
+        if channel.quantity == "time" or channel.quantity not in DIMENSIONS:
             continue
         record = run.record(name)
         signal: dict[str, Any] = {
             "name": name,
             "data": record.values,
-            "unit_str": _UNITS[channel.quantity],
+            "unit_str": SI_UNITS[DIMENSIONS[channel.quantity]],
             "quantity": channel.quantity,
             "group": run.id,
         }

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from tpjb_ident.columns import amount, place_of
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
@@ -148,12 +149,12 @@ class Identification(Presented):
         """What somebody should read beside the numbers: each condition once, with the places where it was found."""
         remarks = [condition.sentence() for condition in self.conditions]
         places: dict[str, list[str]] = {}
-        flagged = [(p.point.static_load, f"{p.point.excitation_hz:g} Hz", p.quality) for p in self.points]
-        flagged += [(band.point.static_load, band.kind, band.quality) for band in self.bands if not band.points]
-        for load, at, quality in flagged:
+        flagged = [(place_of(p.point.static_load, p.point.excitation_hz), p.quality) for p in self.points]
+        for band in self.bands:
+            flagged += [] if band.points else [(f"{amount(band.point.static_load, 'load')}, {band.kind}", band.quality)]
+        for place, quality in flagged:
             for condition in quality:
-                sentence = f"{load / 1e3:g} kN, {at}: {condition.detail or 'found'}"
-                places.setdefault(str(condition), []).append(sentence)
+                places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
         for name, listed in places.items():
             count = len(listed) - 1
             more = f" (and at {count} more point{'s' if count > 1 else ''})" if count else ""

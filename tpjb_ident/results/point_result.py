@@ -9,6 +9,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
+from tpjb_ident.columns import place_of
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.linearity import AmplitudeSlope
@@ -88,8 +89,8 @@ class PointResult:
 
     def __str__(self) -> str:
         flags = f" ({', '.join(str(q) for q in self.quality)})" if self.quality else ""
-        at = f"{self.point.static_load / 1e3:g} kN, {self.point.excitation_hz:g} Hz"
-        return f"{at}: {self.stiffness.direct_coefficients()}{flags}"
+        place = place_of(self.point.static_load, self.point.excitation_hz)
+        return f"{place}: {self.stiffness.direct_coefficients()}{flags}"
 
     def __repr__(self) -> str:
         return f"<PointResult: {self}>"

@@ -14,6 +14,7 @@ from rigdata.arrays import ComplexArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.check.observation import Observation
+from tpjb_ident.columns import amount, place_of
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.line_means import FilmLines, film_lines, mains_lines
 from tpjb_ident.phasors.run_data import RunPhasors
@@ -92,9 +93,10 @@ def excluded_runs(
     """
     reasons = listed([f"{run.run} ({run.reason})" for run in excluded], _LISTED, "; ")
     lost = [run for run in excluded if not any(run.belongs(point, any_excitation) for point in points)]
-    places = [f"{run.point.static_load / 1e3:g} kN" for run in lost]
     if kind == "run":
-        places = [f"{place}, {run.point.excitation_hz:g} Hz" for place, run in zip(places, lost)]
+        places = [place_of(run.point.static_load, run.point.excitation_hz) for run in lost]
+    else:
+        places = [amount(run.point.static_load, "load") for run in lost]
     runs = listed([run.run for run in lost], _LISTED)
     return holding(
         (excluded, "runs-left-out", f"{len(excluded)} of {of} dynamic runs take no part: {reasons}"),

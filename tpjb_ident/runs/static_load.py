@@ -105,14 +105,19 @@ def _set_point(data: LoadCase) -> complex:
     return complex(data.point.static_load * np.exp(1j * data.point.static_load_direction))
 
 
+def _ratio(data: LoadCase, zero: complex) -> ComplexArray:
+    """Cells over set point of every run (n_runs,): size and direction; NaN without a load."""
+    set_point = _set_point(data)
+    return np.asarray((_measured(data) - zero) / set_point if set_point else _measured(data) * np.nan)
+
+
 def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[ComplexArray], complex]:
     """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation).
 
     The ratio is the mean of the runs about the half that agrees best; of two such halves the one nearer to the set
     points. Cells that show no static force have none: it is zero then.
     """
-    scales = [1 / set_point if set_point else np.nan for set_point in map(_set_point, points)]
-    ratios = [(_measured(data) - zero) * scale for data, scale in zip(points, scales)]
+    ratios = [_ratio(data, zero) for data in points]
     measured = np.concatenate(ratios)
     measured = measured[np.isfinite(measured)]
     common = _common_ratio(measured) if len(measured) else complex(1.0)
