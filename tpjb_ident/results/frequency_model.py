@@ -131,29 +131,31 @@ def fit_over_frequency(
     needed = MODELS[model] - 1
     if len(np.unique(omega)) < needed:
         raise ArgumentError(f"{model} needs {needed} frequencies with an answer, got {len(np.unique(omega))}")
-    # Natural scales keep the normal equations well conditioned: N/m, per omega, per omega^2.
+    # Natural scales keep the normal equations well conditioned: per omega, per omega^2.
     middle = float(np.sqrt(omega.min() * omega.max()))
-    size = float(np.mean([np.abs(e.h).max() for e in chosen]))
     design = over_frequency(model, np.zeros(len(chosen), dtype=np.intp), omega, np.array([middle])).columns
     assert design is not None
-    y = np.array([e.vector for e in chosen]) / size
-    weight = np.linalg.inv(np.array([e.covariance for e in chosen]) / size**2)
+    y, covariance = np.array([e.vector for e in chosen]), np.array([e.covariance for e in chosen])
+    weight = np.linalg.inv(covariance)
     weighted = design.transpose(0, 2, 1) @ weight
-    inverse = np.linalg.inv(np.einsum("nka,nal->kl", weighted, design))
+    inverse = np.linalg.inv((weighted @ design).sum(axis=0))
     scale = np.repeat(middle ** -np.arange(MODELS[model], dtype=float), 4)
     gains = scale[:, None] * (inverse @ weighted)  # (n, p, 8): change of the parameters with every estimate
     x = np.einsum("npa,na->p", gains, y)
     residual = y - design @ (x / scale)
     chi_square = float(np.einsum("na,nab,nb->", residual, weight, residual))
-    random = np.array([g @ e.covariance @ g.T for g, e in zip(gains, chosen)])
+    random = gains @ covariance @ gains.transpose(0, 2, 1)
     spare, noise_dof = 8 * len(chosen) - len(x), [float(np.median(e.dof)) for e in chosen]
     lengths = np.linalg.norm(residual, axis=1) / np.linalg.norm(y, axis=1)
+    shared = np.zeros((1, len(chosen), 8))
+    if changes is not None:
+        shared = changes.reshape(len(changes), -1, 8)[:, usable]
     return FrequencyModel(
         model,
-        size * x,
+        x,
         random.sum(axis=0),
         _effective_dof(np.einsum("npp->np", random), np.array(noise_dof)),
-        _shared(gains, chosen, None if changes is None else changes.reshape(len(changes), -1, 8)[:, usable]),
+        _systematic(gains, np.array([e.systematic for e in chosen]), shared),
         chi_square,
         spare,
         chance_of(chi_square, spare, noise_dof),
@@ -163,17 +165,16 @@ def fit_over_frequency(
     )
 
 
-def _shared(gains: FloatArray, estimates: Sequence[DynamicStiffness], changes: FloatArray | None) -> FloatArray:
-    """Covariance (p, p) that systematic errors leave; `gains` (n, p, 8), `changes` (q, n, 8) of what all share."""
-    if changes is None:
-        changes = np.zeros((1, len(estimates), 8))
+def _systematic(gains: FloatArray, systematic: FloatArray, changes: FloatArray) -> FloatArray:
+    """Covariance (p, p) that systematic errors (n, 8, 8) leave.
+
+    `gains` (n, p, 8), `changes` (q, n, 8): what every source does that all share.
+    """
     together = np.einsum("npa,qna->qp", gains, changes)
-    covariance = together.T @ together / len(changes)
-    for n, estimate in enumerate(estimates):
-        # what no source explains is the point's own: of its baseline, of mains on the cells
-        separate = estimate.systematic - changes[:, n].T @ changes[:, n] / len(changes)
-        covariance = covariance + gains[n] @ separate @ gains[n].T
-    return np.asarray(covariance)
+    # what no source explains is the point's own: of its baseline, of mains on the cells
+    separate = systematic - np.einsum("qna,qnb->nab", changes, changes) / len(changes)
+    single = (gains @ separate @ gains.transpose(0, 2, 1)).sum(axis=0)
+    return np.asarray(together.T @ together / len(changes) + single)
 
 
 def _effective_dof(variances: FloatArray, dof: FloatArray) -> FloatArray:

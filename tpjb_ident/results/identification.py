@@ -16,6 +16,7 @@ from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.presentation import Presented
 from tpjb_ident.results.frequency_model import MODEL_COLUMNS, StaticFits, fits_over_frequency
 from tpjb_ident.results.point_result import PointResult, quality_cell
+from tpjb_ident.rounding import counted
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
@@ -156,8 +157,7 @@ class Identification(Presented):
             for condition in quality:
                 places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
         for name, listed in places.items():
-            count = len(listed) - 1
-            more = f" (and at {count} more point{'s' if count > 1 else ''})" if count else ""
+            more = f" (and at {counted(len(listed) - 1, 'more point')})" if listed[1:] else ""
             remarks.append(f"{name} at {listed[0]}{more}")
         return tuple(remarks)
 
