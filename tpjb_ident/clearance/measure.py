@@ -247,23 +247,19 @@ def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple
     first, second = probes
     axes = (float(first.axis or 0.0), float(second.axis or 0.0))
     ratio, se = gain_ratio(polygon.angles, polygon.fitted_angle - polygon.angles, polygon.fitted_angle_se, axes)
-    if not abs(ratio) > max(_UNEQUAL, _GAIN_ERRORS * se):
-        return ()
     share = f"{100 * abs(ratio):.1f} % (se {100 * se:.1f} %)"
     more = "more" if ratio > 0 else "less"
     detail = f"the sides stand as if {first.name} read {share} {more} than {second.name}"
-    return (Condition("probe-gains-differ", detail),)
+    return holding((abs(ratio) > max(_UNEQUAL, _GAIN_ERRORS * se), "probe-gains-differ", detail))
 
 
 def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Condition, ...]:
     """The push lies outside what the dry tests measured: true of most sweeps, and to be said."""
     outside = [c for c in curves or () if bool(c.is_extrapolated(push))]
-    if not outside:
-        return ()
-    lowest = min(c.valid_from for c in outside)
+    lowest = min((c.valid_from for c in outside), default=0.0)
     pads = "all pads" if len(outside) == len(curves or ()) else "pads " + ", ".join(f"#{c.pad}" for c in outside)
     detail = f"pushed with {push:.0f} N, the dry tests of {pads} hold from {lowest:.0f} N on; the sweep corrects it"
-    return (Condition("give-extrapolated", detail),)
+    return holding((outside, "give-extrapolated", detail))
 
 
 def _mean_temperature(run: Run) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.near_names import unknown_name
 from rigdata.units import to_si
-from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.conditions import Condition, holding, merged
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.estimators.mm import mm_fit, within_directions
 from tpjb_ident.estimators.r_matrix import (
@@ -116,11 +116,11 @@ def estimate_table(
         raise ArgumentError(unknown_name("method", method, METHODS))
     settings = replace(rlm_settings or RlmSettings(), quick=reference is not None)
     name = f"rlm:{settings.norm}" if method == "rlm" else method
-    obstacle = _obstacle(table, method)
-    if obstacle is not None:
+    obstacles = _obstacles(table, method)
+    if obstacles:
         nothing, condition = np.full((8, 8), np.nan), displacement_condition(table.D)
         none, weights = np.full((2, 2), np.nan + 0j), np.zeros((len(table.valid), 2))
-        return DynamicStiffness(none, omega, nothing, nothing[0], name, weights, (obstacle,), condition)
+        return DynamicStiffness(none, omega, nothing, nothing[0], name, weights, obstacles[:1], condition)
     fit, windows = (_exact(table), table) if len(table) == 2 else SOLVERS[method](table, settings)
     if reference is not None:
         covariance = _VARIANCE.get(method, 1.0) * reference.covariance
@@ -132,18 +132,18 @@ def estimate_table(
     return _in_units(table, omega, name, fit)
 
 
-def _obstacle(table: PhasorTable, method: str) -> Condition | None:
-    if len(table) < 2 or table.n_directions < 2:
-        return Condition(
-            "fewer-than-two-directions",
-            f"{len(table)} usable windows in {table.n_directions} directions; H needs two directions at least",
-        )
-    if not np.isfinite(displacement_condition(table.D)):
-        return Condition("fewer-than-two-directions", "all displacements are collinear: H needs two directions in them")
-    if method == "iv" and table.reference is None:
-        text = "instruments are missing: the runs do not state two excitation directions"
-        return Condition("no-reference", text)
-    return None
+def _obstacles(table: PhasorTable, method: str) -> tuple[Condition, ...]:
+    """Why a table gives no H, the first reason first."""
+    few = len(table) < 2 or table.n_directions < 2
+    count = f"{len(table)} usable windows in {table.n_directions} directions; H needs two directions at least"
+    is_line = not np.isfinite(displacement_condition(table.D))
+    line = "all displacements are collinear: H needs two directions in them"
+    missing = "instruments are missing: the runs do not state two excitation directions"
+    return holding(
+        (few, "fewer-than-two-directions", count),
+        (is_line and not few, "fewer-than-two-directions", line),
+        (method == "iv" and table.reference is None, "no-reference", missing),
+    )
 
 
 def _exact(table: PhasorTable) -> TableFit:
@@ -219,7 +219,7 @@ def _in_units(table: PhasorTable, omega: float, name: str, fit: TableFit) -> Dyn
         fit.dof,
         name,
         all_weights,
-        merged(fit.conditions, tuple(fit_conditions(condition, joint, used))),
+        merged(fit.conditions, fit_conditions(condition, joint, used)),
         condition,
         fit.chi_square,
         4 * (used - 2),
@@ -227,20 +227,17 @@ def _in_units(table: PhasorTable, omega: float, name: str, fit: TableFit) -> Dyn
     )
 
 
-def fit_conditions(condition: float, weights: FloatArray, directions: int) -> list[Condition]:
+def fit_conditions(condition: float, weights: FloatArray, directions: int) -> tuple[Condition, ...]:
     """What the windows of a fit say of it: condition number of their displacements, weights, directions."""
-    conditions = []
-    if condition > _MAX_CONDITION:
-        text = f"condition number {condition:.3g} of the displacement directions > 30"
-        conditions.append(Condition("ill-conditioned", text))
     rejected = float((weights < REJECTED_WEIGHT).mean()) if len(weights) else 0.0
-    if rejected > _MAX_REJECTED:
-        text = f"{100 * rejected:.0f} % of the windows got no weight (limit 40 %)"
-        conditions.append(Condition("many-windows-rejected", text))
-    if directions == 2:
-        text = "two directions only: the interval cannot see what runs differ by, only their repeats"
-        conditions.append(Condition("no-spare-direction", text))
-    return conditions
+    number = f"condition number {condition:.3g} of the displacement directions > 30"
+    lost = f"{100 * rejected:.0f} % of the windows got no weight (limit 40 %)"
+    two = "two directions only: the interval cannot see what runs differ by, only their repeats"
+    return holding(
+        (condition > _MAX_CONDITION, "ill-conditioned", number),
+        (rejected > _MAX_REJECTED, "many-windows-rejected", lost),
+        (directions == 2, "no-spare-direction", two),
+    )
 
 
 #: What solves Eq. (15) by each method, with the windows whose scatter tells how well: a new estimator is a line here.

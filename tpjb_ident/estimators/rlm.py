@@ -20,7 +20,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.errors import ArgumentError, TpjbError
 from tpjb_ident.estimate.statistics import bisquare_weight, huber_weight, reweighted
 from tpjb_ident.estimators.r_matrix import TableFit, real_rows
@@ -84,13 +84,13 @@ def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | 
         fit = RlmSolution(*reweighted(design, response, lambda u: weight(u, threshold), None, tolerance, most))
     else:
         fit = _statsmodels(design, response, settings)
-    if fit.iterations >= settings.max_iterations:
-        stopped = Condition("iteration-limit", f"RLM stopped after {fit.iterations} iterations")
-        fit = replace(fit, conditions=(stopped,))
-    if not fit.scale > 1e-14 * float(np.abs(response).max(initial=0.0)):
-        exact = Condition("zero-scale", "more than half of the rows fit exactly; no standard errors exist")
-        fit = replace(fit, conditions=(*fit.conditions, exact))
-    return fit
+    stopped, exact = fit.iterations >= settings.max_iterations, "more than half of the rows fit exactly"
+    is_exact = not fit.scale > 1e-14 * float(np.abs(response).max(initial=0.0))
+    conditions = holding(
+        (stopped, "iteration-limit", f"RLM stopped after {fit.iterations} iterations"),
+        (is_exact, "zero-scale", f"{exact}; no standard errors exist"),
+    )
+    return replace(fit, conditions=conditions)
 
 
 def _statsmodels(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RlmSolution:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.scatter import Scatter
@@ -59,10 +59,8 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
 
 def not_locked(wandering: int, directions: int) -> tuple[Condition, ...]:
     """Say in how many directions the drive's phase wanders."""
-    if not wandering:
-        return ()
     text = f"drive phase wanders in {wandering} of {directions} directions; their windows were turned to one phase"
-    return (Condition("drive-not-locked", text),)
+    return holding((wandering, "drive-not-locked", text))
 
 
 def _blocks(means: WindowMeans) -> Blocks:

@@ -120,10 +120,9 @@ def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, 
     beginning, driven = beginning_of(cached), phasors.lines.driven
     observations = []
     for line, frequency in enumerate(driven):
-        alone = len(driven) == 1
-        point = replace(run.point, excitation=2 * np.pi * frequency) if alone else point_of(run.point, frequency)
+        point = replace(run.point, excitation=2 * np.pi * frequency)
         observed = observe(replace(beginning, point=point), phasors, line)
-        line_run = run if alone else replace(run, point=point)
+        line_run = run if len(driven) == 1 else replace(run, point=point_of(run.point, frequency))
         report = Reporter(line_run, observed.report.findings, observed.report.doubts)
         observations.append(replace(observed, run=line_run, report=report))
     return tuple(observations)
