@@ -46,7 +46,9 @@ def all_runs(
     progress(runs[0].id if runs else "", 0, len(runs))
     jobs = []
     for run in runs:  # workers may stand in another folder
-        reader: Any = replace(run.reader, path=run.reader.path.absolute())
+        reader: Any = run.reader
+        if not reader.path.is_absolute():
+            reader = replace(reader, path=reader.path.absolute())
         stored = None if store is None else store.known(run.id)
         jobs.append((replace(run, reader=reader), mass, settings, stored))
     finished: dict[int, RunDigest | ExcludedRun] = {}
