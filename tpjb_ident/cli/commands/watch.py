@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -46,7 +47,7 @@ def watch(
     c.doing(f"watching {folder}; the page: {c.target / 'watch.html'}")
     latest: Snapshot | None = None
     printed: set[str] = set()
-    until = time.monotonic() + 2.0 * patience
+    until = math.inf
     try:
         while True:
             snapshot = watcher.look()
@@ -62,6 +63,7 @@ def watch(
                 latest = snapshot
             if once and (not watcher.waits or time.monotonic() > until):
                 break
+            until = min(until, time.monotonic() + 2.0 * patience)  # from the first look on, however long it took
             time.sleep(min(pause, 0.25 * patience) if once else pause)
     except KeyboardInterrupt:
         heard()
