@@ -1,18 +1,18 @@
-"""The keys of a manifest: one line each, from which it is read, drafted by `tpjb init` and documented."""
+"""The keys of a manifest by `keys.toml`, from which it is read, drafted by `tpjb init` and documented."""
 
 from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 from typing import Any
 
-from rigdata.calibration import DIMENSIONS, UNCALIBRATED
 from rigdata.near_names import hint
-from rigdata.operating_point import ROTATIONS
 from rigdata.problem import Problem, Severity, shown
 from rigdata.units import UnitError, parse_quantity
 
@@ -28,11 +28,6 @@ TextFile = Callable[[str, str], str]
 #: Frequencies of the mains in any country [Hz].
 MAINS_FREQUENCIES = (50.0, 60.0)
 SCHEMA = "tpjb-rig/1"
-_QUANTITIES = (*DIMENSIONS, *UNCALIBRATED, "ignore")
-KINDS = ("dynamic", "dry_pivot", "locus", "clearance", "baseline")
-#: How a dynamic run is excited.
-_EXCITATIONS = ("sine", "multisine", "sweep", "random", "impact")
-_BRANCHES = ("up", "down", "cycle")
 
 #: Kinds that are not read key by key: what they mean hangs on the quantity, or they hold more than one value.
 _RAW = ("table", "tables", "calibration")
@@ -47,11 +42,11 @@ class Field:
     key: str
     #: A dimension of `rigdata.units`, "text", "choice", "whole" (number), "sign", "list" (of texts), or one of `_RAW`.
     kind: str
-    meaning: str
-    example: str
+    meaning: str = ""
+    example: str = ""
     default: Any = None
     required: bool = False
-    choices: tuple[Any, ...] = ()
+    choices: Sequence[Any] = ()
     low: float = -math.inf  #: bounds in SI: from, to; `above` and `below` exclude their ends
     high: float = math.inf
     above: float = -math.inf
@@ -99,104 +94,15 @@ class Field:
         return f"Write it like {self.key} = {self.example}{bound}"
 
 
-TOP = (
-    Field("schema", "choice", "name of the format", '"tpjb-rig/1"', required=True, choices=(SCHEMA,)),
-    Field("id", "text", "name of the campaign", '"rocker-A"', "", required=True),
-    Field("bearing", "text", "bearing file in the folder; HDF5: root attribute", '"rocker.toml"', "", required=True),
-    Field("description", "text", "free text", '"after overhaul"', default=""),
-    Field("date", "text", "when it was measured", '"2026-03-12"', default=""),
-    Field("by", "text", "laboratory and person", '"TU Chemnitz, K. Sato"', default=""),
-    *(Field(key, "table", "", "") for key in ("shaft", "housing", "acquisition", "csv", "channels", "runs")),
-)
-SHAFT = (Field("rotation", "choice", "sense of turning", '"clockwise"', default=ROTATIONS[0], choices=ROTATIONS),)
-HOUSING = (
-    Field("mass", "mass", "stator mass between oil film and load cells", '"30 kg"', default=math.nan, low=0.0),
-    Field("mass_uncertainty", "mass", "of the mass", '"0.5 kg"', default=0.0, low=0.0),
-    Field(
-        "mount",
-        "choice",
-        "on its load cells, or hung on stingers; else found in the records",
-        '"floating"',
-        choices=("floating", "cells"),
-    ),
-)
-ACQUISITION = (
-    Field("sample_rate", "frequency", "where the records hold no times", '"2 kHz"', above=0.0),
-    Field(
-        "mains",
-        "frequency",
-        "50 or 60 Hz; else found in the records",
-        '"60 Hz"',
-        choices=MAINS_FREQUENCIES,
-        remedy='Give "50 Hz" or "60 Hz"',
-    ),
-)
-CSV = (
-    Field("delimiter", "text", 'one character, or "tab"', '";"'),
-    Field("decimal", "text", ". or ,", '","', choices=(".", ",")),
-    Field("encoding", "text", "of the text", '"cp1252"'),
-    Field("header_line", "whole", "line of the column names, from 1", "7", low=1, high=1e7),
-    Field("units_line", "whole", "line of the units", "8", low=1, high=1e7),
-    Field("names", "list", "of the columns, where the files name none", '["time", "X1A"]'),
-)
-CHANNEL = (
-    Field("like", "text", "a sensor of the same type: its entries but axis, pad and position", '"L1H"'),
-    Field("quantity", "choice", "what the column holds", '"displacement"', required=True, choices=_QUANTITIES),
-    Field("axis", "angle", "direction of the positive quantity, counter-clockwise from +X", '"45 deg"'),
-    Field("unit", "text", "of the readings; V, mA, mV/V, or an engineering unit if already converted", '"V"'),
-    Field("sensitivity", "calibration", "reading per quantity; of a bridge: mV/V at full scale", '"7.78 mV/um"'),
-    Field("full_scale", "calibration", "of a bridge", '"20 kN"'),
-    Field("excitation", "calibration", "supply of a bridge", '"5 V"'),
-    Field(
-        "polarity", "sign", "-1: the reading falls as the quantity grows (eddy-current probes)", "-1",
-        default=1, choices=(1, -1), remedy="Give 1 or -1, without quotes",
-    ),
-    Field("zero", "calibration", "value at reading zero", '"0 degC"'),
-    Field("pad", "whole", "number of the pad with the sensor", "1", low=1, high=100),
-    Field(
-        "position", "ratio", "fraction of the arc from the leading edge", "0.75",
-        low=0.0, high=1.0, remedy="It is the fraction of the arc, 0 to 1",
-    ),
-    Field(
-        "uncertainty", "ratio", "of the calibration", '"1 %"',
-        low=0.0, below=1.0, remedy='Give e.g. "1 %", below 100 %',
-    ),
-    Field("axis_uncertainty", "angle", "of the axis", '"0.5 deg"', default=0.0, low=0.0),
-    Field("zero_uncertainty", "calibration", "of the zero", '"50 N"', default=0.0, low=0.0),
-    Field(
-        "delay", "time", "recorded later than the others by this; taken out", '"0.2 ms"', default=0.0,
-        low=-10.0, high=10.0, remedy="It must be below 10 s",
-    ),
-    Field("delay_uncertainty", "time", "shared by channels of a clock or quantity", '"0.02 ms"', default=0.0, low=0.0),
-    Field("filter", "text", "bessel or butterworth, order, low or high, corner; taken out", '"bessel 4 low 800 Hz"'),
-    Field("filter_table", "text", "file of the measured response: frequency_Hz, gain, phase_deg", '"l1h.csv"'),
-    Field("clock", "text", "channels recorded by one device share a letter", '"B"', default=""),
-    Field("sample_rate", "frequency", "of a device without times of its own", '"500 Hz"', above=0.0),
-    Field("plane", "length", "axial distance from the film's middle; two planes at most", '"12 mm"', default=0.0),
-    Field("temperature_coefficient", "per kelvin", "change of the gain; taken out", '"-0.02 %/K"', default=0.0),
-    Field("temperature_coefficient_uncertainty", "per kelvin", "of that", '"0.01 %/K"', default=0.0, low=0.0),
-    Field("temperature_reference", "temperature", "of the gain; else the runs' mean", '"20 degC"', low=0.0),
-    Field("for", "tables", "other entries for some runs: `[[channels.NAME.for]]`", 'runs = ["p-*"]'),
-)  # fmt: skip
-#: Of one entry of `for`, besides all keys of a channel that it changes.
-RUNS_OF = Field("runs", "list", "ids of runs; * stands for any characters", '["p-*", "c-1"]', required=True)
-RUN = (
-    Field("id", "text", "name of the run", '"d-05000-25-03"', required=True),
-    Field("file", "text", "record in the folder; HDF5: the group /runs/ID", '"runs/d-05000-25-03.csv"', default=""),
-    Field("kind", "choice", "what was done", '"dynamic"', required=True, choices=KINDS),
-    Field("shaft_speed", "speed", "of the shaft, set point", '"22 Hz"', default=0.0, low=0.0),
-    Field("static_load", "force", "set point, per bearing", '"5 kN"', default=0.0, low=0.0),
-    Field("static_load_direction", "angle", "where it pushes the shaft; down is -90 deg", '"-90 deg"', -math.pi / 2),
-    Field("excitation_frequency", "speed", "of a sine", '"25 Hz"', default=0.0, above=0.0),
-    Field("excitation_direction", "angle", "of the force", '"54 deg"'),
-    Field("excitation", "choice", "its course in time", '"sweep"', default="sine", choices=_EXCITATIONS),
-    Field("excitation_band", "text", "in place of the frequency, where it is no sine", '"5..120 Hz"'),
-    Field("pad", "whole", "number of the pad that a dry test loads, without quotes", "1", low=1, high=100),
-    Field("branch", "choice", "of a dry test's load", '"cycle"', default="up", choices=_BRANCHES),
-    Field("sample_rate", "frequency", "of this run", '"500 Hz"', above=0.0),
-    Field("rotation", "choice", "of this run; default the shaft's", '"clockwise"', choices=ROTATIONS),
-    Field("temperature", "temperature", "at the probes; else the mean of the thermometers", '"46 degC"', low=0.0),
-)
+def _tables() -> dict[str, tuple[Field, ...]]:
+    """Keys by the tables that they are of."""
+    listed = tomllib.loads(FilePath(__file__).with_name("keys.toml").read_text(encoding="utf-8"))
+    return {table: tuple(Field(key, **entry) for key, entry in keys.items()) for table, keys in listed.items()}
+
+
+#: `RUNS_OF` is of one entry of `for`, besides all keys of a channel that it changes.
+TOP, SHAFT, HOUSING, ACQUISITION, CSV, CHANNEL, (RUNS_OF,), RUN = _tables().values()
+KINDS = next(tuple(field.choices) for field in RUN if field.key == "kind")
 
 
 def open_paths(data: object, path: Path = ()) -> list[Path]:
