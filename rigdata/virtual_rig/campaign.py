@@ -98,7 +98,7 @@ def _written_records(rig: VirtualRig, facts: dict[str, dict[str, object]], progr
 def _stored(record: SimulatedRun, rig: VirtualRig, layout: Layout) -> _Columns:
     """Columns of a record as its file holds them, times first, with the faults of the file."""
     readings, run = record.readings, record.run.id
-    columns: _Columns = [] if layout.time_name is None else [(layout.time_name, readings.time)]
+    columns: _Columns = [] if not layout.time_name else [(layout.time_name, readings.time)]
     doubled: _Columns = []
     for name, values in readings.columns.items():
         kinds = rig.fault_kinds(run, name)

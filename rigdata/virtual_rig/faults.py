@@ -6,46 +6,16 @@ after the converter), a run (the test was done or noted wrongly) and a file.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from fnmatch import fnmatchcase
 from math import inf
-from typing import Literal
 
 from rigdata.near_names import unknown_name
-from rigdata.virtual_rig.truth import VirtualRigError
+from rigdata.virtual_rig.truth import PAPER_RIG, VirtualRigError
 
-Place = Literal["sensor", "record", "run", "file"]
-
-#: Where each kind sits, what it needs of the fault (or of the layout), and what it does.
-KINDS: dict[str, tuple[Place, str, str]] = {
-    "scaled": ("sensor", "channel value", "readings are `value` times the truth"),
-    "delayed": ("sensor", "channel value", "recorded `value` seconds late"),
-    "rotated": ("sensor", "channel value", "the sensor is `value` rad off its stated axis"),
-    "offset": ("sensor", "channel value", "`value` (SI) is added"),
-    "crosstalk": ("sensor", "channel value", "also reads this fraction `value` of the other axis"),
-    "dead": ("record", "channel", "reads `value` (default 0) all the time"),
-    "stuck": ("record", "channel", "from `start` on, for `length`, the reading does not change"),
-    "clipped": ("record", "channel", "saturates at `value` (default 0.6) of its excursion about the middle"),
-    "swapped": ("record", "channel other", "exchanged with the channel `other`"),
-    "inverted": ("record", "channel", "wired the wrong way round: the reading has the wrong sign"),
-    "nan_gap": ("record", "channel", "no value from `start` for `length`"),
-    "glitch": ("record", "channel value", "is off by `value` (SI) from `start` for `length`"),
-    "time_gap": ("record", "", "rows from `start` for `length` are missing in all channels"),
-    "time_jitter": ("record", "times", "time stamps scatter by `value` (default 0.2) of a sample"),
-    "missing_excitation": ("run", "", "the actuators were off"),
-    "duplicate_run": ("run", "other", "the record is that of the run `other`"),
-    "wrong_pad": ("run", "value", "the manifest names pad `value`"),
-    "wrong_direction": ("run", "value", "the manifest's direction is off by `value` rad"),
-    "wrong_frequency": ("run", "value", "the manifest's excitation frequency is off by `value` Hz"),
-    "wrong_load": ("run", "value", "the manifest's static load is `value` times the truth"),
-    "missing_channel": ("file", "channel", "the file lacks the channel"),
-    "duplicate_column": ("file", "channel CsvLayout", "the column is there twice"),
-    "truncated_line": ("file", "CsvLayout", "the last line ends in the middle"),
-    "short_channel": ("file", "channel Hdf5Layout", "the dataset is shorter than the others"),
-    "missing_file": ("file", "", "the run's file or group is not there"),
-    "empty_file": ("file", "", "the run's file holds no samples"),
-}
+#: Where each kind sits, what it needs of the fault or of the layout, and what it does.
+KINDS = PAPER_RIG["faults"]
 
 
 @dataclass(frozen=True)
@@ -65,17 +35,17 @@ class Fault:
             raise VirtualRigError(unknown_name("fault", self.kind, KINDS))
         for name in self.needs:
             if getattr(self, name, self) is None:
-                raise VirtualRigError(f"fault {self.kind!r} needs {name}: {KINDS[self.kind][2]}")
+                raise VirtualRigError(f"fault {self.kind!r} needs {name}: {KINDS[self.kind]['does']}")
 
     @property
-    def needs(self) -> list[str]:
+    def needs(self) -> tuple[str, ...]:
         """What its kind needs: fields of its own, a kind of layout, or times in the files."""
-        return KINDS[self.kind][1].split()
+        return tuple(KINDS[self.kind]["needs"])
 
     @property
-    def place(self) -> Place:
-        """Where it sits."""
-        return KINDS[self.kind][0]
+    def place(self) -> str:
+        """Where it sits: "sensor", "record", "run" or "file"."""
+        return str(KINDS[self.kind]["place"])
 
     def stated(self) -> dict[str, object]:
         """Its entries that say something; an open end is not a JSON number."""
@@ -94,9 +64,8 @@ class Fault:
         return self.channel is None or fnmatchcase(channel, self.channel)
 
 
-def check_faults(faults: Iterable[Fault], runs: Iterable[str], channels: Iterable[str]) -> None:
+def check_faults(faults: Iterable[Fault], runs: Sequence[str], channels: Sequence[str]) -> None:
     """Refuse faults that would strike nothing: a campaign must hold what was asked for."""
-    runs, channels = list(runs), list(channels)
     for fault in faults:
         for name, pattern, names in (("run", fault.run, runs), ("channel", fault.channel or "*", channels)):
             if not any(fnmatchcase(candidate, pattern) for candidate in names):

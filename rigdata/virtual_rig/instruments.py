@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import radians
+from typing import Any
 
 import numpy as np
 
 from rigdata.vector import directions
-from rigdata.virtual_rig.truth import VirtualRigError, hz
+from rigdata.virtual_rig.truth import PAPER_RIG
 
-_STANDARD_GRAVITY = 9.80665
 #: Full scales that cells are sold with [N].
 _CELL_SIZES = (20e3, 50e3, 100e3, 200e3, 500e3)
 #: Quantity and entry of `SensorError` of every effect that acts on readings.
@@ -57,34 +57,9 @@ class Sensor:
     error: SensorError = SensorError()
 
     @classmethod
-    def probe(cls, name: str, axis: float, gap_voltage: float = 8.0) -> Sensor:
-        """Eddy-current probe of 7.78 mV/um: the reading falls as the shaft comes nearer."""
-        stated = {"sensitivity": "7.78 mV/um"}
-        return cls(name, "displacement", "V", 7.78e3, axis, -1, gap_voltage, calibration=stated, uncertainty=0.005)
-
-    @classmethod
-    def load_cell(cls, name: str, axis: float, load: float = 0.0) -> Sensor:
-        """Strain-gauge cell in a bridge: 2 mV/V at full scale, supplied with 5 V; 20 kN, or more for a `load` [N]."""
-        full_scale = next((size for size in _CELL_SIZES if size >= 1.5 * load), 1.5 * load)
-        stated = {"sensitivity": "2.0 mV/V", "full_scale": f"{full_scale / 1e3:g} kN", "excitation": "5 V"}
-        return cls(name, "force", "mV", 10.0 / full_scale, axis, calibration=stated, uncertainty=0.002)
-
-    @classmethod
-    def accelerometer(cls, name: str, axis: float) -> Sensor:
-        """Accelerometer of 10 mV/g on a converter of 0.05 V."""
-        scale = 10.0 * 1e-3 / _STANDARD_GRAVITY
-        return cls(name, "acceleration", "V", scale, axis, span=0.05, calibration={"sensitivity": "10 mV/g"})
-
-    @classmethod
-    def thermometer(cls, name: str, pad: int) -> Sensor:
-        """Pt100 with its amplifier, at three quarters of a pad's arc."""
-        stated = {"sensitivity": "15 K/V", "zero": "0 degC"}
-        return cls(name, "temperature", "V", 1 / 15.0, calibration=stated, pad=pad, position=0.75)
-
-    @classmethod
-    def tachometer(cls, name: str) -> Sensor:
-        """Speed as a voltage."""
-        return cls(name, "speed", "V", 0.1 / hz(1.0), calibration={"sensitivity": "100 mV/Hz"})
+    def of_type(cls, kind: str, name: str, **entries: Any) -> Sensor:
+        """A sensor of the paper's rig, with entries of its own."""
+        return cls(name, **PAPER_RIG["sensors"][kind] | entries)
 
     def with_error(self, **changes: float) -> Sensor:
         """Return the sensor with these errors on top of its own: a gain multiplies, all else adds."""
@@ -96,9 +71,7 @@ class Sensor:
 
     def direction(self, stated: bool = False) -> np.ndarray:
         """Unit vector (2,) along which it really reads, or is stated to read."""
-        if self.axis is None:
-            raise VirtualRigError(f"channel {self.name} has no axis")
-        return directions(self.axis + (0.0 if stated else self.error.angle))
+        return directions((self.axis or 0.0) + (0.0 if stated else self.error.angle))
 
 
 @dataclass(frozen=True)
@@ -110,16 +83,6 @@ class Instruments:
     housing_mass_error: float = 0.0
     cell_stiffness: tuple[float, float] = (4e8, 6e8)
 
-    def __post_init__(self) -> None:
-        names = [sensor.name for sensor in self.sensors]
-        if len(set(names)) < len(names):
-            raise VirtualRigError(f"channel names must differ, got {names}")
-        for quantity in ("displacement", "force", "acceleration"):
-            if len(self.of(quantity)) % 2:
-                raise VirtualRigError(f"{quantity} sensors must come in pairs")
-        if self.true_mass < 0 or min(self.cell_stiffness) <= 0:
-            raise VirtualRigError("the housing's true mass and cell_stiffness must not be negative")
-
     @classmethod
     def like_paper(cls, n_pads: int = 5, seed: int | None = None, load: float = 0.0) -> Instruments:
         """Two probes at 45 and 135 deg, cells (for a `load` [N]) and accelerometers at 0 and 90 deg, Pt100s, a tacho.
@@ -128,22 +91,22 @@ class Instruments:
         are at 8 V and everything else is at zero.
         """
         rng, share = np.random.default_rng([seed or 0, 0]), 0.0 if seed is None else 1.0
-        gaps = (8.0 + share * rng.normal(0.0, 0.2, 2)).tolist()
-        gravity, pt100 = ((share * rng.normal(0.0, size, n) + 0.0).tolist() for size, n in ((1.5, 2), (0.2, n_pads)))
-        quarter = radians(90.0)
-        thermometers = [Sensor.thermometer(f"T{i + 1}", i + 1).with_error(offset=zero) for i, zero in enumerate(pt100)]
-        return cls(
-            (
-                Sensor.probe("X1A", radians(45.0), gaps[0]),
-                Sensor.probe("X1B", radians(135.0), gaps[1]),
-                Sensor.load_cell("L1H", 0.0, load),
-                Sensor.load_cell("L1V", quarter, load),
-                Sensor.accelerometer("A1H", 0.0).with_error(offset=gravity[0]),
-                Sensor.accelerometer("A1V", quarter).with_error(offset=gravity[1]),
-                *thermometers,
-                Sensor.tachometer("K1"),
-            )
-        )
+        gaps = 8.0 + share * rng.normal(0.0, 0.2, 2)
+        gravity, pt100 = (share * rng.normal(0.0, size, count) + 0.0 for size, count in ((1.5, 2), (0.2, n_pads)))
+        full_scale = next((size for size in _CELL_SIZES if size >= 1.5 * load), 1.5 * load)
+        stated = {"sensitivity": "2.0 mV/V", "full_scale": f"{full_scale / 1e3:g} kN", "excitation": "5 V"}
+        cell = {"scale": 10.0 / full_scale, "calibration": stated}
+        sensors: list[Sensor] = []
+        for name, degrees, gap in zip(("X1A", "X1B"), (45.0, 135.0), gaps.tolist(), strict=True):
+            sensors.append(Sensor.of_type("probe", name, axis=radians(degrees), zero=gap))
+        for name, degrees in (("L1H", 0.0), ("L1V", 90.0)):
+            sensors.append(Sensor.of_type("cell", name, axis=radians(degrees), **cell))
+        for name, degrees, zero in zip(("A1H", "A1V"), (0.0, 90.0), gravity.tolist(), strict=True):
+            error = SensorError(offset=zero)
+            sensors.append(Sensor.of_type("accelerometer", name, axis=radians(degrees), error=error))
+        for pad, zero in enumerate(pt100.tolist(), 1):
+            sensors.append(Sensor.of_type("thermometer", f"T{pad}", pad=pad, error=SensorError(offset=zero)))
+        return cls((*sensors, Sensor.of_type("tachometer", "K1")))
 
     @property
     def true_mass(self) -> float:
@@ -156,10 +119,7 @@ class Instruments:
 
     def named(self, name: str) -> Sensor:
         """Look up one sensor by its channel name."""
-        for sensor in self.sensors:
-            if sensor.name == name:
-                return sensor
-        raise VirtualRigError(f"no channel {name!r}; there are {[s.name for s in self.sensors]}")
+        return next(sensor for sensor in self.sensors if sensor.name == name)
 
     def gap_voltages(self) -> dict[str, float]:
         """Reading of every probe with the shaft in the bearing centre."""

@@ -11,7 +11,7 @@ from rigdata.operating_point import ROTATIONS
 from rigdata.virtual_rig.faults import Fault
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.plan import DryTest, PlannedRun
-from rigdata.virtual_rig.truth import VirtualRigError, hz
+from rigdata.virtual_rig.truth import PAPER_RIG, VirtualRigError, hz
 
 
 @dataclass(frozen=True)
@@ -24,58 +24,24 @@ class CsvLayout:
     newline: str = "\n"
     preamble: tuple[str, ...] = ()
     units_line: bool = False
-    time_name: str | None = "time"
+    time_name: str = "time"  #: "" where times are counted
     missing: str = ""
     trailing_delimiter: bool = False
     blank_last_lines: int = 0
     declared: bool = True
-
-    def __post_init__(self) -> None:
-        if len(self.delimiter) != 1 or self.decimal not in ".," or self.delimiter == self.decimal:
-            raise VirtualRigError("delimiter must be one character, decimal '.' or ',', and the two must differ")
 
 
 @dataclass(frozen=True)
 class Hdf5Layout:
     """One HDF5 file, a group per run, a dataset per channel."""
 
-    time_name: str | None = None
+    time_name: str = ""
 
 
 Layout = CsvLayout | Hdf5Layout
 
-_LAYOUTS: dict[str, Layout] = {
-    "hdf5": Hdf5Layout(),
-    "csv": CsvLayout(),
-    "csv-german": CsvLayout(
-        delimiter=";",
-        decimal=",",
-        encoding="cp1252",
-        newline="\r\n",
-        preamble=(
-            "HBM catman Easy; Prüfstand Kippsegmentlager",
-            "Datum: 14.03.2019 09:41:27",
-            "Prüfer: Labor 2; Öl ISO VG 46, 40 °C",
-            "Abtastrate: {rate} Hz",
-            "Messwerte: {count}",
-        ),
-        units_line=True,
-        time_name="Zeit",
-    ),
-    "csv-tabbed": CsvLayout(  # with a byte-order mark
-        delimiter="\t",
-        decimal=",",
-        encoding="utf-8-sig",
-        newline="\r\n",
-        preamble=("Messung\tPrüfstand 3", "{count} Werte\t{rate} Hz"),
-        units_line=True,
-        missing="NaN",
-        trailing_delimiter=True,
-        blank_last_lines=2,
-        declared=False,
-    ),
-    "csv-bare": CsvLayout(time_name=None, declared=False),
-}
+_LAYOUTS: dict[str, Layout] = {"hdf5": Hdf5Layout()}
+_LAYOUTS |= {name: CsvLayout(**entries) for name, entries in PAPER_RIG["layouts"].items()}
 
 
 def layout_named(layout: str | Layout) -> Layout:
@@ -106,7 +72,7 @@ def manifest_text(
         dialect = {key: getattr(layout, key) for key in ("delimiter", "decimal", "encoding")}
         lines = {"header_line": line, "units_line": line + 1 if layout.units_line else None}
         blocks.append(_table("[csv]", dialect | lines))
-    if layout.time_name is not None:
+    if layout.time_name:
         blocks.append(_table(f"[channels.{layout.time_name}]", {"quantity": "time", "unit": "s"}))
     blocks += [_channel(sensor) for sensor in instruments.sensors]
     rotation = runs[0].point.rotation

@@ -6,13 +6,12 @@ that they do not change with a sensor's sensitivity.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from math import radians
+from dataclasses import astuple, dataclass, replace
 from zlib import crc32
 
 import numpy as np
 
-from rigdata.virtual_rig.truth import VirtualRigError
+from rigdata.virtual_rig.truth import PAPER_RIG
 
 
 @dataclass(frozen=True)
@@ -24,13 +23,9 @@ class ChannelNoise:
     mains: float = 0.0
     drift: float = 0.0
 
-    def __post_init__(self) -> None:
-        if not all(0 <= getattr(self, f.name) < float("inf") for f in fields(self)):
-            raise VirtualRigError(f"noise must be finite and not negative: {self}")
-
     def scaled(self, factor: float) -> ChannelNoise:
         """Return the same noise, `factor` times as strong."""
-        return ChannelNoise(*(getattr(self, f.name) * factor for f in fields(self)))
+        return ChannelNoise(*(amount * factor for amount in astuple(self)))
 
 
 @dataclass(frozen=True)
@@ -42,10 +37,6 @@ class Glitches:
     longest: int = 50
     displacement: float = 65e-6
     force: float = 4000.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.share <= 1 or not 1 <= self.shortest <= self.longest:
-            raise VirtualRigError("glitches need a share between 0 and 1, and 1 <= shortest <= longest")
 
 
 @dataclass(frozen=True)
@@ -85,10 +76,6 @@ class Noise:
     dry: DryImperfections = DryImperfections()
     bits: int | None = None
 
-    def __post_init__(self) -> None:
-        if self.bits is not None and not 4 <= self.bits <= 32:
-            raise VirtualRigError(f"a converter has between 4 and 32 bits, not {self.bits}")
-
     @classmethod
     def none(cls) -> Noise:
         """No disturbance at all: the records are the physics."""
@@ -97,38 +84,14 @@ class Noise:
     @classmethod
     def like_samples(cls) -> Noise:
         """As strong as in the sample campaigns, of every kind that they have."""
-        return cls(
-            displacement=ChannelNoise(35e-9, 10e-9, 39e-9, 0.15e-6),
-            force=ChannelNoise(2.05, 0.8, 0.44, 0.2),
-            acceleration=ChannelNoise(3.9e-3, 7e-4, 8e-4, 2e-4),
-            temperature=ChannelNoise(0.057, 0.036, 0.018, 0.02),
-            speed=ChannelNoise(0.122, 0.023, 0.06, 0.002),
-            mains_scatter=0.01,
-            mains_harmonics=(0.02, 0.05),
-            runout=(1.1e-6, 0.25e-6),
-            unbalance=1.31e-3,
-            actuator_harmonics=(0.02,),
-            actuator_scatter=0.03,
-            cross_talk=0.05,
-            load_miss=0.003,
-            direction_miss=radians(0.2),
-            speed_miss=0.0009,
-            glitches=Glitches(1 / 6),
-            dry=DryImperfections(
-                direction=(radians(1.0), radians(2.0)),
-                side=(0.08, 0.22),
-                side_start=2e-6,
-                friction=0.004,
-                contact_gap=(2e-6, 4e-6),
-                push_scatter=0.003,
-            ),
-            bits=16,
-        )
+        entries = dict(PAPER_RIG["noise"])
+        channels = {name: ChannelNoise(**amounts) for name, amounts in entries.pop("channels").items()}
+        parts = {"glitches": Glitches(**entries.pop("glitches")), "dry": DryImperfections(**entries.pop("dry"))}
+        return cls(**channels, **parts, **entries)
 
     def scaled(self, factor: float) -> Noise:
         """Return it with the channels' noise `factor` times as strong; shaft, actuators, dry tests as they are."""
-        names = ("displacement", "force", "acceleration", "temperature", "speed")
-        return replace(self, **{name: getattr(self, name).scaled(factor) for name in names})
+        return replace(self, **{name: getattr(self, name).scaled(factor) for name in PAPER_RIG["noise"]["channels"]})
 
 
 #: What random streams are for; a change in one leaves all others as they were.

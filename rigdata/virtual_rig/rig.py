@@ -13,7 +13,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len
 
 from rigdata.arrays import BoolArray, FloatArray
-from rigdata.virtual_rig.faults import Fault, check_faults
+from rigdata.virtual_rig.faults import KINDS, Fault, check_faults
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
 from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
@@ -163,10 +163,6 @@ def _pick_up(noise: Noise, names: list[str], time: FloatArray, seed: int, run: s
     return out
 
 
-#: Fields of a sensor's error by the fault that changes them.
-_ERRORS = {"scaled": "gain", "delayed": "delay", "rotated": "angle", "offset": "offset", "crosstalk": "cross"}
-
-
 def spoil_record(
     readings: Readings, instruments: Instruments, faults: Iterable[Fault], rng: np.random.Generator
 ) -> Readings:
@@ -232,12 +228,8 @@ class VirtualRig:
     description: str = "computed data from a virtual rig"
 
     def __post_init__(self) -> None:
-        pads = {s.pad for s in self.instruments.of("temperature")}
-        if any(p is None or not 1 <= p <= len(self.truth.pivot_angles) for p in pads):
-            listed, count = sorted(map(str, pads)), len(self.truth.pivot_angles)
-            raise VirtualRigError(f"temperature sensors are in pads {listed}, but the bearing has pads 1 to {count}")
         if self.faults:
-            check_faults(self.faults, [r.id for r in self.runs()], [s.name for s in self.instruments.sensors])
+            check_faults(self.faults, [run.id for run in self._runs], [s.name for s in self.instruments.sensors])
 
     def runs(self) -> tuple[PlannedRun, ...]:
         """All runs, in the order of the test."""
@@ -275,7 +267,7 @@ class VirtualRig:
         sensors = self.instruments.sensors
         for fault in faults:
             if fault.place == "sensor":
-                change = {_ERRORS[fault.kind]: fault.size(0.0)}
+                change = {KINDS[fault.kind]["error"]: fault.size(0.0)}
                 sensors = tuple(s.with_error(**change) if fault.is_in(s.name) else s for s in sensors)
         instruments = replace(self.instruments, sensors=sensors)
         glitches: tuple[Glitch, ...] = ()

@@ -279,7 +279,10 @@ def test_probes_that_stand_elsewhere_than_stated_are_told_by_the_sweep_at_every_
     assert [c for c in point.quality if "from where the load pushes it" in c.detail] == ([reached] if reached else [])
 
 
-SPARE = (Sensor.probe("X1C", math.radians(90.0), 8.1), Sensor.probe("X1D", 0.0, 7.9))
+SPARE = (
+    Sensor.of_type("probe", "X1C", axis=math.radians(90.0), zero=8.1),
+    Sensor.of_type("probe", "X1D", axis=0.0, zero=7.9),
+)
 
 
 @pytest.mark.parametrize(

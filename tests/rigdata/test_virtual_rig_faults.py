@@ -73,7 +73,7 @@ def test_channel_faults_change_that_channel_of_that_run(kind):
 
 
 def test_every_spoiling_fault_is_tested_here():
-    of_channels = {kind for kind, (place, _, _) in KINDS.items() if place in ("record", "sensor")}
+    of_channels = {kind for kind, entry in KINDS.items() if entry["place"] in ("record", "sensor")}
     assert of_channels - set(CHANNEL_FAULTS) == {"clipped", "delayed", "time_gap", "time_jitter"}
 
 
@@ -183,7 +183,7 @@ def test_the_truth_tells_all_faults(tmp_path):
     fault = vr.Fault("dead", FIRST, "X1A")
     truth = vr.write_campaign(tmp_path / "c.h5", rig(fault))
     assert truth["faults"] == [{"kind": "dead", "run": FIRST, "channel": "X1A", "start": 0.0}]
-    assert all(text for _, _, text in KINDS.values())
+    assert all(entry["does"] for entry in KINDS.values())
     assert replace(fault, run="*").affects(SECOND)
     assert fault.is_in("X1A")
     assert not fault.is_in("X1B")

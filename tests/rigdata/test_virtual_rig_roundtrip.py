@@ -144,7 +144,7 @@ def test_probes_at_other_angles_and_engineering_units(campaign_of):
     base = vr.Instruments.like_paper()
     probes = (
         vr.Sensor("DX", "displacement", "um", 1e6, math.radians(20.0), span=500.0),
-        vr.Sensor.probe("DY", math.radians(80.0)),
+        vr.Sensor.of_type("probe", "DY", axis=math.radians(80.0)),
     )
     rig = quiet_rig(instruments=replace(base, sensors=(*probes, *base.sensors[2:])))
     runs = rigdata.load_campaign(campaign_of(rig)).of_kind("dynamic")[:2]
