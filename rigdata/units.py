@@ -10,8 +10,10 @@ from __future__ import annotations
 import functools
 import math
 import re
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from rigdata.problem import RigError, shown
@@ -22,57 +24,10 @@ ZERO_CELSIUS = 273.15
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _TOKEN = re.compile(r"\s*(?:([A-Za-z_Ω%]{1,24})(?:(?:\^|\*\*)?([+-]?[1-6]))?(?![0-9])|([*/()])|(1)(?![0-9]))")
 _MAX_UNIT = 48
+_LISTED: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 #: SI unit of every dimension.
-SI_UNITS = {
-    "length": "m",
-    "angle": "rad",
-    "mass": "kg",
-    "time": "s",
-    "frequency": "Hz",
-    "speed": "rad/s",
-    "acceleration": "m/s^2",
-    "force": "N",
-    "pressure": "Pa",
-    "stiffness": "N/m",
-    "compliance": "m/N",
-    "damping": "N*s/m",
-    "rotational stiffness": "N*m/rad",
-    "moment of inertia": "kg*m^2",
-    "viscosity": "Pa*s",
-    "density": "kg/m^3",
-    "temperature": "K",
-    "temperature difference": "K",
-    "per kelvin": "1/K",
-    "specific heat": "J/kg/K",
-    "conductivity": "W/m/K",
-    "heat transfer": "W/m^2/K",
-    "flow": "m^3/s",
-    "voltage": "V",
-    "current": "A",
-    "ratio": "",
-}
-_EXAMPLES = {
-    "length": "um",
-    "force": "kN",
-    "temperature": "degC",
-    "speed": "Hz",
-    "angle": "deg",
-    "frequency": "kHz",
-    "pressure": "bar",
-    "ratio": "%",
-}
-_SPELLINGS = str.maketrans(
-    {"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "⋅": "*", ".": "*", "\u2126": "Ω", "\u00a0": " "}
-)
-#: Unit names that mean something else here than in pint (where g is a gram and C a coulomb).
-_ALIASES = {"%": "percent", "degC": "kelvin", "celsius": "kelvin", "degF": "degR", "kp": "kgf"}
-_ALIASES_BY_DIMENSION = {
-    "acceleration": {"g": "standard_gravity", "gn": "standard_gravity", "g_n": "standard_gravity"},
-    "length": {"mil": "thou"},
-    "temperature": {"C": "kelvin"},
-    "temperature difference": {"C": "kelvin"},
-    "speed": {"U": "revolution"},
-}
+SI_UNITS: dict[str, str] = _LISTED["si"]
+_SPELLINGS = str.maketrans(_LISTED["spellings"])
 
 
 class UnitError(RigError):
@@ -96,31 +51,11 @@ class Unit:
         return Unit(self.factor**power, tuple((n, p * power) for n, p in self.powers))
 
 
-#: Units that campaigns and bearings use all the time, as factors of SI base units. pint has them all, bit for bit
-#: (tests/rigdata/test_units.py); to import it would make `predict` of a bearing take 1.2 times as long.
-_COMMON = {
-    "meter": {"m": 1.0, "meter": 1.0, "cm": 0.01, "mm": 0.001, "um": 1e-6, "micrometer": 1e-6, "nm": 1e-9},
-    "second": {"s": 1.0, "second": 1.0, "ms": 0.001, "us": 1e-6, "min": 60.0, "minute": 60.0, "hour": 3600.0},
-    "second^-1": {"Hz": 1.0, "hertz": 1.0, "kHz": 1000.0},
-    "kilogram": {"kg": 1.0, "gram": 0.001, "g": 0.001},
-    "kilogram meter second^-2": {"N": 1.0, "newton": 1.0, "kN": 1000.0, "MN": 1e6, "kgf": 9.80665},
-    "kilogram meter^-1 second^-2": {"Pa": 1.0, "mPa": 0.001, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5},
-    "kilogram meter^2 second^-2": {"J": 1.0},
-    "kilogram meter^2 second^-3": {"W": 1.0},
-    "ampere^-1 kilogram meter^2 second^-3": {"V": 1.0, "volt": 1.0, "mV": 0.001, "millivolt": 0.001},
-    "ampere": {"A": 1.0, "mA": 0.001},
-    "kelvin": {"K": 1.0, "kelvin": 1.0},
-    "radian": {"rad": 1.0, "radian": 1.0, "deg": math.pi / 180, "degree": math.pi / 180, "revolution": 2 * math.pi},
-    "meter second^-2": {"standard_gravity": 9.80665},
-    "": {"percent": 0.01},
-}
-
-
 @functools.cache
 def common_units() -> dict[str, Unit]:
     """Units that need no pint, by name."""
     units = {}
-    for dimension, factors in _COMMON.items():
+    for dimension, factors in _LISTED["common"].items():
         powers = []
         for base in dimension.split():
             name, _, power = base.partition("^")
@@ -187,7 +122,7 @@ def _product(pieces: Iterator[re.Match[str]], text: str, dimension: str) -> Unit
             continue
         factor = _product(pieces, text, dimension) if symbol else Unit(1.0)
         if name:
-            aliases = _ALIASES | _ALIASES_BY_DIMENSION.get(dimension, {})
+            aliases = _LISTED["aliases"]["any"] | _LISTED["aliases"].get(dimension, {})
             factor = _base(aliases.get(name, name)) ** int(power or 1)
             if dimension == "speed" and name in {"Hz", "kHz"}:  # of a shaft or a vibration: cycles
                 factor *= _base("revolution") ** int(power or 1)
@@ -212,7 +147,7 @@ def unit_factor(unit: str, dimension: str) -> float:
 
 
 def _example(dimension: str) -> str:
-    return _EXAMPLES.get(dimension, SI_UNITS[dimension])
+    return str(_LISTED["examples"].get(dimension, SI_UNITS[dimension]))
 
 
 def split_quantity(value: object, dimension: str) -> tuple[float, str]:
