@@ -183,16 +183,16 @@ def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) ->
     truth, instruments = rig.truth, rig.instruments
     points = []
     for point in rig.plan.dynamic:
-        h, steady = truth.h(point), replace(point, excitation=0.0)
+        h, steady = truth.stiffness(point), replace(point, excitation=0.0)
         readings = apparent_stiffness(h, point.excitation, instruments)
         entry = {
-            **point_facts(point, truth.centre(steady)),
+            **point_facts(point, truth.position(steady)),
             "excitation_Hz": point.excitation_hz,
             "K": h.real.tolist(),
             "C": (h.imag / point.excitation).tolist(),
             "K_apparent": readings.real.tolist(),
             "C_apparent": (readings.imag / point.excitation).tolist(),
-            "pad_temperature_C": truth.temperatures(steady).tolist(),
+            "pad_temperature_C": truth.temperature(steady).tolist(),
         }
         points.append(entry)
     return CampaignTruth(
@@ -200,7 +200,7 @@ def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) ->
         campaign=rig.campaign,
         seed=rig.seed,
         points=points,
-        locus=[point_facts(point, truth.centre(point)) for point in rig.plan.locus],
+        locus=[point_facts(point, truth.position(point)) for point in rig.plan.locus],
         pivot_curves=[_pivot_curve(truth, k + 1) for k in range(len(truth.pivot_angles))],
         clearance_cold_m=truth.clearance,
         gap_voltage_V=instruments.gap_voltages(),
@@ -231,7 +231,7 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
     Instrument errors are linear maps, so this needs no records: the difference to the truth is what the errors alone
     do, and a sharp test of whoever evaluates the records.
     """
-    lines = [answer(frequency, force, h, instruments) for force in np.eye(2, dtype=complex)]
+    response = answer(frequency, np.eye(2, dtype=complex), h, instruments)
     readings = {}
     for quantity in ("displacement", "force", "acceleration"):
         stated, sensed = [], []
@@ -239,7 +239,7 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
             gain = sensor.error.gain * np.exp(-1j * frequency * sensor.error.delay)
             stated.append(sensor.direction(stated=True))
             sensed.append(gain * felt_direction(sensor, instruments))
-        phasors = np.stack([getattr(line, quantity) for line in lines], axis=1)
+        phasors = getattr(response, quantity).T
         readings[quantity] = np.linalg.solve(np.array(stated, dtype=complex), np.array(sensed)) @ phasors
     oil_force = readings["force"] + instruments.housing_mass * readings["acceleration"]
     return oil_force @ np.linalg.inv(readings["displacement"])

@@ -90,22 +90,24 @@ class Instruments:
         With a `seed`, gap voltages and the zeros of accelerometers and Pt100s are random; without, the probes
         are at 8 V and everything else is at zero.
         """
-        rng, share = np.random.default_rng([seed or 0, 0]), 0.0 if seed is None else 1.0
-        gaps = 8.0 + share * rng.normal(0.0, 0.2, 2)
-        gravity, pt100 = (share * rng.normal(0.0, size, count) + 0.0 for size, count in ((1.5, 2), (0.2, n_pads)))
+        pads = [f"T{number}" for number in range(1, n_pads + 1)]
+        rows = [("probe", "X1A", 45.0), ("probe", "X1B", 135.0), ("cell", "L1H", 0.0), ("cell", "L1V", 90.0)]
+        rows += [("accelerometer", "A1H", 0.0), ("accelerometer", "A1V", 90.0)]
+        scatter = [0.2, 0.2, 1.5, 1.5, *[0.2] * n_pads]  # of gap voltages, and of zeros
+        share = 0.0 if seed is None else 1.0
+        zeros = share * np.random.default_rng([seed or 0, 0]).normal(0.0, scatter) + 0.0
+        drawn = dict(zip(("X1A", "X1B", "A1H", "A1V", *pads), zeros.tolist(), strict=True))
+        sensors = [Sensor.of_type(kind, name, axis=radians(degrees)) for kind, name, degrees in rows]
+        sensors += [Sensor.of_type("thermometer", name, pad=number) for number, name in enumerate(pads, 1)]
         full_scale = next((size for size in _CELL_SIZES if size >= 1.5 * load), 1.5 * load)
         stated = {"sensitivity": "2.0 mV/V", "full_scale": f"{full_scale / 1e3:g} kN", "excitation": "5 V"}
-        cell = {"scale": 10.0 / full_scale, "calibration": stated}
-        sensors: list[Sensor] = []
-        for name, degrees, gap in zip(("X1A", "X1B"), (45.0, 135.0), gaps.tolist(), strict=True):
-            sensors.append(Sensor.of_type("probe", name, axis=radians(degrees), zero=gap))
-        for name, degrees in (("L1H", 0.0), ("L1V", 90.0)):
-            sensors.append(Sensor.of_type("cell", name, axis=radians(degrees), **cell))
-        for name, degrees, zero in zip(("A1H", "A1V"), (0.0, 90.0), gravity.tolist(), strict=True):
-            error = SensorError(offset=zero)
-            sensors.append(Sensor.of_type("accelerometer", name, axis=radians(degrees), error=error))
-        for pad, zero in enumerate(pt100.tolist(), 1):
-            sensors.append(Sensor.of_type("thermometer", f"T{pad}", pad=pad, error=SensorError(offset=zero)))
+        for place, sensor in enumerate(sensors):
+            if sensor.quantity == "force":
+                sensors[place] = replace(sensor, scale=10.0 / full_scale, calibration=stated)
+            elif sensor.quantity == "displacement":
+                sensors[place] = replace(sensor, zero=sensor.zero + drawn[sensor.name])
+            else:
+                sensors[place] = sensor.with_error(offset=drawn[sensor.name])
         return cls((*sensors, Sensor.of_type("tachometer", "K1")))
 
     @property

@@ -98,18 +98,18 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
     steady = replace(actual, excitation=0.0)
     lines, line_facts = [], []
     for frequency, force in forces:
-        line = answer(frequency, force, truth.h(replace(actual, excitation=frequency)), instruments)
+        line = answer(frequency, force, truth.stiffness(replace(actual, excitation=frequency)), instruments)
         lines.append(line)
         fact: dict[str, object] = {"frequency_Hz": round(frequency / (2 * np.pi), 9)}
         for name, phasor in (("oil_force_N", line.oil_force), ("displacement_m", line.displacement)):
             fact[name] = np.stack([phasor.real, phasor.imag], axis=1).tolist()
         line_facts.append(fact)
-    position = truth.centre(steady)
+    position = truth.position(steady)
     return Motion(
         time=np.arange(round(run.seconds * run.rate)) / run.rate,
         position=position,
         load=load_vector(actual),
-        temperature=truth.temperatures(steady),
+        temperature=truth.temperature(steady),
         facts=point_facts(actual, position) | {"lines": line_facts},
         lines=tuple(lines),
         speed=actual.spin,
@@ -134,7 +134,7 @@ def _actuator_forces(run: PlannedRun, noise: Noise, rng: np.random.Generator) ->
 
 
 def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: Instruments) -> MotionLine:
-    """How shaft and housing answer an oil force phasor (2,) [N] at one frequency [rad/s].
+    """How shaft and housing answer oil force phasors (.., 2) [N] at one frequency [rad/s].
 
     The film passes the force on to the housing: k_cell x_h - m_h omega^2 x_h = F_oil.
     """
@@ -145,7 +145,7 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
     return MotionLine(
         frequency=frequency,
         oil_force=force,
-        displacement=np.asarray(np.linalg.solve(h, force), dtype=complex),
+        displacement=np.linalg.solve(h, force.T).T,
         force=force - instruments.true_mass * acceleration,
         acceleration=acceleration,
     )
@@ -244,28 +244,32 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     of the angle between them: there the side is at clearance + deflection(that).
     """
     pads = _sides(truth)
-    normals = _normals(truth, pads)
+    angles = np.array(truth.pivot_angles)[pads]
+    following = [*pads[1:], pads[0]]
     shares, places = [], []
-    for i, pad in enumerate(pads):
-        after = pads[(i + 1) % len(pads)]
+    for pad, after in zip(pads, following, strict=True):
         angle, next_angle = truth.pivot_angles[pad], truth.pivot_angles[after]
         gap = (next_angle - angle) % (2 * np.pi)
         passed, remaining = _wrapped(direction - angle - lag), _wrapped(next_angle + lag - direction)
         share = 0.25 * (1 + np.tanh(passed / _SLIDE_WIDTH)) * (1 + np.tanh(remaining / _SLIDE_WIDTH))
         turned = np.clip(_wrapped(direction - angle), 0.0, gap)
         forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
-        reach = np.stack([truth.clearance[k] + truth.deflection(k + 1, f) for k, f in zip((pad, after), forces)])
+        reach = np.stack([_reach(truth, k, force) for k, force in zip((pad, after), forces, strict=True)])
         shares.append(share)
-        places.append(np.linalg.solve(_normals(truth, [pad, after]), reach).T)
+        places.append(np.linalg.solve(directions([angle, next_angle]), reach).T)
     weight = np.array(shares) / np.sum(shares, axis=0)
     position = np.einsum("kn,knj->nj", weight, np.array(places))
-    for i, pad in enumerate(pads):
+    for i, (pad, normal) in enumerate(zip(pads, directions(angles), strict=True)):
         # between two corners a blend of both would share the load among three pads
         alone = 4.0 * weight[i - 1] * weight[i]
-        off = np.cos(direction - truth.pivot_angles[pad])
-        side = truth.clearance[pad] + truth.deflection(pad + 1, push * np.maximum(off, 0.0))
-        position += (alone * (side - position @ normals[i]))[:, None] * normals[i]
+        side = _reach(truth, pad, push * np.cos(direction - angles[i]))
+        position += (alone * (side - position @ normal))[:, None] * normal
     return np.asarray(position)
+
+
+def _reach(truth: RigTruth, pad: int, force: FloatArray) -> FloatArray:
+    """How far (n,) [m] the shaft gets toward a pad, counted from 0, that carries a force (n,) [N]."""
+    return truth.clearance[pad] + truth.deflection(pad + 1, force)
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:
@@ -282,16 +286,10 @@ def _sides(truth: RigTruth) -> list[int]:
     from scipy.spatial import ConvexHull, QhullError
 
     open_bearing = "the pads leave half the circle open: the shaft would fall out of the bearing"
-    every_pad = list(range(len(truth.pivot_angles)))
     try:
-        hull = ConvexHull(_normals(truth, every_pad) / np.array(truth.clearance)[:, None])
+        hull = ConvexHull(directions(truth.pivot_angles) / np.array(truth.clearance)[:, None])
     except QhullError as error:  # all pads are on one line
         raise VirtualRigError(open_bearing) from error
     if np.max(hull.equations[:, -1]) * min(truth.clearance) >= -1e-6:
         raise VirtualRigError(open_bearing)
     return sorted(hull.vertices.tolist(), key=lambda pad: truth.pivot_angles[pad] % (2 * np.pi))
-
-
-def _normals(truth: RigTruth, pads: list[int]) -> FloatArray:
-    """Unit vectors toward the pads, (len(pads), 2)."""
-    return directions([truth.pivot_angles[pad] for pad in pads])

@@ -242,8 +242,6 @@ class VirtualRig:
     def simulate(self, run_id: str) -> SimulatedRun:
         """Make the record of one run (or the one that it shares, or that was copied in its place)."""
         runs = {run.id: run for run in self.runs()}
-        if run_id not in runs:
-            raise VirtualRigError(f"no run {run_id!r} in the plan")
         run = runs[runs[run_id].record]
         copied = [fault.other for fault in self.faults_of(run.id) if fault.kind == "duplicate_run"]
         source = runs[copied[0] or ""] if copied else run
@@ -279,6 +277,8 @@ class VirtualRig:
             motion = running_motion(run, self.truth, instruments, noise, seed)
             glitches = draw_glitches(instruments, noise, len(motion.time), seed, run.id)
         columns = analogue_readings(motion, instruments, noise, seed, run.id)
+        if not np.isfinite(list(columns.values())).all():
+            raise VirtualRigError(f"run {run.id}: the truth gives no finite motion at {run.point}")
         for glitch in glitches:
             sensor = instruments.named(glitch.channel)
             burst = slice(glitch.first, glitch.first + glitch.count)

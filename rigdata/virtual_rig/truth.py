@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigError
 from rigdata.vector import directions
@@ -74,30 +74,14 @@ class RigTruth:
         )
         return replace(base, **fields)
 
-    def h(self, point: OperatingPoint) -> ComplexArray:
-        """Dynamic stiffness at a point, (2, 2) complex [N/m], checked."""
-        h = _checked(self.stiffness(point), (2, 2), f"stiffness({point})", complex)
-        if np.linalg.cond(h) > 1e8:
-            raise VirtualRigError(f"stiffness({point}) is singular: the shaft would move without bound")
-        return h
-
-    def centre(self, point: OperatingPoint) -> FloatArray:
-        """Mean shaft position at a point, (2,) [m], checked."""
-        return _checked(self.position(point), (2,), f"position({point})")
-
-    def temperatures(self, point: OperatingPoint) -> FloatArray:
-        """Film temperatures at a point, (n_pads,) [degC], checked."""
-        return _checked(self.temperature(point), (len(self.pivot_angles),), f"temperature({point})")
-
     @property
     def cold_temperatures(self) -> FloatArray:
         """Of all pads at rest, (n_pads,) [degC]."""
         return np.full(len(self.pivot_angles), self.cold_temperature)
 
     def deflection(self, pad: int, load: FloatArray) -> FloatArray:
-        """Pivot deflection of `pad` (1 is pad #1) under `load` (n,) [N] -> (n,) [m], checked; 0 where it lifts off."""
-        pushed = np.maximum(load, 0.0)
-        return _checked(self.pivot_deflection(pad, pushed), pushed.shape, f"pivot_deflection({pad}, load)")
+        """Pivot deflection of `pad` (1 is pad #1) under `load` (n,) [N] -> (n,) [m]; 0 where it lifts off."""
+        return np.asarray(self.pivot_deflection(pad, np.maximum(load, 0.0)))
 
 
 def load_vector(point: OperatingPoint) -> FloatArray:
@@ -120,10 +104,3 @@ def point_facts(point: OperatingPoint, position: FloatArray) -> dict[str, object
         "x_m": x,
         "y_m": y,
     }
-
-
-def _checked(values: Any, shape: tuple[int, ...], name: str, kind: type = float) -> np.ndarray:
-    array: np.ndarray = np.asarray(values, dtype=kind)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise VirtualRigError(f"{name} must be finite with shape {shape}, got shape {array.shape}")
-    return array

@@ -86,8 +86,8 @@ def test_rig_and_model_agree_on_what_stands_in_series(bearing):
     truth = rig_truth(bearing, soft)
     (row,) = predict_points(bearing, [point(5000.0, 25.0)], soft)
     k, c = coefficients(row)
-    assert np.allclose(truth.h(point(5000.0, 25.0)), k + 25j * HZ * c, rtol=1e-6)
-    assert np.allclose(truth.centre(point(5000.0, 0.0)), [row["x_m"], row["y_m"]], rtol=1e-6, atol=1e-12)
+    assert np.allclose(truth.stiffness(point(5000.0, 25.0)), k + 25j * HZ * c, rtol=1e-6)
+    assert np.allclose(truth.position(point(5000.0, 0.0)), [row["x_m"], row["y_m"]], rtol=1e-6, atol=1e-12)
     plain = rig_truth(bearing, ModelSettings("kirk", "isothermal"))
     load = np.array([1000.0, 4000.0])
     assert np.allclose(truth.deflection(1, load) - plain.deflection(1, load), load / 4e8)
@@ -100,7 +100,7 @@ def test_effects_on_records_go_to_the_instruments_only(bearing):
     truth = rig_truth(bearing, ModelSettings("kirk", "isothermal", effects))
     plain = rig_truth(bearing, ModelSettings("kirk", "isothermal"))
     # to rounding: where arrays lie in memory decides the order of a library's sums
-    assert np.allclose(truth.h(point(5000.0, 25.0)), plain.h(point(5000.0, 25.0)), rtol=1e-9)
+    assert np.allclose(truth.stiffness(point(5000.0, 25.0)), plain.stiffness(point(5000.0, 25.0)), rtol=1e-9)
     erring = erring_instruments(Instruments.like_paper(), effects)
     assert erring.named("X1A").error.gain == 1.05
     assert erring.true_mass == erring.housing_mass + 2.0

@@ -90,7 +90,7 @@ def test_cell_gain_shows_in_the_mean_force_and_probe_gain_in_the_position():
     instruments = RIGID.with_errors(loadcell_gain=1.02, probe_gain=1.05)
     columns = vr.VirtualRig(truth, plan, instruments, vr.Noise.none()).simulate("l-05000-01").readings.columns
     assert columns["L1V"].mean() / instruments.named("L1V").scale == pytest.approx(-5100.0)
-    x, y = truth.centre(plan.locus[0])
+    x, y = truth.position(plan.locus[0])
     probe = instruments.named("X1A")
     along = (probe.zero - columns["X1A"].mean()) / probe.scale
     assert along == pytest.approx(1.05 * (x + y) / math.sqrt(2), rel=1e-9)

@@ -90,7 +90,7 @@ def test_means_temperatures_and_speed_come_back(campaign_of, layout):
     # the probes' zero is 0 V: the bearing centre stands at the gap voltage of 8 V
     centre = -8.0 / 7.78e-3 * 1e-6 * np.array([math.cos(math.pi / 4) + math.cos(3 * math.pi / 4), math.sqrt(2)])
     position = run.vector("displacement").values.mean(axis=0) - centre
-    np.testing.assert_allclose(position, rig.truth.centre(rig.plan.locus[1]), atol=1e-11)
+    np.testing.assert_allclose(position, rig.truth.position(rig.plan.locus[1]), atol=1e-11)
     angle = run.point.static_load_direction
     force = run.vector("force").values.mean(axis=0)
     np.testing.assert_allclose(force, 5000.0 * np.array([math.cos(angle), math.sin(angle)]), atol=1e-3)

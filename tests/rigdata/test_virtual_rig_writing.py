@@ -75,7 +75,7 @@ def test_a_failure_on_the_way_leaves_nothing_behind(tmp_path, layout):
         return np.full((2, 2), np.nan) if point.static_load_direction > -1.0 else np.diag([2e8, 4e8])
 
     truth = replace(TRUTH, stiffness=broken)
-    with pytest.raises(vr.VirtualRigError, match=r"stiffness\(.*finite"):
+    with pytest.raises(vr.VirtualRigError, match="no finite motion"):
         vr.write_campaign(tmp_path / "c", rig(truth=truth), layout)
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(vr.VirtualRigError, match="not a folder"):
@@ -119,9 +119,6 @@ def test_float32_holds_16_bit_readings_exactly(campaign_of):
         assert narrow["runs/d-02500-25-01"].attrs["sample_rate_hz"] == 1000.0
 
 
-SINGULAR = vr.RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=lambda point: np.zeros(2))
-
-
 def swept(angles: tuple[float, ...]) -> object:
     truth = vr.RigTruth.constant(np.eye(2) * 1e8, np.eye(2), pivot_angles=angles, clearance=(8e-5,) * 3)
     return vr.VirtualRig(truth, vr.RigPlan(clearance=(vr.ClearanceSweep(),)), vr.Instruments.like_paper(3)).simulate(
@@ -134,7 +131,6 @@ def swept(angles: tuple[float, ...]) -> object:
     [
         (lambda: vr.write_campaign("x", rig(), "tdms"), "no layout 'tdms'"),
         (lambda: vr.RigPlan(dry=(vr.DryTest(1), vr.DryTest(1, ramp=1.0))).runs(TRUTH.pivot_angles), "the id 'p-1-up'"),
-        (lambda: rig(truth=SINGULAR).simulate("d-02500-25-01"), "singular"),
         (
             lambda: vr.RigPlan(dynamic=vr.operating_points([(5000.0, 600.0)])).runs(()),
             "600 Hz cannot be sampled at 1000 Hz",
@@ -142,10 +138,6 @@ def swept(angles: tuple[float, ...]) -> object:
         (lambda: vr.RigPlan(dynamic=vr.operating_points([(5000.0, 0.0)])).runs(()), "0 Hz cannot be sampled"),
         (lambda: swept((0.0, 1.0, 2.0)), "fall out"),
         (lambda: swept((-math.pi / 2, math.pi / 2, math.pi / 2)), "fall out"),
-        (
-            lambda: rig(truth=replace(TRUTH, pivot_deflection=lambda pad, load: 1e-6)).simulate("p-1-up"),
-            r"pivot_deflection\(1, load\) must be finite with shape",
-        ),
     ],
 )
 def test_impossible_numbers_are_refused_where_they_are_given(make, message):
