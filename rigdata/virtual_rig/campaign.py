@@ -49,30 +49,24 @@ def write_campaign(
     progress: Progress | None = None,
 ) -> CampaignTruth:
     """Write a campaign in the `tpjb-rig/1` format."""
-    target = Path(out)
-    chosen = layout_named(layout)
+    target, chosen = Path(out), layout_named(layout)
     if not target.parent.is_dir():
         raise VirtualRigError(f"{target.parent} is not a folder; make it first")
     if os.path.lexists(target):
         raise VirtualRigError(f"{target} exists; choose another name, or delete it first")
-    shown = {type(chosen).__name__, "times" if chosen.time_name else ""}
+    layouts = {"CsvLayout", "Hdf5Layout", "times"} - {type(chosen).__name__, "times" if chosen.time_name else ""}
     for fault in rig.faults:
-        missing = {"CsvLayout", "Hdf5Layout", "times"}.intersection(fault.needs) - shown
-        if missing:
+        if missing := layouts.intersection(fault.needs):
             raise VirtualRigError(f"fault {fault.kind!r} needs {missing.pop()}, which this layout does not have")
     laws: dict[str, Any] = {name: cache(getattr(rig.truth, name)) for name in ("stiffness", "position", "temperature")}
     rig = replace(rig, truth=replace(rig.truth, **laws))  # each is asked only once per point
-    header = {"id": rig.campaign, "bearing": rig.truth.bearing_name, "description": rig.description}
-    manifest = manifest_text(header, rig.instruments, rig.runs(), chosen, rig.faults)
     facts: dict[str, dict[str, object]] = {}
     records = _written_records(rig, facts, progress)
     # the temporary sibling is on the same file system, so that the last step is one rename
     with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as spare:
         draft = Path(spare) / "campaign"
-        if isinstance(chosen, Hdf5Layout):
-            _write_hdf5(draft, rig, manifest, records, chosen)
-        else:
-            _write_csv(draft, rig, manifest, records, chosen)
+        write = _write_hdf5 if isinstance(chosen, Hdf5Layout) else _write_csv
+        write(draft, rig, records, chosen)
         truth = campaign_truth(rig, facts)
         os.rename(draft, target)
     return truth
@@ -112,7 +106,7 @@ def _stored(record: SimulatedRun, rig: VirtualRig, layout: Layout) -> _Columns:
     return [(name, values[:0]) for name, values in columns] if is_empty else columns
 
 
-def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: _Records, layout: Layout) -> None:
+def _write_hdf5(path: Path, rig: VirtualRig, records: _Records, layout: Any) -> None:
     """Write all records to a new file; runs that share a record share its group.
 
     No time stamps are stored: the same rig gives the same bytes.
@@ -121,7 +115,7 @@ def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: _Records, l
 
     kind = "float64" if rig.noise.bits is None else "float32"
     with h5py.File(path, "w-", libver="earliest") as file:
-        file.attrs["manifest"] = manifest
+        file.attrs["manifest"] = manifest_text(rig, layout)
         file.attrs["bearing"] = rig.truth.bearing_text
         groups = file.create_group("runs")
         for record in records:
@@ -139,10 +133,10 @@ def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: _Records, l
                 groups[run.id] = groups[run.record]  # a hard link
 
 
-def _write_csv(folder: Path, rig: VirtualRig, manifest: str, records: _Records, layout: CsvLayout) -> None:
+def _write_csv(folder: Path, rig: VirtualRig, records: _Records, layout: Any) -> None:
     """Write manifest, bearing and all records into a new folder."""
     (folder / "runs").mkdir(parents=True)
-    (folder / "campaign.toml").write_bytes(manifest.encode())
+    (folder / "campaign.toml").write_bytes(manifest_text(rig, layout).encode())
     (folder / rig.truth.bearing_name).write_bytes(rig.truth.bearing_text.encode())
     for record in records:
         text = _record_text(record, rig, layout)
@@ -172,10 +166,10 @@ def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> st
     for written, wanted in (("nan", layout.missing), (".", layout.decimal), ("\0", layout.delimiter)):
         text = text.replace(written, wanted)
     body = [line + tail for line in text.split("\n")] if text else []
+    lines = [*head, *body, *[""] * (1 + layout.blank_last_lines)]
     if "truncated_line" in rig.fault_kinds(record.run.id) and body:
-        body[-1] = body[-1][: len(body[-1]) * 3 // 5]
-        return layout.newline.join([*head, *body])
-    return layout.newline.join([*head, *body, *[""] * (1 + layout.blank_last_lines)])
+        lines = [*head, *body[:-1], body[-1][: len(body[-1]) * 3 // 5]]
+    return layout.newline.join(lines)
 
 
 def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) -> CampaignTruth:

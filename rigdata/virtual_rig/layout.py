@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import degrees
 
 from rigdata.operating_point import ROTATIONS
 from rigdata.virtual_rig.faults import Fault
-from rigdata.virtual_rig.instruments import Instruments, Sensor
+from rigdata.virtual_rig.instruments import Sensor
 from rigdata.virtual_rig.plan import DryTest, PlannedRun
+from rigdata.virtual_rig.rig import VirtualRig
 from rigdata.virtual_rig.truth import PAPER_RIG, VirtualRigError, hz
 
 
@@ -53,19 +53,16 @@ def layout_named(layout: str | Layout) -> Layout:
     return _LAYOUTS[layout]
 
 
-def manifest_text(
-    header: dict[str, str],
-    instruments: Instruments,
-    runs: Sequence[PlannedRun],
-    layout: Layout,
-    faults: tuple[Fault, ...] = (),
-) -> str:
+def manifest_text(rig: VirtualRig, layout: Layout) -> str:
     """Write the manifest (`tpjb-rig/1`)."""
-    common = max({run.rate for run in runs}, key=[run.rate for run in runs].count)
+    runs, truth = rig.runs(), rig.truth
+    rates = [run.rate for run in runs]
+    rate, rotation = max(set(rates), key=rates.count), runs[0].point.rotation
+    header = {"schema": "tpjb-rig/1", "id": rig.campaign, "bearing": truth.bearing_name}
     blocks = [
-        _table(None, {"schema": "tpjb-rig/1", **header}),
-        _table("[housing]", {"mass": f"{instruments.housing_mass:.10g} kg"}),
-        _table("[acquisition]", {"sample_rate": _rate(common)}),
+        _table("", {**header, "description": rig.description}),
+        _table("[housing]", {"mass": f"{rig.instruments.housing_mass:.10g} kg"}),
+        _table("[acquisition]", {"sample_rate": _rate(rate)}),
     ]
     if isinstance(layout, CsvLayout) and layout.declared:
         line = len(layout.preamble) + 1
@@ -74,17 +71,16 @@ def manifest_text(
         blocks.append(_table("[csv]", dialect | lines))
     if layout.time_name:
         blocks.append(_table(f"[channels.{layout.time_name}]", {"quantity": "time", "unit": "s"}))
-    blocks += [_channel(sensor) for sensor in instruments.sensors]
-    rotation = runs[0].point.rotation
+    blocks += [_channel(sensor) for sensor in rig.instruments.sensors]
     if rotation != ROTATIONS[0]:
         blocks.append(_table("[shaft]", {"rotation": rotation}))
-    blocks += [_run(run, layout, common, faults, rotation) for run in runs]
+    blocks += [_run(_as_noted(run, rig.faults), layout, rate, rotation) for run in runs]
     return "\n".join(blocks)
 
 
-def _table(title: str | None, entries: dict[str, object]) -> str:
+def _table(title: str, entries: dict[str, object]) -> str:
     """A table of the manifest; entries without a value are left out."""
-    lines = [] if title is None else [title]
+    lines = [title] if title else []
     for key, value in entries.items():
         if value is not None:
             lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
@@ -105,9 +101,8 @@ def _channel(sensor: Sensor) -> str:
     return _table(f"[channels.{sensor.name}]", entries)
 
 
-def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Fault, ...], rotation: str) -> str:
-    noted = _as_noted(run, faults)
-    test, point = noted.test, noted.point
+def _run(run: PlannedRun, layout: Layout, rate: float, rotation: str) -> str:
+    test, point = run.test, run.point
     entries: dict[str, object] = {
         "id": run.id,
         "file": f"runs/{run.record}.csv" if isinstance(layout, CsvLayout) else None,
@@ -115,7 +110,7 @@ def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Faul
     }
     if isinstance(test, DryTest):
         entries["pad"] = test.pad
-        entries["static_load_direction"] = _degrees(noted.direction)
+        entries["static_load_direction"] = _degrees(run.direction)
         entries["branch"] = test.branch if test.branch != "up" else None
     elif test is None:
         entries["shaft_speed"] = f"{point.shaft_speed_hz:.10g} Hz"
@@ -124,8 +119,8 @@ def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Faul
         entries["rotation"] = point.rotation if point.rotation != rotation else None
     if run.kind == "dynamic":
         entries["excitation_frequency"] = f"{point.excitation_hz:.10g} Hz"
-        entries["excitation_direction"] = _degrees(noted.direction)
-    entries["sample_rate"] = _rate(run.rate) if run.rate != common_rate else None
+        entries["excitation_direction"] = _degrees(run.direction)
+    entries["sample_rate"] = _rate(run.rate) if run.rate != rate else None
     return _table("[[runs]]", entries)
 
 
