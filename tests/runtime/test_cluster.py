@@ -21,7 +21,7 @@ from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.runs.run_store import RunStore
 from tpjb_ident.runtime import executors
-from tpjb_ident.runtime.executors import ClusterError, LostJobsError, dask_workers, local_workers, map_ordered
+from tpjb_ident.runtime.executors import ClusterError, LostJobsError, dask_workers, local_workers
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -93,7 +93,7 @@ def test_a_worker_killed_half_way_changes_no_bit(cluster, campaign_file, tmp_pat
         # and with a job in its hands: the second worker kills itself, nobody is left, a new one takes over
         cluster.workers.append(cluster._start("worker", "--nthreads", "1", "--no-nanny"))
         jobs = [(str(tmp_path), i) for i in range(6)]
-        assert list(map_ordered(workers, dies_once, jobs)) == [3 * i for i in range(6)]
+        assert list(workers.map(dies_once, jobs)) == [3 * i for i in range(6)]
     assert cluster.workers[0].poll() is not None
     assert (6, 12) in seen
     with local_workers(2) as processes:
@@ -161,7 +161,7 @@ def test_a_scheduler_that_is_lost_half_way_is_the_end_and_is_named(tmp_path, mon
 
     def lose() -> None:
         with dask_workers(str(cluster.file), 5.0) as workers:
-            for _ in map_ordered(workers, time.sleep, [(0.1,)] * 200):
+            for _ in workers.map(time.sleep, [(0.1,)] * 200):
                 cluster.scheduler.kill()
 
     try:

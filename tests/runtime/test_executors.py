@@ -22,7 +22,6 @@ from tpjb_ident.runtime.executors import (
     Workers,
     background_job,
     local_workers,
-    map_ordered,
     open_workers,
 )
 from tpjb_ident.runtime.interrupts import interrupts_held
@@ -97,23 +96,22 @@ class Backwards(Executor):
 
 def test_answers_stand_in_order_even_if_they_end_in_another():
     workers = PoolWorkers(Backwards, 2)
-    assert [index for index, _ in workers.outcomes(doubled, jobs(8))] != list(range(8))
-    assert list(map_ordered(workers, doubled, jobs(8))) == [2 * i for i in range(8)]
+    assert list(workers.map(doubled, jobs(8))) == [2 * i for i in range(8)]
 
 
 @pytest.mark.slow
 def test_here_and_in_processes_alike(two):
     shared = {"offset": 100}
     for workers in (Workers(), two):
-        assert list(map_ordered(workers, doubled, jobs(9))) == [2 * i for i in range(9)]
-        assert list(map_ordered(workers, with_shared, jobs(3), shared)) == [100, 101, 102]
-        assert list(map_ordered(workers, doubled, [])) == []
+        assert list(workers.map(doubled, jobs(9))) == [2 * i for i in range(9)]
+        assert list(workers.map(with_shared, jobs(3), shared)) == [100, 101, 102]
+        assert list(workers.map(doubled, [])) == []
 
 
 @pytest.mark.slow
 def test_the_first_error_in_order_is_raised_where_it_stands(two):
     for workers in (Workers(), two):
-        answers = map_ordered(workers, refused, jobs(8))
+        answers = workers.map(refused, jobs(8))
         assert [next(answers) for _ in range(3)] == [0, 1, 2]
         with pytest.raises(ValueError, match="no 3"):
             next(answers)
@@ -121,27 +119,25 @@ def test_the_first_error_in_order_is_raised_where_it_stands(two):
 
 def test_a_warning_on_a_worker_is_a_warning_here(two):
     with pytest.warns(RuntimeWarning, match="mind 7"):
-        assert list(map_ordered(two, warned, [(7,)])) == [7]
+        assert list(two.map(warned, [(7,)])) == [7]
 
 
 def test_an_error_that_cannot_travel_comes_as_its_text(two):
     with pytest.raises(RuntimeError, match="Odd"):
-        list(map_ordered(two, has_own_class, [()]))
+        list(two.map(has_own_class, [()]))
 
 
 @pytest.mark.slow
 def test_a_killed_process_loses_nothing(tmp_path):
     with local_workers(2) as workers:
-        assert list(map_ordered(workers, dies_once, [(str(tmp_path), i) for i in range(12)])) == [
-            3 * i for i in range(12)
-        ]
+        assert list(workers.map(dies_once, [(str(tmp_path), i) for i in range(12)])) == [3 * i for i in range(12)]
     assert (tmp_path / "died").exists()
 
 
 @pytest.mark.slow
 def test_a_job_that_kills_every_worker_is_given_up():
     with local_workers(2) as workers, pytest.raises(LostJobsError, match=r"3 times in a row.*memory"):
-        list(map_ordered(workers, dies, jobs(1)))
+        list(workers.map(dies, jobs(1)))
 
 
 def test_one_worker_is_this_process():
@@ -161,7 +157,7 @@ def _threads() -> tuple[set[str], int]:
 def test_linear_algebra_that_is_loaded_takes_one_thread_in_workers():
     """Processes that are forked have numpy already: the environment does not reach it."""
     with local_workers(2, start="fork") as workers:
-        assert next(map_ordered(workers, _threads, [()])) == ({"1"}, 1)
+        assert next(workers.map(_threads, [()])) == ({"1"}, 1)
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from tpjb_ident.results.linearity import FilmChange, film_change
 from tpjb_ident.runs.finished_runs import RunDigest
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.runs.static_load import StaticLoads, static_loads
-from tpjb_ident.runtime.executors import Workers, map_ordered
+from tpjb_ident.runtime.executors import Workers
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.mains import (
     MAINS_ON_LINE,
@@ -83,7 +83,7 @@ def solve_campaign(
 
     def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> CampaignSolution:
         task = replace(common, sensors=sensors, rates=rates)
-        means = tuple(map_ordered(workers, point_means, [(data,) for data in points], task))
+        means = tuple(workers.map(point_means, [(data,) for data in points], task))
         film = tuple(_film(data, point) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])
         blocks = campaign_blocks(points, means, loads.misses, bent, temperatures)

@@ -28,7 +28,7 @@ from tpjb_ident.runs.finished_runs import FinishedRuns, excluded_runs, without_r
 from tpjb_ident.runs.point_data import gather
 from tpjb_ident.runs.run_jobs import Progress, all_runs
 from tpjb_ident.runs.run_store import RunStore
-from tpjb_ident.runtime.executors import Workers, map_ordered
+from tpjb_ident.runtime.executors import Workers
 from tpjb_ident.terms.registry import cell_stiffness
 
 
@@ -156,7 +156,7 @@ def assemble(
     jobs = [(data, point_share(solved, data, p)) for p, data in enumerate(gathered)]
     excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
     points = []
-    for point in map_ordered(workers, finished_point, jobs, task):
+    for point in workers.map(finished_point, jobs, task):
         without = without_runs(point.point, excluded, several)
         points.append(replace(point, quality=merged(point.quality, without)))
         report("estimating", len(points), len(gathered))

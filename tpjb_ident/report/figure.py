@@ -24,7 +24,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.picture import LIGHT, in_house_style
 from tpjb_ident.rounding import significant
-from tpjb_ident.runtime.executors import cores, local_workers, map_ordered
+from tpjb_ident.runtime.executors import cores, local_workers
 from tpjb_ident.runtime.tables import printable, write_atomic, write_text
 
 _PNG_DPI = 160
@@ -109,7 +109,7 @@ def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
     # forked: what is drawn is there already, and a few panels are not worth a second process
     alone = len(panels) < _TOGETHER or "fork" not in multiprocessing.get_all_start_methods()
     with local_workers(1 if alone else min(cores(), _MOST_HANDS), start="fork") as opened:
-        texts = list(map_ordered(opened, _save_panel, [(index, folder) for index in range(len(panels))]))
+        texts = list(opened.map(_save_panel, [(index, folder) for index in range(len(panels))]))
     _drawn.clear()
     return {panel.name: text for panel, text in zip(panels, texts, strict=True)}
 

@@ -51,18 +51,16 @@ def all_runs(
             reader = replace(reader, path=reader.path.absolute())
         stored = None if store is None else store.known(run.id)
         jobs.append((replace(run, reader=reader), mass, settings, stored))
-    finished: dict[int, RunDigest | ExcludedRun] = {}
-    outcomes = (workers or Workers()).outcomes(process_run, jobs)
-    for done, (index, outcome) in enumerate(outcomes, start=1):  # nothing is held back to be put in order
-        mark, result = outcome.get()
-        run = runs[index]
+    finished: list[RunDigest | ExcludedRun] = []
+    results = (workers or Workers()).map(process_run, jobs)
+    for run, (mark, result) in zip(runs, results, strict=True):
         if store is not None and mark and isinstance(result, RunDigest):
             store.keep(mark, result)
         if store is not None and result is None:  # or cleared by another command since
             result = store.load(run, mark)
-        finished[index] = result or one_run(run, mass, settings)
-        progress(run.id, done, len(runs))
-    gathered = FinishedRuns(tuple(finished[index] for index in sorted(finished)))
+        finished.append(result or one_run(run, mass, settings))
+        progress(run.id, len(finished), len(runs))
+    gathered = FinishedRuns(tuple(finished))
     return gathered.without(_dead_accelerometers(gathered.digests))
 
 

@@ -1,11 +1,11 @@
 """Where jobs run: here, in processes of this machine, on a Dask cluster. The answers are the same everywhere.
 
 A job is a module-level function and its arguments. It depends on nothing else, so that it may run anywhere, and
-once more where a worker was lost with it. Whoever has work to spread takes a `Workers` and asks `map_ordered`:
+once more where a worker was lost with it. Whoever has work to spread takes a `Workers`:
 
 ```python
 with open_workers(count=4) as workers:   # or open_workers(scheduler="tcp://host:8786")
-    for answer in map_ordered(workers, task, [(argument,), ..]):
+    for answer in workers.map(task, [(argument,), ..]):
         ...
 ```
 """
@@ -15,6 +15,7 @@ from __future__ import annotations
 import collections
 import functools
 import gc
+import itertools
 import multiprocessing
 import os
 import pickle
@@ -24,7 +25,7 @@ import threading
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -70,30 +71,33 @@ class Workers:
 
     count = 1  #: jobs that run at a time
 
-    def outcomes(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[tuple[int, Outcome]]:
-        """Run ``task(*job)`` for every job; yield (index of the job, outcome) as they end, in any order.
+    def map(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[Any]:
+        """Yield the values of ``task(*job)`` in the order of the jobs; raise the error of the first that has one.
 
         The task is one of a module, so that other processes find it. What is `shared` is every job's first argument; a
         worker unpacks it once, so a task must not change it.
         """
         call = _with_shared(task, shared)
-        for index, job in enumerate(jobs):
-            yield index, Outcome(call(*job))
+        for job in jobs:
+            yield call(*job)
 
 
 def _with_shared(task: Task, shared: Any) -> Task:
     return task if shared is None else functools.partial(task, shared)
 
 
-def map_ordered(workers: Workers, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[Any]:
-    """Yield the values of all jobs in their order; raise the error of the first job, in order, that has one."""
-    early: dict[int, Outcome] = {}
-    due = 0
-    for index, outcome in workers.outcomes(task, jobs, shared):
-        early[index] = outcome
-        while due in early:
-            yield early.pop(due).get()
-            due += 1
+@dataclass
+class _Entry:
+    """A job whose value is still to be given, and where it runs."""
+
+    job: Job
+    future: Future[Outcome] | None = None
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether its worker is gone: what the job itself raises comes as a value."""
+        future = self.future
+        return future is not None and (future.cancelled() or (future.done() and future.exception() is not None))
 
 
 class PoolWorkers(Workers):
@@ -108,22 +112,17 @@ class PoolWorkers(Workers):
         with interrupts_held():
             return self.executor.submit(*call)
 
-    def outcomes(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[tuple[int, Outcome]]:
+    def map(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[Any]:
         """See `Workers`; raises `LostJobsError`."""
         packed = pickle.dumps(_with_shared(task, shared), protocol=5)
-        waiting = collections.deque(range(len(jobs)))
-        flying: dict[Future[Outcome], int] = {}
+        entries = collections.deque(_Entry(job) for job in jobs)
         losses = 0
-        while waiting or flying:
+        while entries:
             try:
-                while waiting and len(flying) < _AHEAD * self.count:
-                    future = self.submit(_attempt, packed, jobs[waiting[0]])
-                    flying[future] = waiting.popleft()
-                ended = wait(flying, timeout=_STALLED, return_when=FIRST_COMPLETED).done
-                for future in ended:
-                    outcome = future.result()
-                    losses = 0
-                    yield flying.pop(future), outcome
+                for entry in itertools.islice(entries, _AHEAD * self.count):
+                    entry.future = entry.future or self.submit(_attempt, packed, entry.job)
+                ended = wait([entries[0].future], timeout=_STALLED).done  # type: ignore[list-item]
+                outcomes = [future.result() for future in ended]
             except Exception as error:  # every executor has its own way to say that a worker is gone
                 losses += 1
                 if losses == _MAX_LOSSES:
@@ -131,18 +130,17 @@ class PoolWorkers(Workers):
                         f"workers were lost {losses} times in a row, last with {type(error).__name__}: {error}. "
                         "Is memory short? Use fewer workers, or look at the workers' own messages"
                     ) from error
-                waiting.extendleft(sorted(self._lost(error, flying), reverse=True))
+                broken = isinstance(error, BrokenExecutor)  # takes all of its jobs with it
+                self.executor = self._opened() if broken else self.executor
+                for entry in entries:
+                    entry.future = None if broken or entry.is_lost else entry.future
                 continue
-            if not ended and not self._alive():
+            if not outcomes and not self._alive():
                 raise LostJobsError("all workers are gone, and none came back. Start some again")
-
-    def _lost(self, error: Exception, flying: dict[Future[Outcome], int]) -> list[int]:
-        """Jobs that are to be tried again: a broken pool takes all of its jobs with it, and is replaced."""
-        broken = isinstance(error, BrokenExecutor)
-        if broken:
-            self.executor = self._opened()
-        gone = [f for f in flying if broken or f.cancelled() or (f.done() and f.exception())]
-        return [flying.pop(future) for future in gone]
+            for outcome in outcomes:
+                losses = 0
+                entries.popleft()
+                yield outcome.get()
 
 
 def _attempt(packed: bytes, job: Job) -> Outcome:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tpjb_ident.diagnosis.forward.forward import ForwardModel
-from tpjb_ident.runtime.executors import Workers, cores, local_workers, map_ordered
+from tpjb_ident.runtime.executors import Workers, cores, local_workers
 
 #: What the workers of this process share: they are forked from it and have it from there. Sent with every job it would
 #: be megabytes of equilibria each time.
@@ -33,7 +33,7 @@ class Map:
 
     def __call__(self, task: Callable[..., Any], jobs: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
         """Yield ``task(forward, problem, argument, ..)`` for every job, in order."""
-        return map_ordered(self.opened, _run, [(self.number, task, *arguments) for arguments in jobs])
+        return self.opened.map(_run, [(self.number, task, *arguments) for arguments in jobs])
 
 
 @contextmanager
