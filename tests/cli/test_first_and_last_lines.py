@@ -11,8 +11,8 @@ import pytest
 from tests.command_line import tpjb
 from tpjb_ident.cli.command import Command
 from tpjb_ident.cli.commands.app import app
-from tpjb_ident.cli.identification import with_half
 from tpjb_ident.cli.options import ROCKER
+from tpjb_ident.cli.terminal import with_half
 from tpjb_ident.errors import NotTrustedError
 
 ROOT = Path(__file__).parents[2]

@@ -10,8 +10,8 @@ import pytest
 
 from tests.command_line import tpjb
 from tpjb_ident.cli import terminal
-from tpjb_ident.cli.identification import cross_coupling_matters, with_half
-from tpjb_ident.cli.terminal import MOST_ROWS, Terminal, cell_len, table_lines, wrapped
+from tpjb_ident.cli.identification import cross_coupling_matters
+from tpjb_ident.cli.terminal import MOST_ROWS, Terminal, cell_len, table_lines, with_half, wrapped
 from tpjb_ident.columns import Column, words
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
 

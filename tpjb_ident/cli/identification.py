@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command
 from tpjb_ident.cli.options import refuse_unknown
-from tpjb_ident.columns import Column, amount, place_of
+from tpjb_ident.columns import amount, place_of
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted, listed
-from tpjb_ident.schema import DAMPING, KINDS, STIFFNESS, coefficient_column
+from tpjb_ident.schema import DAMPING, POINT_COLUMNS, STIFFNESS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,40 +23,11 @@ if TYPE_CHECKING:
 
 #: Share of the mean direct coefficient from which a cross-coupled one is shown.
 _CROSS_COUPLED = 0.1
-
-
-def with_half(value: float, half: float) -> str:
-    """A number with half its interval, or that there is none."""
-    if value == half == 0.0:  # the mass of a model without one
-        return "-"
-    if not math.isfinite(value) or (value == 0.0 and not half > 0.0):
-        return "no answer"
-    if not math.isfinite(half) or half <= 0:
-        return f"{value:.4g} ±?"
-    digits = min(3, max(0, -math.floor(math.log10(half)))) if half < 10 else 0
-    return f"{value:.{digits}f} ±{half:.{digits}f}"
-
-
-def coefficients(names: str) -> dict[str, Column | str]:
-    """Columns of K, C and M at the terminal, by those of the tables on disk."""
-    shown = {name: Column(f"{name} {{{KINDS[name[0]].quantity}}}", with_half) for name in names.split()}
-    return {coefficient_column(name): column for name, column in shown.items()}
-
-
-POINT: dict[str, Column | str] = {
-    "static_load_N": "load {load}",
-    "static_load_direction_deg": "dir. {angle}",
-    "shaft_speed_Hz": "speed {speed}",
-    "excitation_Hz": "exc. {frequency}",
-}
-_DIRECT = coefficients("kxx kyy cxx cyy")
-_MODELS: dict[str, Column | str] = {
-    "static_load_N": "load {load}",
-    "model": Column("model", words=True),
-    **_DIRECT,
-    **coefficients("mxx myy"),
-    "supported": Column("supported", words=True),
-}
+#: Columns of tables at the terminal: direct and cross-coupled coefficients, models, what tells points apart.
+DIRECT = "kxx_N_per_m kyy_N_per_m cxx_Ns_per_m cyy_Ns_per_m"
+_CROSS = "kxy_N_per_m kyx_N_per_m cxy_Ns_per_m cyx_Ns_per_m"
+_MODELS = f"static_load_N model {DIRECT} mxx_kg myy_kg supported"
+POINT = " ".join(POINT_COLUMNS)
 
 
 def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | None) -> IdentifySettings:
@@ -152,15 +123,10 @@ def _show_coefficients(c: Command, title: str, frame: pd.DataFrame) -> None:
     """Print K and C of every point with half the width of their intervals, and its flags."""
     if frame.empty:
         return
-    rotation: dict[str, Column | str] = {"rotation": Column("rotation", words=True)}
-    point = POINT | (rotation if "clockwise" in set(frame["rotation"]) else {})
-    share, flags = Column("out {share}", ".0f"), Column("flags", words=True)
-    c.show_frame(
-        title, frame, {**point, **_DIRECT, "outlier_fraction": share, "quality": flags}, file="coefficients.csv"
-    )
-    cross = coefficients("kxy kyx cxy cyx")
+    point = f"{POINT} rotation" if "clockwise" in set(frame["rotation"]) else POINT
+    c.show_frame(title, frame, f"{point} {DIRECT} outlier_fraction quality", "coefficients.csv")
     title = "cross-coupled, where they are more than a tenth of the direct ones"
-    c.show_frame(title, frame[cross_coupling_matters(frame)], {**point, **cross}, file="coefficients.csv")
+    c.show_frame(title, frame[cross_coupling_matters(frame)], f"{point} {_CROSS}", "coefficients.csv")
 
 
 def cross_coupling_matters(frame: pd.DataFrame) -> BoolArray:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import itertools
+import math
 import shlex
 import shutil
 import sys
 import textwrap
 import time
 import unicodedata
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.columns import Column
@@ -31,8 +34,30 @@ MOST_ROWS = 40
 _FORETELLS = 0.02
 #: Between two columns of a table.
 _SPACE = "  "
+
+
+def _printed() -> dict[str, Column]:
+    """How columns of tables on disk are printed, by name."""
+    text = Path(__file__).with_name("printed.csv").read_text(encoding="utf-8")
+    rows = csv.DictReader(text.splitlines())
+    return {row["column"]: Column(row["title"], row["form"], bool(row["words"])) for row in rows}
+
+
+PRINTED = _printed()
 #: Called with what is being done, how many are done, of how many.
 Progress = Callable[[str, int, int], None]
+
+
+def with_half(value: float, half: float) -> str:
+    """A number with half its interval, or that there is none."""
+    if value == half == 0.0:  # the mass of a model without one
+        return "-"
+    if not math.isfinite(value) or (value == 0.0 and not half > 0.0):
+        return "no answer"
+    if not math.isfinite(half) or half <= 0:
+        return f"{value:.4g} ±?"
+    digits = min(3, max(0, -math.floor(math.log10(half)))) if half < 10 else 0
+    return f"{value:.{digits}f} ±{half:.{digits}f}"
 
 
 class Terminal:
@@ -99,15 +124,19 @@ class Terminal:
             lines.append(f"{len(texts) - len(shown)} more rows: {file} has all {len(texts)}")
         print("\n".join(["", *lines]), flush=True)
 
-    def show_frame(self, title: str, frame: pd.DataFrame, columns: Mapping[str, Column | str], file: str = "") -> None:
-        """Print columns of a table on disk; those with a form of several numbers with half of their intervals."""
+    def show_frame(self, title: str, frame: pd.DataFrame, names: str, file: str = "") -> None:
+        """Print columns of a table on disk, by the names in a text; what has an interval with half of it."""
+        columns: list[Column | str] = []
         cells: list[Iterable[Any]] = []
-        for name, column in columns.items() if len(frame) else ():
-            has_interval = isinstance(column, Column) and callable(column.form)
-            half = 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]) if has_interval else None
-            cells.append(frame[name] if half is None else zip(frame[name], half, strict=True))
+        for name in names.split() if len(frame) else ():
+            column, values = PRINTED[name], frame[name]
+            if f"{name}_lo" in frame:
+                column = column._replace(form=with_half)
+                values = zip(values, 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]), strict=True)
+            columns.append(column)
+            cells.append(values)
         if cells:
-            self.show(title, columns.values(), zip(*cells, strict=True), file)
+            self.show(title, columns, zip(*cells, strict=True), file)
 
     def show_table(self, table: Table, name: str = "") -> None:
         """Print a table of a page; `name` says what it is of."""

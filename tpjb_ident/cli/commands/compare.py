@@ -11,7 +11,7 @@ from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import identified, identify_settings, refuse_untrusted, write_identification
 from tpjb_ident.cli.inputs import model_settings, open_source, parse_share
 from tpjb_ident.cli.options import DEMO, known_names, named
-from tpjb_ident.columns import Column, amount, words
+from tpjb_ident.columns import amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import listed, percent
 
@@ -97,12 +97,10 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
         following = f"tpjb diagnose {paths[1]}" if on_records else f"tpjb view {c.target}"
         write_difference_report(c.folder, difference, named(c.options), c.inputs, following)
     points = difference.points
-    columns: dict[str, Column | str] = {"static_load_N": "load {load}", "excitation_Hz": "exc. {frequency}"}
-    for name in DIRECT:
-        columns[f"{name}_changed"] = Column(name, words=True)
     with c.conclusion(difference_sentences(difference), following):
         title = f"{difference.a.name} and {difference.b.name}: changed?"
-        c.show_frame(title, points, columns, file="difference.csv")
+        names = " ".join(f"{name}_changed" for name in DIRECT)
+        c.show_frame(title, points, f"static_load_N excitation_Hz {names}", "difference.csv")
     if points.empty:
         raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")
     if bad := difference.untrusted_points():

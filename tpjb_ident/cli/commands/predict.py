@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.identification import POINT
+from tpjb_ident.cli.identification import DIRECT, POINT
 from tpjb_ident.cli.inputs import model_settings, operating_points, parse_value, pivot_choice, rotation_choice
 from tpjb_ident.cli.options import ROCKER, choices, known_names
-from tpjb_ident.columns import Column
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.executors import background_job, forks
@@ -28,15 +27,6 @@ if TYPE_CHECKING:
 FEW = 20
 #: Share of a direct coefficient from which the mesh is too coarse.
 _COARSE = 0.05
-#: Columns of the printed table, by those of prediction.csv.
-COLUMNS: dict[str, Column | str] = {
-    **POINT,
-    "kxx_N_per_m": Column("kxx {stiffness}", ".1f"),
-    "kyy_N_per_m": Column("kyy {stiffness}", ".1f"),
-    "cxx_Ns_per_m": Column("cxx {damping}", ".1f"),
-    "cyy_Ns_per_m": Column("cyy {damping}", ".1f"),
-    "min_film_m": Column("h_min {length}", ".3g"),
-}
 
 
 @command(
@@ -75,7 +65,7 @@ def predict(
     state = f"{bad} did NOT converge" if bad else "all converged"
     c.print(f"{drawing.name}: {counted(len(frame), 'operating point')}, {state}.")
     c.next("export", c.target, "--to", "ross")
-    c.show_frame(drawing.name, frame, COLUMNS, "prediction.csv")
+    c.show_frame(drawing.name, frame, f"{POINT} {DIRECT} min_film_m", "prediction.csv")
     if bad:  # whether the bearing carries the load at all
         c.next("predict", bearing, "--load", load, "--speed", speed, "--pivots", "rigid", "--thermal", "isothermal")
         raise NotTrustedError(

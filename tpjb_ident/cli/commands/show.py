@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.command import HDF5, Command, campaign_place, command
 from tpjb_ident.cli.options import DEMO
+from tpjb_ident.cli.terminal import PRINTED
 from tpjb_ident.columns import Column, channel_unit, in_us_units, size, symbol, words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.presentation import UNITS
@@ -28,20 +29,9 @@ BARS = " ▁▂▃▄▅▆▇█"
 #: What is this far below the highest bar is blank.
 DECADES = 3.0
 #: Columns of channels.csv at the terminal.
-_COLUMNS: dict[str, Column | str] = {
-    "channel": Column("channel", words=True),
-    "unit": Column("unit", words=True),
-    "samples": "samples",
-    "sample_rate_Hz": "rate {frequency}",
-    "mean": Column("mean", ".4g"),
-    "standard_deviation": Column("std", ".3g"),
-    "minimum": Column("min", ".4g"),
-    "maximum": Column("max", ".4g"),
-    "line1_Hz": Column("line {frequency}", ".4g"),
-    "line2_Hz": Column("2nd", ".4g"),
-    "line3_Hz": Column("3rd", ".4g"),
-    "missing": "missing",
-}
+_COLUMNS = (
+    "channel unit samples sample_rate_Hz mean standard_deviation minimum maximum line1_Hz line2_Hz line3_Hz missing"
+)
 
 
 @command(
@@ -85,7 +75,8 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
     dead = [name for name, look in looks.items() if look.flat]
     c.print(f"{title}: {counted(len(displayed), 'channel')}, {', '.join(dead) or 'none'} dead.")
     rows = [_row(s, looks[s.name]) for s in displayed]
-    c.show(title, _COLUMNS.values(), map(itemgetter(*_COLUMNS), rows))
+    names = _COLUMNS.split()
+    c.show(title, [PRINTED[name] for name in names], map(itemgetter(*names), rows))
     spectra = []
     for name, look in looks.items():
         if len(look.frequency) > 4:
