@@ -5,8 +5,10 @@ from __future__ import annotations
 import contextlib
 import math
 import re
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from rigdata.calibration import DIMENSIONS, VECTOR_QUANTITIES, reading_gain
@@ -14,35 +16,13 @@ from rigdata.manifest.fields import MARK
 from rigdata.readers.series import is_time
 from rigdata.units import UnitError, is_signal, parse_quantity, parse_unit
 
-#: Words of rigs in several languages -> quantity; the first that fits counts.
-_WORDS = (
-    ("speed", r"speed|rpm|drehzahl|tach|keyph|vitesse|giri|^n\d*$|^k\d*$"),
-    ("temperature", r"temp|^t\d+|thermo|^tc\d*"),
-    ("acceleration", r"acc|beschl|^a\d*[a-z]?$|^a\d+[hvxy]$"),
-    ("force", r"force|load|kraft|last|forza|^f[xyhv]?\d*$|^l\d+[hvxy]?$|^lc(?![a-z])|cell"),
-    ("pressure", r"press|druck|^p\d+$"),
-    ("displacement", r"disp|prox|probe|weg|gap|sonde|^x\d*[ab]?$|^y\d*[ab]?$|^d[xy]?\d*$|^x\d+[a-d]$|^y\d+[a-d]$"),
-)
-#: How loggers spell units, in small letters, and how a manifest does.
-_SPELT = {
-    "u/min": "rpm", "1/min": "rpm", "min-1": "rpm", "rpm": "rpm", "degc": "degC", "deg c": "degC", "c": "degC",
-    "degf": "degF", "deg f": "degF", "f": "degF", "m/s2": "m/s^2", "volts": "V", "volt": "V", "newtons": "N",
-    "newton": "N", "mils": "mil", "microns": "um", "micron": "um", "lbs": "lbf", "lb": "lbf", "pounds": "lbf",
-    "g's": "g", "gs": "g", "psig": "psi", "hertz": "Hz",
-    "n": "N", "kn": "kN", "klb": "klbf", "m_s2": "m/s^2", "mps2": "m/s^2",
-}  # fmt: skip
+#: Tables of `words.toml`.
+WORDS: dict[str, dict[str, str]] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
 #: Units that a name may end with after an underscore; V, H and A there are directions and numbers of sensors.
 _SUFFIXES = "um|mm|mils?|k?N|lbf|m_s2|m/s2|mps2|g|deg[CF]|rpm|Hz|mV|bar|k?Pa|MPa|psi"
 _UNIT_IN_NAME = re.compile(rf"^(.*?)(?:\s*[(\[]([^)\]]{{1,12}})[)\]]|_({_SUFFIXES}))\s*$")
 #: What rigs call a pad.
 PAD = "(?:pad|shoe|segment|schuh|klotz|patin)"
-#: Directions [deg] that the end of a name hints at.
-_HINTS = {
-    0.0: r"(?:horiz|waa?ge?r)\w*$|(?:^[fdal]?|[\d_\-. ])[xh]$",
-    90.0: r"(?:vert|senkr|lotr)\w*$|(?:^[fdal]?|[\d_\-. ])[yv]$",
-    45.0: r"[a-z _\-]45(?: ?deg)?$",
-    135.0: r"[a-z _\-]135(?: ?deg)?$",
-}
 
 
 @dataclass(frozen=True)
@@ -92,7 +72,7 @@ def guess_channel(name: str, unit: str) -> ChannelGuess:
     if quantity := quantity_of_unit(usable):
         gain = reading_gain(quantity, usable, None)
         return ChannelGuess(Entry(quantity, "file"), usable, gain=gain, hint=_hint(bare, quantity))
-    for quantity, pattern in _WORDS:
+    for quantity, pattern in WORDS["quantities"].items():
         if re.search(pattern, bare, re.IGNORECASE):
             return ChannelGuess(Entry(quantity, "guess", "its name"), usable, hint=_hint(bare, quantity))
     return ChannelGuess(Entry(), usable)
@@ -102,7 +82,7 @@ def usable_unit(unit: str) -> str:
     """Write a logger's unit so that a manifest can hold it; "" if it is none."""
     text = unit.strip().replace("°", "deg").replace("µ", "u").replace("μ", "u").replace("²", "2")
     text = re.sub(r"\s*/\s*", "/", text)
-    text = _SPELT.get(text.lower(), text)
+    text = WORDS["units"].get(text.lower(), text)
     try:
         parse_unit(text)
     except UnitError:
@@ -127,7 +107,8 @@ def _hint(name: str, quantity: str) -> float:
     """Direction [deg] that the end of a name hints at, for quantities that have one."""
     if quantity not in VECTOR_QUANTITIES:
         return math.nan
-    return next((angle for angle, end in _HINTS.items() if re.search(end, name, re.IGNORECASE)), math.nan)
+    hints = WORDS["directions"].items()
+    return next((float(angle) for angle, end in hints if re.search(end, name, re.IGNORECASE)), math.nan)
 
 
 def as_described(guess: ChannelGuess, table: Mapping[str, Any]) -> ChannelGuess:

@@ -17,19 +17,11 @@ from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError, refuse
-from rigdata.survey.channels import OPEN, PAD, Entry, quantity_of_unit, usable_unit
+from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, quantity_of_unit, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
 from rigdata.survey.survey import Survey, survey
 
-_EXAMPLE = {
-    "displacement": '"7.78 mV/um"',
-    "force": '"1 mV/N", or "2.0 mV/V" with full_scale and excitation of the bridge',
-    "acceleration": '"10 mV/g"',
-    "temperature": '"15 K/V", with zero = "0 degC"',
-    "pressure": '"1 V/bar"',
-    "speed": '"100 mV/Hz"',
-}
 _HEAD = (
     "# Draft by `tpjb init`. No mark: read from the files. (records): concluded from them, with the figure.",
     f"# (guess): confirm or correct. {MARK}: open. After changes `tpjb init --update` fills in what follows from them.",
@@ -83,7 +75,7 @@ def _tables(surveyed: Survey) -> _Tables:
     tables: _Tables = {}
     for name, guess in surveyed.channels.items():
         quantity = guess.quantity.value
-        is_raw = quantity in _EXAMPLE and quantity_of_unit(guess.unit) == ""
+        is_raw = quantity in WORDS["sensitivities"] and quantity_of_unit(guess.unit) == ""
         model = models.setdefault((quantity, guess.unit), name) if is_raw else name
         tables["channels", name] = _channel_lines(name, surveyed, model)
     for run in surveyed.runs:
@@ -111,7 +103,7 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
         reason = "constant over the line that is taken for the shaft's"
         lines.append(_line("sensitivity", Entry(ratio, "records", reason)))
     elif not is_like and quantity_of_unit(guess.unit) == "":
-        lines.append(f'sensitivity = "{MARK}"   # such as {_EXAMPLE.get(quantity, "1 V per unit")}')
+        lines.append(f'sensitivity = "{MARK}"   # such as {WORDS["sensitivities"].get(quantity, "1 V per unit")}')
     usual = surveyed.channels[model].polarity if is_like else 1
     if guess.axis.value is not None and (guess.polarity < 0 or guess.polarity != usual):
         lines.append(f"polarity = {guess.polarity}")

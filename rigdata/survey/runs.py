@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.readers.series import Series
-from rigdata.survey.channels import OPEN, PAD, Entry, Guesses, usable_unit
+from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, Guesses, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.spectrum import Peaks, amplitude_spectrum, strongest
 from rigdata.units import UnitError, unit_factor
@@ -28,12 +28,6 @@ NEAR = 0.02
 _TURNS = {"rpm": 1.0 / 60.0, "Hz": 1.0, "1/s": 1.0, "rad/s": 1.0 / (2.0 * math.pi)}
 #: A number and what may be its unit in a file's name; a sign behind a letter is a hyphen.
 _NUMBER = r"(?<![\d.,])((?<![a-z0-9])[-+])?(\d+(?:[.,]\d+)?)[ _]?"
-_BY_NAME = (
-    ("dry_pivot", r"pivot|dry|trocken|steps?|stufen|^p-"),
-    ("clearance", r"clear|spiel|^c-"),
-    ("locus", r"locus|locat|^l-"),
-    ("dynamic", r"dyn|excit|shake|^d-"),
-)
 
 
 @dataclass(frozen=True)
@@ -88,7 +82,7 @@ def of_quantity(export: Export, channels: Guesses, quantity: str) -> list[Series
 
 def _kind(stem: str, forces: list[Series], moves: list[Series], lines: Peaks) -> Entry:
     """Movement beats a misleading name, but a name tells a constant load from none."""
-    named = next((kind for kind, pattern in _BY_NAME if re.search(pattern, stem, re.IGNORECASE)), "")
+    named = next((kind for kind, pattern in WORDS["kinds"].items() if re.search(pattern, stem, re.IGNORECASE)), "")
     movement, why = _by_movement(forces, moves, lines)
     if movement and movement != named and named and {movement, named} != {"dynamic", "locus"}:
         return Entry(movement, "records", f"{why} (its name says {named})")
