@@ -35,10 +35,13 @@ class StaticTests:
     clearance: ClearancePolygon | None
     locus: Locus | None
     left_out: tuple[Condition, ...] = ()
+    other_sweeps: tuple[ClearancePolygon, ...] = ()  #: where all of them are measured
 
 
-def measure_static(campaign: Campaign, bearing: Bearing, with_pivots: bool = True) -> StaticTests:
-    """Measure what the campaign holds of pivot curves, clearance polygon and locus."""
+def measure_static(
+    campaign: Campaign, bearing: Bearing, with_pivots: bool = True, every_sweep: bool = False
+) -> StaticTests:
+    """Measure what the campaign holds of pivot curves, clearance polygon (of the coldest sweep) and locus."""
     from tpjb_ident.clearance.locus import measure_locus
     from tpjb_ident.pivot import fit_pivots
 
@@ -46,11 +49,12 @@ def measure_static(campaign: Campaign, bearing: Bearing, with_pivots: bool = Tru
     curves: tuple[PivotCurve, ...] = ()
     if with_pivots and campaign.of_kind("dry_pivot"):
         curves = fit_pivots(campaign, angles, on_refusal="few")
-    polygons, excluded = measure_sweeps(campaign.of_kind("clearance"), angles, curves or None, most=1)
+    most = None if every_sweep else 1
+    polygons, excluded = measure_sweeps(campaign.of_kind("clearance"), angles, curves or None, most)
     clearance = polygons[0] if polygons else None
     locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
     excluded += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]
-    return StaticTests(curves, clearance, locus, tuple(excluded))
+    return StaticTests(curves, clearance, locus, tuple(excluded), tuple(polygons[1:]))
 
 
 def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Problem] = ()) -> list[Problem]:

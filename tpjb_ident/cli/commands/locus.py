@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.options import DEMO
-from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError, NotTrustedError
-
-if TYPE_CHECKING:
-    from rigdata.campaign import Campaign
-    from tpjb_ident.clearance.measure import ClearancePolygon
-    from tpjb_ident.compare.static_tests import StaticTests
 
 
 @command(f"tpjb locus {DEMO}")
@@ -28,7 +21,9 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
         raise BadInputError(f"campaign {source.id}: has neither locus nor clearance runs; there is nothing to measure.")
     drawing = c.bearing_of(source, bearing)
     import numpy as np
+    import pandas as pd
 
+    from tpjb_ident.clearance.measure import pairs_frame
     from tpjb_ident.compare.static_tests import measure_static
     from tpjb_ident.report.comparison_page import clearance_table
     from tpjb_ident.report.panels import position_panels
@@ -36,14 +31,18 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     angles = np.array([pad.pivot_angle for pad in drawing.pads])
     drawn = np.array([pad.assembled_clearance for pad in drawing.pads])
     with c.results("measuring positions"):
-        static = measure_static(source, drawing)
+        static = measure_static(source, drawing, every_sweep=True)
         measured = {"clearance": static.clearance, "locus": static.locus}
         parts = {name: part for name, part in measured.items() if part is not None}
         if not parts:
             raise BadInputError("; ".join(condition.detail for condition in static.left_out))
         for name, part in parts.items():
             c.table(name, part.to_frame())
-        polygons, refused = _other_polygons(c, source, angles.tolist(), static)
+        polygons = static.other_sweeps
+        if static.clearance is not None and polygons:
+            frames = [polygon.to_frame() for polygon in (static.clearance, *polygons)]
+            c.table("clearance_runs", pd.concat(frames, ignore_index=True))
+            c.table("clearance_pairs", pairs_frame(static.clearance, polygons))
         c.draw(position_panels(static.clearance, (angles, drawn), static.locus, {}, polygons))
     c.print(f"{source.id}: {' and '.join(f'the {name} is measured' for name in parts)}.")
     if static.clearance is not None:
@@ -54,28 +53,8 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
         c.print(f"locus: {str(static.locus).partition('; ')[0]}")
     for polygon in polygons:
         c.print(str(polygon))
-    c.judge({name: part.status for name, part in parts.items()} | {"left out": (*static.left_out, *refused)})
+    c.judge({name: part.status for name, part in parts.items()} | {"left out": static.left_out})
     if static.clearance is None and source.of_kind("clearance"):
         raise NotTrustedError(
             "no clearance run can be used: positions count from the probes' zero, not from the centre."
         )
-
-
-def _other_polygons(
-    c: Command, source: Campaign, angles: list[float], static: StaticTests
-) -> tuple[list[ClearancePolygon], list[Condition]]:
-    """Measure the sweeps besides the one that counts, and write their tables; what is wrong with those of no use."""
-    from tpjb_ident.clearance.measure import measure_sweeps, pairs_frame
-
-    first = static.clearance
-    if first is None:
-        return [], []
-    others = [run for run in source.of_kind("clearance") if run.id != first.run]
-    polygons, refused = measure_sweeps(others, angles, static.curves or None)
-    if polygons:
-        import pandas as pd
-
-        frames = [polygon.to_frame() for polygon in (first, *polygons)]
-        c.table("clearance_runs", pd.concat(frames, ignore_index=True))
-        c.table("clearance_pairs", pairs_frame(first, polygons))
-    return polygons, refused
