@@ -145,7 +145,7 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
     return MotionLine(
         frequency=frequency,
         oil_force=force,
-        displacement=np.linalg.solve(h, force.T).T,
+        displacement=np.asarray(np.linalg.solve(h, force.T).T, dtype=complex),
         force=force - instruments.true_mass * acceleration,
         acceleration=acceleration,
     )

@@ -7,6 +7,7 @@ that they do not change with a sensor's sensitivity.
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass, replace
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -84,10 +85,11 @@ class Noise:
     @classmethod
     def like_samples(cls) -> Noise:
         """As strong as in the sample campaigns, of every kind that they have."""
-        entries = dict(PAPER_RIG["noise"])
-        channels = {name: ChannelNoise(**amounts) for name, amounts in entries.pop("channels").items()}
-        parts = {"glitches": Glitches(**entries.pop("glitches")), "dry": DryImperfections(**entries.pop("dry"))}
-        return cls(**channels, **parts, **entries)
+        entries: dict[str, Any] = dict(PAPER_RIG["noise"])
+        for name, amounts in entries.pop("channels").items():
+            entries[name] = ChannelNoise(**amounts)
+        entries |= {"glitches": Glitches(**entries["glitches"]), "dry": DryImperfections(**entries["dry"])}
+        return cls(**entries)
 
     def scaled(self, factor: float) -> Noise:
         """Return it with the channels' noise `factor` times as strong; shaft, actuators, dry tests as they are."""

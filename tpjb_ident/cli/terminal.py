@@ -129,7 +129,8 @@ class Terminal:
         columns: list[Column | str] = []
         cells: list[Iterable[Any]] = []
         for name in names.split() if len(frame) else ():
-            column, values = PRINTED[name], frame[name]
+            column = PRINTED[name]
+            values: Iterable[Any] = frame[name]
             if f"{name}_lo" in frame:
                 column = column._replace(form=with_half)
                 values = zip(values, 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]), strict=True)
