@@ -39,18 +39,13 @@ def vector_rows(channels: Sequence[Channel], readings: Sequence[FloatArray]) -> 
 
     Least squares where there are more than two channels, NaN where fewer than two directions have a value.
     """
-    axes = np.array([channel.axis or 0.0 for channel in channels])
+    axes = [channel.axis or 0.0 for channel in channels]
     values = np.array([channel.to_si(reading) for channel, reading in zip(channels, readings, strict=True)])
-    present = np.isfinite(values)
-    if present.all():
-        return np.asarray(inverse_directions(tuple(axes.tolist())) @ values)
-    rows = np.full((2, values.shape[1]), np.nan)
-    patterns, pattern_of = np.unique(present, axis=1, return_inverse=True)
-    for index, pattern in enumerate(patterns.T):
-        samples = pattern_of.ravel() == index
-        if np.count_nonzero(pattern) >= 2:
-            rows[:, samples] = inverse_directions(tuple(axes[pattern].tolist())) @ values[np.ix_(pattern, samples)]
-    return rows
+    rows = inverse_directions(tuple(axes)) @ values
+    partial = np.isnan(rows[0])
+    if partial.any():
+        rows[:, partial] = plane_vector(directions(axes), values[:, partial].T).real.T
+    return np.asarray(rows)
 
 
 def plane_vector(along: FloatArray, values: ComplexArray) -> ComplexArray:
