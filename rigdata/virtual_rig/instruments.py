@@ -127,7 +127,7 @@ class Instruments:
         """Reading of every probe with the shaft in the bearing centre."""
         return {s.name: s.zero + s.polarity * s.scale * s.error.offset for s in self.of("displacement")}
 
-    def with_errors(self, mass_error: float = 0.0, **effects: float) -> Instruments:
+    def with_errors(self, housing_mass: float = 0.0, **effects: float) -> Instruments:
         """Add measurement effects by their canonical names and meanings (physics.md)."""
         errors: dict[str, dict[str, float]] = {}
         for name, value in effects.items():
@@ -136,5 +136,5 @@ class Instruments:
         return replace(
             self,
             sensors=tuple(s.with_error(**errors.get(s.quantity, {})) for s in self.sensors),
-            housing_mass_error=self.housing_mass_error + mass_error,
+            housing_mass_error=self.housing_mass_error + housing_mass,
         )

@@ -48,8 +48,8 @@ def seen_in_records(instruments: vr.Instruments) -> np.ndarray:
         {"loadcell_gain": 0.98},
         {"loadcell_crosstalk": 0.04},
         {"channel_delay": 150e-6},
-        {"mass_error": 12.0},
-        {"probe_gain": 0.97, "probe_rotation": -0.03, "loadcell_crosstalk": 0.02, "mass_error": -8.0},
+        {"housing_mass": 12.0},
+        {"probe_gain": 0.97, "probe_rotation": -0.03, "loadcell_crosstalk": 0.02, "housing_mass": -8.0},
     ],
     ids=lambda e: "-".join(e) or "none",
 )
@@ -79,7 +79,7 @@ def test_each_effect_means_what_physics_md_says(name):
 @pytest.mark.parametrize("error", [0.0, 12.0])
 def test_housing_mass_error_takes_its_inertia_out_of_the_force(error):
     """F_cell + stated mass a_h = F_oil - error a_h, with a_h = -omega^2 F_oil / (k - m omega^2)."""
-    instruments = vr.Instruments.like_paper().with_errors(mass_error=error)
+    instruments = vr.Instruments.like_paper().with_errors(housing_mass=error)
     share = error * OMEGA**2 / (np.array([4e8, 6e8]) - (30.0 + error) * OMEGA**2)
     np.testing.assert_allclose(apparent_stiffness(H, OMEGA, instruments), (1 + share)[:, None] * H, rtol=1e-12)
 

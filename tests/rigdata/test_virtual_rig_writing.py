@@ -83,7 +83,7 @@ def test_a_failure_on_the_way_leaves_nothing_behind(tmp_path, layout):
 
 
 def test_the_truth_is_not_in_the_campaign(tmp_path):
-    hidden = rig(instruments=vr.Instruments.like_paper(seed=1).with_errors(probe_gain=1.0437, mass_error=7.31))
+    hidden = rig(instruments=vr.Instruments.like_paper(seed=1).with_errors(probe_gain=1.0437, housing_mass=7.31))
     truth = vr.write_campaign(tmp_path / "c", hidden, "csv")
     text = (tmp_path / "c" / "campaign.toml").read_text()
     assert "1.0437" not in text

@@ -225,7 +225,7 @@ def compare_campaign(
 
     settings = settings or CompareSettings()
     _check(campaign, settings)
-    report = progress or _silent
+    report = progress or (lambda text, done, total: None)
     least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = settings.identify or IdentifySettings()
     chosen = replace(chosen, clearance=chosen.clearance or least)
@@ -258,7 +258,7 @@ def model_side(
 
     from tpjb_ident.compare.static_tests import measure_static
 
-    report = progress or _silent
+    report = progress or (lambda text, done, total: None)
     points = sorted({run.point for run in campaign.of_kind("dynamic")}) if points is None else points
     report("fitting pivot curves, clearance and locus", 0, 1)
     static = measure_static(campaign, bearing, "measured" in settings.variants)
@@ -318,10 +318,6 @@ def _check(campaign: Campaign, settings: CompareSettings) -> None:
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to compare")
 
 
-def _silent(text: str, done: int, total: int) -> None:
-    """Progress that nobody watches."""
-
-
 def _labelled(progress: Progress, label: str) -> Progress:
     return lambda text, done, total: progress(f"{label}, {text}", done, total)
 
@@ -356,11 +352,10 @@ def predicted_loci(loci: pd.DataFrame | None) -> dict[str, FloatArray]:
     return {str(name): rows.to_numpy() for name, rows in models}
 
 
-def locus_distances(loci: pd.DataFrame | None) -> dict[str, float]:
+def locus_distances(loci: pd.DataFrame | None) -> dict[Any, float]:
     """Root mean square distance between measured and predicted locus by pivot model [m]; empty without locus runs."""
-    distances = {}
-    for name, places in predicted_loci(loci).items():
-        assert loci is not None
-        off = places - loci.loc[loci["pivots"] == name, ["x_m", "y_m"]].to_numpy()
-        distances[name] = float(np.sqrt(np.nanmean((off**2).sum(axis=1))))
-    return distances
+    if loci is None:
+        return {}
+    squares = (loci["x_m_predicted"] - loci["x_m"]) ** 2 + (loci["y_m_predicted"] - loci["y_m"]) ** 2
+    distances = np.sqrt(squares.groupby(loci["pivots"], sort=False).mean())
+    return dict(distances.items())

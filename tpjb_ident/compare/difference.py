@@ -231,7 +231,7 @@ def _at_common_loads(*curves: pd.DataFrame) -> list[pd.DataFrame]:
     """Curves of one pad at loads at which both were measured."""
     low = max(curve["force_N"].min() for curve in curves)
     high = min(curve["force_N"].max() for curve in curves)
-    force = np.linspace(low, high, _PIVOT_LOADS) if low < high else np.zeros(0)
+    force = np.linspace(low, high, _PIVOT_LOADS if low < high else 0)
     frames = []
     for curve in curves:
         frame = pd.DataFrame({"force_N": force}).assign(pad=curve["pad"].iloc[0])
@@ -250,9 +250,9 @@ def _clearance(a: Side, b: Side) -> pd.DataFrame:
     frames = []
     for table in (a.clearance, b.clearance):
         frame = pads.merge(table)
-        half = HALF * frame[f"{_CLEARANCE}_se"]
-        ends = {f"{_CLEARANCE}_lo": frame[_CLEARANCE] - half, f"{_CLEARANCE}_hi": frame[_CLEARANCE] + half}
-        frames.append(frame.assign(**ends))
+        for end, sign in (("_lo", -HALF), ("_hi", HALF)):
+            frame[_CLEARANCE + end] = frame[_CLEARANCE] + sign * frame[f"{_CLEARANCE}_se"]
+        frames.append(frame)
     judged = _judged(_CLEARANCE, frames, 0.0, _NO_CHANGE * frames[0][_CLEARANCE], len(pads))
     return pd.DataFrame({"pad": pads["pad"], **judged})
 

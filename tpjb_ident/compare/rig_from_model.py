@@ -25,14 +25,14 @@ from rigdata.virtual_rig.truth import load_vector
 from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.errors import TpjbError
 
-#: Effects that act on the records: which error of the virtual instruments each one is, and its parameter.
+#: Effects that act on the records, as errors of the virtual instruments, and the parameter of each.
 INSTRUMENT_ERRORS = {
-    "probe_gain": ("probe_gain", "factor"),
-    "probe_rotation": ("probe_rotation", "angle"),
-    "loadcell_gain": ("loadcell_gain", "factor"),
-    "loadcell_crosstalk": ("loadcell_crosstalk", "fraction"),
-    "channel_delay": ("channel_delay", "delay"),
-    "housing_mass": ("mass_error", "mass_error"),
+    "probe_gain": "factor",
+    "probe_rotation": "angle",
+    "loadcell_gain": "factor",
+    "loadcell_crosstalk": "fraction",
+    "channel_delay": "delay",
+    "housing_mass": "mass_error",
 }
 #: Where the rig's temperature sensors sit, as a fraction of the arc.
 _SENSOR_POSITION = 0.75
@@ -100,6 +100,6 @@ def erring_instruments(instruments: Instruments, effects: Iterable[Effect]) -> I
     """Add the effects that act on the records to a rig's instruments; other effects do nothing here."""
     for effect in effects:
         if effect.name in INSTRUMENT_ERRORS:
-            argument, parameter = INSTRUMENT_ERRORS[effect.name]
-            instruments = instruments.with_errors(**{argument: effect.parameters[parameter]})
+            size = effect.parameters[INSTRUMENT_ERRORS[effect.name]]
+            instruments = instruments.with_errors(**{effect.name: size})
     return instruments

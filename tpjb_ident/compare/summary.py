@@ -178,7 +178,7 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
     if abs(off[pad]) < _AS_DRAWN:
         within = amount(abs(off[pad]), "length", ".1g")
         return [f"The measured clearance is that of the drawing, within {within} at every pad."]
-    digits, unit = (1, symbol("length")) if size("length") < 1e-5 else (3, symbol("length"))
+    digits, unit = 1 if size("length") < 1e-5 else 3, symbol("length")
     median, worst = (signed(per("length") * float(v), digits) for v in (np.nanmedian(off), off[pad]))
     return [
         f"The measured clearance differs from the drawing by {worst} {unit} at pad #{pad + 1}, where it differs most "

@@ -59,8 +59,7 @@ def compare_table(
         for name in names:
             model = ModelSettings(name, settings.thermal, settings.effects)
             frames[name] = pd.DataFrame(predict_points(bearing, points, model, progress))
-    cells = zip(points, rows[VALUES].to_numpy(), rows[ERRORS].to_numpy(), rows["status"], strict=True)
-    results = tuple(_point(*row) for row in cells)
+    results = tuple(map(_point, points, rows[VALUES].to_numpy(), rows[ERRORS].to_numpy(), rows["status"]))
     identification = Identification(path.stem, _METHOD, results, np.zeros((1, 8 * len(points))))
     source = TableSource(path.stem)
     return Comparison(source, bearing, settings, identification, (), None, None, frames, None, tuple(remarks))
