@@ -17,14 +17,6 @@ from rigdata.virtual_rig.truth import PAPER_RIG
 
 #: Full scales that cells are sold with [N].
 _CELL_SIZES = (20e3, 50e3, 100e3, 200e3, 500e3)
-#: Quantity and entry of `SensorError` of every effect that acts on readings.
-_EFFECTS = {
-    "probe_gain": ("displacement", "gain"),
-    "probe_rotation": ("displacement", "angle"),
-    "channel_delay": ("displacement", "delay"),
-    "loadcell_gain": ("force", "gain"),
-    "loadcell_crosstalk": ("force", "cross"),
-}
 
 
 @dataclass(frozen=True)
@@ -131,7 +123,7 @@ class Instruments:
         """Add measurement effects by their canonical names and meanings (physics.md)."""
         errors: dict[str, dict[str, float]] = {}
         for name, value in effects.items():
-            quantity, entry = _EFFECTS[name]
+            quantity, entry = PAPER_RIG["effects"][name]
             errors.setdefault(quantity, {})[entry] = value
         return replace(
             self,
