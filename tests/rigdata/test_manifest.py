@@ -7,8 +7,10 @@ import tomllib
 
 import pytest
 
-from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, RUN
+from rigdata.calibration import DIMENSIONS, UNCALIBRATED
+from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, RUN, SHAFT
 from rigdata.manifest.manifest import MAX_MANIFEST, parse_manifest
+from rigdata.operating_point import ROTATIONS
 from rigdata.problem import RigDataError
 from rigdata.units import SI_UNITS, parse_quantity
 from tests.rigdata.manifest_tables import markdown
@@ -227,6 +229,12 @@ def test_control_and_right_to_left_characters_do_not_reach_the_message():
 
 def test_every_key_is_in_the_docs(checkout):
     assert markdown() in (checkout / "docs" / "campaigns.md").read_text("utf-8")
+
+
+def test_choices_of_the_table_are_those_of_the_code():
+    choices = {field.key: tuple(field.choices) for field in (*SHAFT, *CHANNEL)}
+    assert choices["rotation"] == ROTATIONS
+    assert choices["quantity"] == (*DIMENSIONS, *UNCALIBRATED, "ignore")
 
 
 @pytest.mark.parametrize("field", [f for f in CHANNEL + RUN + HOUSING + ACQUISITION if f.kind in SI_UNITS])
