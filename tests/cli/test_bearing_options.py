@@ -46,7 +46,11 @@ def test_predict_turns_the_shaft_the_way_that_is_asked_for_or_that_the_bearing_s
         assert float(asked[column]) == pytest.approx(sign * float(usual[column]), rel=1e-6)
     drawing.write_text(text.replace("[bearing]", '[bearing]\nrotation = "clockwise"'), "utf-8")
     stated = predicted(drawing, tmp_path / "stated", "--load-direction", "-120 deg")
-    assert {**stated, "status": ""} == {**asked, "status": ""}
+    # where arrays lie in memory chooses a loop's vector or plain form: equal to rounding
+    other = {name: cell for name, cell in stated.items() if name != "status" and cell != asked[name]}
+    assert {name: float(cell) for name, cell in other.items()} == pytest.approx(
+        {name: float(asked[name]) for name in other}, rel=1e-9
+    )
     against = predicted(drawing, tmp_path / "against", "--rotation", "counter-clockwise")
     assert against["rotation"] == "counter-clockwise"
     assert float(against["kxx_N_per_m"]) < 0.6 * float(usual["kxx_N_per_m"])
