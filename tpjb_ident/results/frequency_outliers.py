@@ -31,15 +31,15 @@ _CLEARLY, _ALONE = 25.0, 5.0
 
 def with_frequency_outliers(points: Sequence[PointResult]) -> tuple[PointResult, ...]:
     """The points, with a condition on each that stands apart from the other frequencies of its load."""
-    doubts: dict[int, Condition] = {}
-    for members in by_static_point(points):
-        outlier = frequency_outlier([p.stiffness for p in members])
+    result = list(points)
+    for places in by_static_point(points):
+        outlier = frequency_outlier([points[i].stiffness for i in places])
         if outlier is not None:
-            place, share = outlier
-            others = f"the other {len(members) - 1} frequencies of this load"
-            text = f"h is {100 * share:.0f} % from what {others} let expect"
-            doubts[id(members[place])] = Condition("frequency-outlier", text)
-    return tuple(replace(p, quality=merged(p.quality, (doubts[id(p)],))) if id(p) in doubts else p for p in points)
+            point, share = points[places[outlier[0]]], outlier[1]
+            others = f"the other {len(places) - 1} frequencies of this load"
+            doubt = Condition("frequency-outlier", f"h is {100 * share:.0f} % from what {others} let expect")
+            result[places[outlier[0]]] = replace(point, quality=merged(point.quality, (doubt,)))
+    return tuple(result)
 
 
 def frequency_outlier(estimates: Sequence[DynamicStiffness]) -> tuple[int, float] | None:
