@@ -6,6 +6,7 @@ import functools
 import gc
 import os
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -57,7 +58,16 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
         def _split_scope(self, nodeid: str) -> str:
             return STRUCTURE if nodeid.startswith(STRUCTURE) else super()._split_scope(nodeid)
 
+    config.option.loadscopereorder = False  # the order is that of the collection, see below
     return ByFile(config, log)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Workers begin with the structure and files of many slow tests: at last, quick files let both end together."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return
+    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    items.sort(key=lambda item: (not item.nodeid.startswith(STRUCTURE), -slow[item.path]))
 
 
 @pytest.fixture(scope="session")

@@ -220,3 +220,9 @@ def test_every_third_party_import_is_declared_and_the_wheel_holds_the_three_pack
         at_top |= dict.fromkeys((tops & extras) - declared, path)
     assert not {top: name for top, name in found.items() if top not in declared | extras}
     assert not at_top
+
+
+def test_what_the_mutation_score_takes_exists():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["mutmut"]
+    named = {*project["only_mutate"], *project["pytest_add_cli_args_test_selection"]}
+    assert {name for name in named if not list(ROOT.glob(name))} == set()
