@@ -244,4 +244,4 @@ def _records(
 
 def _variances(A_inverse: FloatArray, K: FloatArray, S_inverse: FloatArray) -> FloatArray:
     """Variances of the points' numbers, (P, n)."""
-    return np.einsum("paa->pa", A_inverse) + np.einsum("pak,kl,pal->pa", K, S_inverse, K, optimize=True)
+    return np.einsum("paa->pa", A_inverse) + np.einsum("pak,pak->pa", K @ S_inverse, K)

@@ -348,9 +348,9 @@ class _Rows:
     def residuals(self, weight: FloatArray, conditional: FloatArray) -> Residuals:
         """What is left of blocks of a weight (n,), and what the numbers of their points take; `given` (n, a, a)."""
         J_h, conditional = self.J[:, :, : conditional.shape[1]], weight[:, None, None] * conditional
-        leverage = np.einsum("nka,nab,nkb->n", J_h, conditional, J_h, optimize=True) / np.maximum(self.counted, 1.0)
+        leverage = np.einsum("nka,nka->n", J_h @ conditional, J_h) / np.maximum(self.counted, 1.0)
         along = self.along
-        spent = np.einsum("nca,nab,ncb->nc", along.J_h, conditional, along.J_h, optimize=True)
+        spent = np.einsum("nca,nca->nc", along.J_h @ conditional, along.J_h)
         chi_square = np.einsum("nk,nk->n", self.r, self.r)
         return Residuals(chi_square, self.counted, leverage, along.chi_square, along.information, spent)
 

@@ -184,16 +184,14 @@ def _locus(test: LocusTest, reading: SolvedPoint) -> FloatArray:
 
 def _dry(setup: Setup, test: DryTest) -> FloatArray:
     """Logarithm of the tangent compliance at loads as read."""
-    out = []
-    for load in test.load:
-        step = 0.02 * load
-        forces, deflections = dry_curve(setup, test.pad, np.array([load - step, load + step]))
-        gain = forces[1] / (load + step)  # loads are as read: ask at the true ones
-        if abs(gain - 1.0) > 1e-12:
-            forces, deflections = dry_curve(setup, test.pad, np.array([load - step, load + step]) / gain)
-        slope = max(float(np.diff(deflections)[0] / np.diff(forces)[0]), 1e-16)
-        out.append(math.log(slope))
-    return np.array(out)
+    load = np.array(test.load)
+    around = np.concatenate([0.98 * load, 1.02 * load])
+    forces, deflections = dry_curve(setup, test.pad, around)
+    gain = forces / around
+    if np.any(np.abs(gain - 1.0) > 1e-12):  # loads are as read: ask at the true ones
+        forces, deflections = dry_curve(setup, test.pad, around / gain)
+    rise, push = (values[len(load) :] - values[: len(load)] for values in (deflections, forces))
+    return np.asarray(np.log(np.maximum(rise / push, 1e-16)))
 
 
 def _clearance(setup: Setup, push_load: float) -> list[FloatArray]:
