@@ -7,9 +7,9 @@ from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork, Wedge
 from model.film.reynolds import FilmForces, solve_film
 
-_JFO, _TURBULENT = range(2)
+SWIFT_STIEBER, _JFO, _TURBULENT = range(3)
 #: Names, and by what compiled loops know them.
-FILM_MODELS = {"swift-stieber": None, "jfo": _JFO, "turbulent": _TURBULENT}
+FILM_MODELS = {"swift-stieber": SWIFT_STIEBER, "jfo": _JFO, "turbulent": _TURBULENT}
 
 
 @inner
@@ -24,11 +24,11 @@ def solve_by(
 ) -> FilmForces:
     """Pressure of one film; sharp: its derivatives once more, with the pressure that `work` holds.
 
-    Where the model is None when a search is compiled, the search has no code of the others. `supplied`: oil there is
-    at the leading edge [kg/s/m].
+    Where the model is None when a search is compiled, the search has `SWIFT_STIEBER` alone. `supplied`: oil there is at
+    the leading edge [kg/s/m].
     """
     if model is None:
         return solve_film(grid, work, wedge, speed, sharp, None, sharp)
     if model == _JFO:
         return solve_film_jfo(grid, work, wedge, speed, sharp, (1.0, supplied))
-    return solve_film(grid, work, wedge, speed, sharp, True, sharp)
+    return solve_film(grid, work, wedge, speed, sharp, model == _TURBULENT, sharp)

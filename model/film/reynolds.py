@@ -85,7 +85,8 @@ def solve_film(
     solved : bool, optional
         `work` holds this film's pressure: only its derivatives are asked for, sharp.
     turbulent : bool, optional
-        True: by `model.film.turbulence`; `work.gained` is set to the heat beyond that of a laminar film [W].
+        True: by `model.film.turbulence`; `work.gained` is set to the heat beyond that of a laminar film [W]. None: no,
+        and without compiling it.
 
     Returns
     -------
@@ -99,7 +100,7 @@ def solve_film(
     if not min_film > 0.0:
         return FilmForces(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)), min_film, -1)
     faces = film_faces(grid, work, wedge, speed)
-    if turbulent is not None:
+    if turbulent is not None and turbulent:
         resist(grid, work, speed, faces)
     source = np.empty(len(work.unknown))
     net_inflow(grid, faces.couette, source)
@@ -111,7 +112,7 @@ def solve_film(
             weight = rupture_line(grid, work, faces, source)
             factorise(work.band)
         derivatives(grid, work, faces)
-        if turbulent is not None:
+        if turbulent is not None and turbulent:
             heat_beyond(grid, work, speed)
     force, stiffness, damping = integrate(grid, work, weight)
     return FilmForces(force, stiffness, damping, min_film, steps)

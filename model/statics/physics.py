@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from model.film.models import FILM_MODELS
+from model.film.models import FILM_MODELS, SWIFT_STIEBER
 from model.film.oil_state import Running
 from model.pad.pivot import OTHER
 from model.pivots import encoded
@@ -30,8 +30,7 @@ def couples_heat(setup: Setup) -> bool:
 def case_of(setup: Setup, load: FloatArray, surface_speed: float, heat: float) -> Case:
     """The numbers of a search; `heat` is the share of the heat that the films keep."""
     oil, growth, length = setup.bearing.oil, setup.growth, setup.bearing.length
-    kept = (1.0 - setup.heat_loss) * heat
-    supply = float(setup.inlet_temperature)
+    kept, supply = (1.0 - setup.heat_loss) * heat, float(setup.inlet_temperature)
     thermal = ISOTHERMAL if setup.thermal == "isothermal" else ALONE
     if couples_heat(setup):
         thermal = ACROSS if setup.thermal == "thd" else COUPLED
@@ -40,13 +39,15 @@ def case_of(setup: Setup, load: FloatArray, surface_speed: float, heat: float) -
         carried = (oil.specific_heat / kept, oil.conductivity / kept)
     if thermal == ISOTHERMAL:
         carried = (math.inf, oil.conductivity)
+    model, bends = FILM_MODELS[rupture_of(setup)], setup.flexible_pads or setup.pads_follow
+    plain = model == SWIFT_STIEBER and not (couples_heat(setup) or bends)
     return Case(
         load=np.array(load, dtype=float),
         running=Running(float(surface_speed), oil_constants(oil), carried),
         hold=hold_numbers(setup),
         accuracy=float(setup.accuracy),
         thermal=thermal,
-        rupture=FILM_MODELS[rupture_of(setup)],
+        rupture=None if plain else model,
         supply=supply,
         kept=float(kept),
         mixing=float(setup.mixing),
@@ -61,7 +62,7 @@ def case_of(setup: Setup, load: FloatArray, surface_speed: float, heat: float) -
 
 def bodies_of(setup: Setup, case: Case, films: Sequence[PadFilm]) -> BodyStack | None:
     """The bodies of pads that bend or conduct; None for rigid pads whose plain films are for themselves."""
-    if case.rupture is None and not (couples_heat(setup) or setup.flexible_pads or case.axial):
+    if case.rupture is None:
         return None
     bodies = tuple(f.deformation for f in films if f.deformation is not None)
     factor = setup.bending_factor if setup.flexible_pads else 0.0

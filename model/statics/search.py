@@ -104,8 +104,7 @@ class Search:
 
     def _state(self) -> PadState:
         n = len(self.films)
-        works = self.works
-        crosses = self.crosses
+        works, crosses = self.works, self.crosses
         bends = self.setup.flexible_pads or self.case.axial
         shape = works.extra.shape
         faces, warmth = (works.temperature,) * 2 if crosses is None else (crosses.face, crosses.temperature)
@@ -230,7 +229,7 @@ class Search:
         pads, even = self.pads, []
         for m in np.flatnonzero(self.state.idle & (np.abs(self.margins()) < _EVEN)).tolist():
             film = self.films[m]
-            if pads.attitudes[m, 3, 0] == 0.0 and self.case.rupture is None and self.case.thermal == ISOTHERMAL:
+            if film.rupture == "swift-stieber" and self.case.thermal == ISOTHERMAL and pads.attitudes[m, 3, 0] == 0.0:
                 film.work.ruptured[:] = False
                 wedge = (float(pads.clearance[m]), float(pads.attitudes[m, 1, 0]), 0.0)
                 set_viscosity(film.work, self.case.running.oil)
@@ -285,8 +284,7 @@ class Search:
 
     def run(self) -> Equilibrium:
         """Iterate from where the search stands."""
-        size = vector_size(self.state, self.case)
-        memory = fresh_memory(size)
+        memory = fresh_memory(vector_size(self.state, self.case))
         problem = Problem(self.grids, self.bodies, self.pads, self.works, self.state, self.case)
         code = ASKS_OIL
         while code in (ASKS_OIL, ASKS_HEAT, ASKS_LAWS, ASKS_STABLE):

@@ -32,7 +32,7 @@ class Case(NamedTuple):
     hold: HoldNumbers
     accuracy: float
     thermal: int
-    rupture: int | None  #: One of `model.film.models.FILM_MODELS`.
+    rupture: int | None  #: One of `model.film.models.FILM_MODELS`; None: a search of plain films and rigid pads alone.
     supply: float  #: Temperature of fresh oil [degC].
     kept: float  #: Share of the dissipation that stays in the films; in `running.heat` where films are alone.
     mixing: float  #: lambda
