@@ -176,17 +176,14 @@ def tables(out: Path) -> list[bytes]:
     return [(out / f"{name}.csv").read_bytes() for name in TABLES]
 
 
-def command(path: Path, out: Path, *options: str) -> list[str]:
-    return [sys.executable, "-P", "-m", "tpjb_ident", "identify", str(path), "--out", str(out), *options]
-
-
 @pytest.mark.slow
 def test_a_killed_command_goes_on_and_ends_with_the_same_tables(tmp_path):
     path = written(tmp_path / "c.h5", rig(POINTS, seed=8))  # long enough to be killed half-way
-    subprocess.run(command(path, tmp_path / "whole"), check=True, capture_output=True)
+    ended(0, "identify", path, "--out", tmp_path / "whole")
     assert sorted(p.name for p in (tmp_path / "whole").iterdir() if p.name.startswith(".")) == []
     out = tmp_path / "killed"
-    process = subprocess.Popen(command(path, out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    command = [sys.executable, "-P", "-m", "tpjb_ident", "identify", str(path), "--out", str(out)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     until = time.monotonic() + 60
     while len(list((out / KEPT).glob("*.npz"))) < 3 and time.monotonic() < until and process.poll() is None:
         time.sleep(0.002)
@@ -194,7 +191,7 @@ def test_a_killed_command_goes_on_and_ends_with_the_same_tables(tmp_path):
     process.wait()
     assert not (out / "coefficients.csv").exists()
     assert len(list((out / KEPT).glob("*.npz"))) >= 3
-    subprocess.run(command(path, out, "--workers", "2"), check=True, capture_output=True)
+    ended(0, "identify", path, "--out", out, "--workers", 2)
     assert tables(out) == tables(tmp_path / "whole")
     assert not (out / KEPT).exists()
 
