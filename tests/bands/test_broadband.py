@@ -316,7 +316,7 @@ CONTRADICT = "accelerometers-contradict-cells"
     ],
 )
 def test_accelerometers_that_contradict_the_cells_are_told_for_every_kind(tmp_path, kind, fault, named):
-    path = campaign(tmp_path, BandRig(kind=kind, seconds=8.0), seed=90001)
+    path = campaign(tmp_path, BandRig(kind=kind, seconds=4.0), seed=90001)
     if fault is not None:
         with h5py.File(path, "r+") as file:
             for group in file["runs"].values():
