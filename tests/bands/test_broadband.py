@@ -495,6 +495,7 @@ def test_a_multisine_that_starts_late_or_ends_early_is_taken_where_it_drives(tmp
     assert (np.abs(np.hstack([off.real, off.imag])) < band.half_width()).mean() > 0.88
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("band", [(8.0, 60.0), (25.0, 28.5)])
 def test_a_band_in_which_nothing_drives_gives_no_line_and_says_so(tmp_path, band):
     rig = cf.Rig(excitation="multisine", band=band, seconds=6.0, directions=(20.0, 110.0), amplitude=1e-9)
@@ -504,6 +505,7 @@ def test_a_band_in_which_nothing_drives_gives_no_line_and_says_so(tmp_path, band
     assert pd.read_csv(tmp_path / "out" / "frf.csv").empty
 
 
+@pytest.mark.slow
 def test_blows_need_devices_of_one_rate(tmp_path):
     """What a blow holds beyond the band folds back into it where a device is slow."""
     rig = cf.Rig(excitation="impact", seconds=2.0, directions=(20.0, 110.0))

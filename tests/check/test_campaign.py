@@ -206,6 +206,7 @@ def test_noise_free_data_are_not_dead(campaign_of):
     assert {p.severity for p in found} == {"note"}
 
 
+@pytest.mark.slow
 def test_every_problem_is_reported_not_just_the_first(campaign_of):
     faults = (
         Fault("dead", "d-05000-25-02", "X1A"),

@@ -92,6 +92,7 @@ def test_probes_that_agree_are_not_apart(gains, how):
     assert found(made(**{"probes": PLANES, "gains": gains, **how})) == ({}, [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gains", "names"),
     [

@@ -105,6 +105,7 @@ def test_a_repeated_direction_shows_the_drift(campaign):
     assert "do not hold how well the shaft comes back" in said
 
 
+@pytest.mark.slow
 def test_intervals_hold_how_well_the_shaft_comes_back_where_repeats_tell_it(campaign, monkeypatch):
     """Of positions that scatter by half a micrometre from run to run, beside a drift, 95 % intervals hold 95 %."""
     source, rng, inside = Repeated(campaign, [0, 1, 2, 3], np.zeros((10, 2))), np.random.default_rng(3), []

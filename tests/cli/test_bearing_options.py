@@ -66,6 +66,7 @@ def test_a_sense_that_there_is_not_is_refused_with_the_nearest(name, rocker_file
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("section", "entry", "value"), PER_PAD, ids=[entry for _, entry, _ in PER_PAD])
 def test_a_list_of_another_length_than_pads_is_refused(section, entry, value, rocker_file, tmp_path):
     drawing = tmp_path / "b.toml"

@@ -68,6 +68,7 @@ def test_rows_meet_points_by_load_direction_speed_and_excitation_and_gaps_stay_g
     assert "rows that meet no point: line 4 (5000 N at -90 deg, shaft 22 Hz, excited at 40 Hz)" in remark
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "meets"),
     [

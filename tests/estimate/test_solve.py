@@ -16,6 +16,7 @@ from tpjb_ident.estimate.solve import Solver
 EXACT = Case(noise=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case",
     [

@@ -398,6 +398,7 @@ def rows_of_a_rotor_program(path, to):
     return np.loadtxt(lines[first:], ndmin=2), re.findall(r"\((.+?)\)", lines[first - 1])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("us")
 def test_every_format_writes_us_units_or_refuses_them_by_name(to, tmp_path):
     frame = doubtful_table()

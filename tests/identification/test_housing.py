@@ -35,6 +35,7 @@ def test_cell_stiffness_is_read_from_runs_over_a_band(tmp_path, kind):
     assert found == pytest.approx((4e8, 6e8), rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [({}, set()), ({"gain": -1.0}, CONTRADICT), ({"late": 3e-3}, CONTRADICT)],

@@ -113,6 +113,7 @@ def test_frequency_fits_cover_loads_run_at_several_frequencies(result):
     assert frame["kyy_N_per_m"][0] == pytest.approx(1.8e8, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_bad_window_is_listed_with_its_run_time_and_reason(campaign):
     spoiled = _with_offset(only(campaign, "d-05000-30"), "d-05000-30-03", 0.9, 1.4)
     (point,) = identify(spoiled, IdentifySettings(methods=())).points

@@ -147,6 +147,7 @@ class TestBimetal:
         mismatch = (two.thermal_expansion - one.thermal_expansion) * rise
         return 6 * mismatch * (1 + m) ** 2 / (h * (3 * (1 + m) ** 2 + (1 + m * n) * (m**2 + 1 / (m * n))))
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("lining", "backing"), [(3e-3, 13e-3), (1e-3, 1e-3), (4e-3, 2e-3)])
     def test_curvature(self, lining: float, backing: float) -> None:
         """A nearly straight strip (R = 1e4 h); curvature from the middle half, free of end effects."""

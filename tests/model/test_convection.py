@@ -13,6 +13,7 @@ from model.pad.operators import LARGEST, pad_operators
 COARSE = MeshDensity(2, 1, 3, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("even", [True, False])
 def test_between_the_nodes(rocker, even, monkeypatch):
     monkeypatch.setenv("TPJB_CACHE", "off")  # what is stored may come from another number of threads: 1e-15

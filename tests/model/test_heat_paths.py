@@ -95,7 +95,8 @@ def test_all_paths_together_converge_with_few_steps(rocker):
 def test_isothermal_films_exchange_nothing(rocker):
     a = run(rocker, thermal="isothermal")
     b = run(rocker, Options(conduction=True, isothermal_journal=True), thermal="isothermal")
-    np.testing.assert_array_equal(a.h, b.h)
+    # to rounding: where arrays lie in memory decides the order of a library's sums
+    np.testing.assert_allclose(a.h, b.h, rtol=0.0, atol=1e-12 * np.abs(a.h).max())
 
 
 def test_what_pads_conduct_is_what_films_lose(rocker):

@@ -95,6 +95,7 @@ def write(path, stairs: Stairs, seed: int) -> None:
         file.attrs["manifest"] = text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stairs", "within"),
     [
@@ -115,6 +116,7 @@ def test_curves_are_the_pivots_and_nothing_creeps(tmp_path, stairs, within):
         assert ("contact-incomplete" in curve.status) or curve.angle not in np.radians(UPPER)
 
 
+@pytest.mark.slow
 def test_a_ramp_behind_a_free_way_has_no_holds(tmp_path):
     write(tmp_path / "stairs.h5", Stairs(held=False), 7)
     curves = ti.fit_pivots(ti.load_campaign(tmp_path / "stairs.h5"), np.radians(ANGLES))

@@ -135,7 +135,8 @@ def errors_within(curve, law, spreads):
     return np.abs(error)
 
 
-@pytest.mark.parametrize("kind", ["rocker", pytest.param("sphere", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["rocker", "sphere"])
 def test_one_campaign(tmp_path, kind):
     laws = bearing(kind, 1)
     source, truth = campaign(tmp_path / "c.h5", laws, 1)

@@ -168,6 +168,7 @@ def test_wrong_entries_are_named_with_their_line(entry, says):
     assert lines[0] in (f"line {last}", f"line {last - 1}")
 
 
+@pytest.mark.slow
 def test_patterns_without_end_are_refused():
     stars = ", ".join(f'"*{i}"' for i in range(2000))
     refused("more than 1000 patterns", extra=f"{FOR}runs = [{stars}]\n")

@@ -180,6 +180,7 @@ NO_RECORDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NO_RECORDS)
 def test_what_is_no_record_in_this_file_is_refused_before_anything_is_loaded(path, name):
     store, says = NO_RECORDS[name]

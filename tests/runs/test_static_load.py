@@ -60,6 +60,7 @@ def test_of_two_groups_that_agree_the_one_at_the_set_points_is_common():
     np.testing.assert_allclose(miss.real, [0.0] * 3 + [0.05] * 3, atol=5e-3)
 
 
+@pytest.mark.slow
 def test_cells_that_read_otherwise_in_half_of_the_runs_are_in_the_interval(tmp_path):
     """A load that seems to miss its set point may as well be a gain of the cells: 4 % at +-1.5 % otherwise."""
     rig = cf.Rig(loads=(3000.0, 5000.0, 8000.0), frequencies=(25.0,), directions=(0.0, 30.0, 60.0, 90.0, 120.0, 150.0))

@@ -132,6 +132,7 @@ def test_two_frequencies_tell_the_corner_by_the_housing_s_equations(seed, corner
     assert "low corner" in term.words(of(solution, "corner"))[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(
     ("hertz", "corner", "late"), [((25.0, 45.0), 1.2, 0.0), ((25.0,), 0.7, 0.0), ((25.0, 45.0), 0.0, 1e-3)]
@@ -149,6 +150,7 @@ def test_accelerometers_that_lead_have_a_corner_or_the_cells_come_late(seed, her
         assert of(solution, "corner").value[0] == pytest.approx(corner, abs=0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("wrong", [[-1.0, -1.0], [-1.0, 1.0]])
 @pytest.mark.parametrize(
@@ -354,6 +356,7 @@ def test_a_floating_stator_s_accelerometers_are_held_against_the_probes(late, sh
     assert term.conditions(of(solution, "housing")) == named
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("gives", [0.0, 1.5e-9])
 @pytest.mark.parametrize(
