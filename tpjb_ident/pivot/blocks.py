@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
@@ -31,8 +32,7 @@ _MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
 _TURN = 0.02  # of the load range: a smaller way back is noise
 
 
-@dataclass(frozen=True)
-class Hold:
+class Hold(NamedTuple):
     """One stretch of constant load."""
 
     start: float  #: [s]
@@ -149,7 +149,7 @@ def cut_blocks(time: FloatArray, vectors: FloatArray, holds: tuple[Hold, ...], l
 
 def _edges(time: FloatArray, holds: tuple[Hold, ...], length: float) -> tuple[FloatArray, IntArray]:
     """Start and stop of every piece (m, 2) [s] and its hold number (m,)."""
-    bounds = np.r_[time[0], np.ravel([(hold.start, hold.stop) for hold in holds]), time[-1]]
+    bounds = np.r_[time[0], np.ravel([hold[:2] for hold in holds]), time[-1]]
     pieces: list[tuple[float, float, int]] = []
     for k, (start, stop) in enumerate(itertools.pairwise(bounds)):
         number, usual = (k // 2, length) if k % 2 else (-1, 0.5 * length)

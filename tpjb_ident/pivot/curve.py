@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import optimize, special
+from scipy import integrate, special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.dry_record import PadDirection
 from tpjb_ident.pivot.law_fit import FRICTION, OFFSET, SCALE, LawFit
-from tpjb_ident.pivot.laws import interpolation
 from tpjb_ident.presentation import Presented
 
 if TYPE_CHECKING:
@@ -51,33 +50,21 @@ class Hysteresis:
         )
 
 
-def measure_loop(
-    load: FloatArray, deflection: FloatArray, covariance: FloatArray, branch: IntArray
-) -> Hysteresis | None:
-    """Area between loading and unloading points (n,) at loads [N]; covariance (n, n) of the deflections [m]."""
-    down, up = branch < 0, branch > 0
-    if up.sum() < 2 or down.sum() < 2:
+def measure_loop(law: LawFit, low: float, high: float) -> Hysteresis | None:
+    """Area between the readings of a fit while loading and while unloading, from load to load [N].
+
+    The fit knows drift from friction by what goes on within the holds, while an area between the steps themselves
+    takes every drift from the way up to the way down for a loss.
+    """
+    load = np.linspace(low, high, 200)
+    up, up_gradient = law.reading_gradient(load, np.ones(len(load)))
+    down, down_gradient = law.reading_gradient(load, -np.ones(len(load)))
+    stored = math.pi / 4.0 * (high - low) * abs(float(up[-1] - up[0]))
+    if not high > low or stored == 0.0:
         return None
-    low = float(max(load[up].min(), load[down].min()))
-    high = float(min(load[up].max(), load[down].max()))
-    if not high > low:
-        return None
-    grid, step = np.linspace(low, high, 200, retstep=True)
-    trapezoid = np.full(len(grid), step)
-    trapezoid[[0, -1]] *= 0.5
-    # trapezoid weights times interpolation weights: the area is linear in the points, so is its error
-    sensitivity, ends = np.zeros(len(load)), np.zeros(2)
-    for sign, members in ((1.0, down), (-1.0, up)):
-        order = np.flatnonzero(members)[np.argsort(load[members], kind="stable")]
-        # equal loads are set apart by a hair
-        knots = load[order] + 1e-9 * max(float(np.ptp(load[order])), 1.0) * np.arange(len(order))
-        sensitivity[order] = sign * (trapezoid @ interpolation(grid, knots))
-        ends = np.interp([low, high], load[order], deflection[order])
-    stored = math.pi / 4.0 * (high - low) * abs(float(ends[1] - ends[0]))
-    if stored == 0.0:
-        return None
-    energy = float(sensitivity @ deflection)
-    energy_se = math.sqrt(max(float(sensitivity @ covariance @ sensitivity), 0.0))
+    energy = float(integrate.trapezoid(down - up, load))
+    sensitivity = integrate.trapezoid(down_gradient - up_gradient, load, axis=0)
+    energy_se = math.sqrt(max(float(sensitivity @ law.covariance @ sensitivity), 0.0))
     return Hysteresis(energy, energy_se, energy / stored, energy_se / stored, (low, high))
 
 
@@ -192,24 +179,7 @@ class PivotCurve(Presented):
         load : array_like
             [N], not negative.
         """
-        return self.law.deflection(_positive("load", load))
-
-    def load(self, deflection: ArrayLike) -> FloatArray:
-        """Pad load [N] at deflections [m] (the inverse of `deflection`).
-
-        Parameters
-        ----------
-        deflection : array_like
-            [m], not negative.
-        """
-        values, top = _positive("deflection", deflection), self.valid_to
-        while self.deflection(top) < np.max(values, initial=0.0):
-            top *= 2.0
-
-        def load_at(deflection: float) -> float:
-            return float(optimize.brentq(lambda w: self.deflection(w) - deflection, 0.0, top, xtol=1e-12 * top))
-
-        return np.array([load_at(value) for value in values.ravel()]).reshape(values.shape)
+        return self.law.deflection(_positive(load))
 
     def stiffness(self, load: ArrayLike) -> FloatArray:
         """Tangent stiffness dW/d delta [N/m] at pad loads [N], what small vibrations feel (paper, Eq. 18).
@@ -219,7 +189,7 @@ class PivotCurve(Presented):
         load : array_like
             [N], not negative.
         """
-        return np.asarray(1.0 / self.law.compliance(_positive("load", load)))
+        return np.asarray(1.0 / self.law.compliance(_positive(load)))
 
     def secant(self, load: ArrayLike) -> FloatArray:
         """Secant stiffness W/delta [N/m] at pad loads [N], what the printed formulas mean (Eq. 16, 17).
@@ -229,7 +199,7 @@ class PivotCurve(Presented):
         load : array_like
             [N], not negative.
         """
-        return np.asarray(_positive("load", load) / self.deflection(load))
+        return np.asarray(_positive(load) / self.deflection(load))
 
     def stiffness_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
         """Interval of the tangent stiffness.
@@ -247,8 +217,7 @@ class PivotCurve(Presented):
             [N/m], shape of `load`. Random errors, drift, friction and the choice of the law; calibration is
             in `relative_calibration`.
         """
-        factor = np.exp(_quantile(level) * self.relative_stiffness_se(load))
-        return np.asarray(self.stiffness(load) / factor), np.asarray(self.stiffness(load) * factor)
+        return self._band(self.stiffness(load), load, level, secant=False)
 
     def secant_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
         """Interval of the secant stiffness [N/m]; as `stiffness_band`.
@@ -260,18 +229,24 @@ class PivotCurve(Presented):
         level : float, optional
             Of the interval, 0 to 1.
         """
-        factor = np.exp(_quantile(level) * self._log_se(load, secant=True))
-        return np.asarray(self.secant(load) / factor), np.asarray(self.secant(load) * factor)
+        return self._band(self.secant(load), load, level, secant=True)
 
-    def relative_stiffness_se(self, load: ArrayLike) -> FloatArray:
-        """Standard error of ln(tangent stiffness) at pad loads [N].
+    def _band(self, value: FloatArray, load: ArrayLike, level: float, secant: bool) -> tuple[FloatArray, FloatArray]:
+        factor = np.exp(_quantile(level) * self.relative_stiffness_se(load, secant))
+        return np.asarray(value / factor), np.asarray(value * factor)
+
+    def relative_stiffness_se(self, load: ArrayLike, secant: bool = False) -> FloatArray:
+        """Standard error of ln(stiffness) at pad loads [N].
 
         Parameters
         ----------
         load : array_like
             [N]
+        secant : bool
+            Of the secant stiffness instead of the tangent one.
         """
-        return self._log_se(load, secant=False)
+        variance = np.diag(self.relative_stiffness_covariance(load, secant))
+        return np.asarray(np.sqrt(variance)).reshape(np.shape(load))
 
     def relative_stiffness_covariance(self, load: ArrayLike, secant: bool = False) -> FloatArray:
         """Covariance of ln(stiffness) between pad loads (n,) [N], (n, n).
@@ -286,7 +261,7 @@ class PivotCurve(Presented):
         secant : bool
             Of the secant stiffness instead of the tangent one.
         """
-        loads = np.maximum(_positive("load", load).ravel(), 1e-6 * self.valid_to)
+        loads = np.maximum(_positive(load).ravel(), 1e-6 * self.valid_to)
         total = np.zeros((len(loads), len(loads)))
         leading, _ = self.law.log_softness(loads, secant)
         for fit, weight in zip(self.fits, self.weights, strict=True):
@@ -295,10 +270,6 @@ class PivotCurve(Presented):
             total += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))
         outside = np.maximum(loads / self.valid_to, float(np.min(self.steps.load)) / loads)
         return total + np.diag((EXTRAPOLATION_SPREAD * np.log(np.maximum(outside, 1.0))) ** 2)
-
-    def _log_se(self, load: ArrayLike, secant: bool) -> FloatArray:
-        variance = np.diag(self.relative_stiffness_covariance(load, secant))
-        return np.asarray(np.sqrt(variance)).reshape(np.shape(load))
 
     def reading_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Deflection that the steps should show while loading, and its interval.
@@ -318,7 +289,7 @@ class PivotCurve(Presented):
         value, lo, hi : ndarray
             [m], shape of `load`.
         """
-        values = _positive("load", load)
+        values = _positive(load)
         applied, up = values.ravel() / (1.0 - self.law.theta[FRICTION]), np.ones(values.size)
         centre, _ = self.law.reading_gradient(applied, up)
         variance = np.zeros(len(applied))
@@ -337,7 +308,7 @@ class PivotCurve(Presented):
         load : array_like
             [N]
         """
-        values = _positive("load", load)
+        values = _positive(load)
         return np.asarray((values < self.valid_from) | (values > self.valid_to))
 
     def to_frame(self) -> pd.DataFrame:
@@ -379,12 +350,12 @@ class PivotCurve(Presented):
         return "\n".join(lines)
 
 
-def _positive(name: str, values: ArrayLike) -> FloatArray:
-    """Loads or deflections as an array; refused where one is negative or none: a pivot can only be pressed."""
-    numbers = np.asarray(values, dtype=float)
-    if np.any(~(numbers >= 0.0)):
-        raise ArgumentError(f"{name} must be zero or positive, and not NaN: a pivot can only be pressed")
-    return numbers
+def _positive(load: ArrayLike) -> FloatArray:
+    """Loads as an array; refused where one is negative or none: a pivot can only be pressed."""
+    loads = np.asarray(load, dtype=float)
+    if np.any(~(loads >= 0.0)):
+        raise ArgumentError("load must be zero or positive, and not NaN: a pivot can only be pressed")
+    return loads
 
 
 def _quantile(level: float) -> float:

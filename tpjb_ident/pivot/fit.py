@@ -270,15 +270,13 @@ def _steps(records: Sequence[DryRecord], law: LawFit, noise: NoiseModel) -> Pivo
 
 
 def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
-    """Loop over the loads as applied: taking off the friction would close it.
-
-    The deflections are those of the fit at the steps: it knows drift from friction by what goes on within the holds,
-    while the area between the points themselves takes every drift from the way up to the way down for a loss.
-    """
+    """Loop over the loads as applied that both branches cover: taking off the friction would close it."""
     used = steps.weight > 0
-    applied = (steps.load / (1.0 - law.theta[FRICTION] * steps.branch))[used]
-    reading, gradient = law.reading_gradient(applied, steps.branch[used].astype(float))
-    return measure_loop(applied, reading, gradient @ law.covariance @ gradient.T, steps.branch[used])
+    applied = steps.load / (1.0 - law.theta[FRICTION] * steps.branch)
+    up, down = (applied[used & (steps.branch == branch)] for branch in (1, -1))
+    if min(len(up), len(down)) < 2:
+        return None
+    return measure_loop(law, float(max(up.min(), down.min())), float(min(up.max(), down.max())))
 
 
 def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> tuple[Condition, ...]:
