@@ -18,15 +18,20 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
 
 
+def _required(fits: bool, value: Any, name: str, expected: str) -> Any:
+    """The value of an argument, where it is what it must be."""
+    if not fits:
+        raise ArgumentError(f"{name}: must {expected}, got {type(value).__name__}.")
+    return value
+
+
 def as_campaign(value: Any, name: str) -> Campaign:
     """Return the campaign given, or open it."""
     if isinstance(value, (str, Path)):
         from rigdata import load_campaign
 
         return load_campaign(value)
-    if not hasattr(value, "runs"):
-        raise ArgumentError(f"{name}: must be a Campaign or the path of one, got {type(value).__name__}.")
-    campaign: Campaign = value
+    campaign: Campaign = _required(hasattr(value, "runs"), value, name, "be a Campaign or the path of one")
     return campaign
 
 
@@ -35,31 +40,25 @@ def as_bearing(value: Any, name: str) -> Bearing:
     from model.bearing import Bearing
     from model.bearing_file import load_bearing
 
-    if isinstance(value, Bearing):
-        return value
     if isinstance(value, (str, Path)):
         return load_bearing(value)
-    raise ArgumentError(f"{name}: must be a Bearing or the path of a bearing file, got {type(value).__name__}.")
+    bearing: Bearing = _required(isinstance(value, Bearing), value, name, "be a Bearing or the path of a bearing file")
+    return bearing
 
 
 def _path(value: Any, name: str) -> Any:
-    if not isinstance(value, (str, os.PathLike)):
-        raise ArgumentError(f"{name}: must be a path, got {type(value).__name__}.")
-    return value
+    return _required(isinstance(value, (str, os.PathLike)), value, name, "be a path")
 
 
 def _curves(value: Any, name: str) -> Any:
     curves = tuple(value) if isinstance(value, Iterable) else (value,)
     for curve in curves:
-        if not hasattr(curve, "stiffness_band"):
-            raise ArgumentError(f"{name}: must hold what fit_pivots gives, got {type(curve).__name__}.")
+        _required(hasattr(curve, "stiffness_band"), curve, name, "hold what fit_pivots gives")
     return curves
 
 
 def _comparison(value: Any, name: str) -> Any:
-    if not hasattr(value, "predictions"):
-        raise ArgumentError(f"{name}: must be what compare_campaign gives, got {type(value).__name__}.")
-    return value
+    return _required(hasattr(value, "predictions"), value, name, "be what compare_campaign gives")
 
 
 def least_clearance(campaign: Campaign, warn: Callable[[str], Any]) -> float | None:

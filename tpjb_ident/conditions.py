@@ -1,16 +1,54 @@
-"""Named conditions: what a result has to say about itself besides its numbers."""
+"""Named conditions: what a result has to say about itself besides its numbers.
+
+A new condition is one row of `condition_kinds.csv`: name, how grave it is, what it means, what to do; a `Condition`
+refuses a name that is not there. With an error a number is not to be trusted: the command ends with exit code 3. With a
+warning the number holds as far as its interval goes, and somebody should look. A note says how the number was made.
+"""
 
 from __future__ import annotations
 
+import csv
 import itertools
 from collections.abc import Iterable
-from typing import Any, Self, get_args
+from pathlib import Path
+from typing import Any, NamedTuple, Self, get_args
 
 from rigdata import problem
-from tpjb_ident.condition_kinds import KINDS, condition_kind
+from rigdata.near_names import hint
 
 #: How grave a condition or a finding can be, the gravest first.
 SEVERITIES = get_args(problem.Severity)
+#: Lines that may stand on the excitation beside those of the list: higher harmonics, and lines found in the record.
+_LINES = (
+    *(f"{n}X" for n in range(4, 11)),
+    *(f"{kind} {n}" for kind in ("mains", "harmonic") for n in range(2, 11)),
+    "found",
+)
+
+
+class UnknownConditionError(LookupError):
+    """A condition that is not in the registry: a mistake of the code, not of its input."""
+
+
+class ConditionKind(NamedTuple):
+    """What is known of a condition by its name alone."""
+
+    severity: problem.Severity
+    name: str
+    meaning: str
+
+
+def _registered() -> dict[str, ConditionKind]:
+    text = Path(__file__).with_name("condition_kinds.csv").read_text(encoding="utf-8")
+    rows: Any = csv.reader(text.splitlines()[1:])
+    kinds = [ConditionKind(*row) for row in rows]
+    meaning = "Another line is on the excitation and cannot be separated from it. Excite elsewhere."
+    kinds += [ConditionKind("warning", f"{line} on excitation line", meaning) for line in _LINES]
+    return {kind.name: kind for kind in kinds}
+
+
+#: Every condition by its name.
+KINDS = _registered()
 
 
 class Condition(problem.Condition):
@@ -20,7 +58,10 @@ class Condition(problem.Condition):
 
     def __new__(cls, name: str, detail: str = "") -> Self:
         """Make a condition from its name and its sentence."""
-        kind = condition_kind(name)
+        kind = KINDS.get(str(name))
+        if kind is None:
+            names = hint(name, KINDS, "tpjb_ident/condition_kinds.csv lists them:")
+            raise UnknownConditionError(f"condition {str(name)!r} is not known. {names}")
         return super().__new__(cls, kind.name, kind.severity, detail)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -29,7 +70,7 @@ class Condition(problem.Condition):
     @property
     def meaning(self) -> str:
         """What it means to the reader, and what to do."""
-        return condition_kind(self).meaning
+        return KINDS[str(self)].meaning
 
 
 def merged(*groups: tuple[Condition, ...]) -> tuple[Condition, ...]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 #: Rows of a table in a notebook.
 _MOST_ROWS = 30
 #: Unit in a column's name: the quantity whose unit people read.
-_DISPLAYED = {**{kind.suffix: kind.quantity for kind in KINDS.values()}, "N": "load", "m": "length"}
+_DISPLAYED = {**{kind.suffix: kind.quantity for kind in KINDS.values()}, "N": "load", "m": "length", "Pa": "pressure"}
 _WITH_UNIT = re.compile(rf"(.+?)_({'|'.join(_DISPLAYED)}|deg|Hz|K)(_lo|_hi|_se|_predicted)?")
 _COEFFICIENT = re.compile(r"[kc](?:xx|xy|yx|yy)_")
 _FOR_PEOPLE = re.compile(
@@ -97,18 +97,11 @@ def changed(settings: Any) -> str:
     return f"{type(settings).__name__}({', '.join(differing)})"
 
 
-_US = SYSTEMS["us"]
 #: Unit in a column's name: unit there in US units, its size in SI, and the zero of its scale in SI.
-UNITS = {
-    "N_per_m": ("lbf_per_in", _US["stiffness"][1], 0.0),
-    "Ns_per_m": ("lbfs_per_in", _US["damping"][1], 0.0),
-    "N": ("lbf", _US["load"][1], 0.0),
-    "m": ("mil", _US["length"][1], 0.0),
-    "kg": ("lb", _US["mass"][1], 0.0),
-    "Pa": ("psi", _US["pressure"][1], 0.0),
-    "degC": ("degF", 5 / 9, -160 / 9),
-    "K": ("degF", 5 / 9, 459.67 * 5 / 9),
-}
+UNITS = {"degC": ("degF", 5 / 9, -160 / 9), "K": ("degF", 5 / 9, 459.67 * 5 / 9)}
+for _suffix, _quantity in _DISPLAYED.items():
+    _symbol, _size = SYSTEMS["us"][_quantity]
+    UNITS[_suffix] = (_symbol.replace("/", "_per_").replace(" ", ""), _size, 0.0)
 _NAMES = re.compile(rf"(.+?)_({'|'.join(UNITS)})((?:_[a-z0-9]+)*)")
 #: Endings of what is a difference, which has no zero.
 _WIDTHS = re.compile(r"_se|_difference|95")

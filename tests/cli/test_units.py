@@ -12,7 +12,7 @@ from tests.command_line import tpjb
 from tpjb_ident.columns import SYSTEMS, amount, degrees, place_of, use_units
 from tpjb_ident.compare.effect_words import shown_unit
 from tpjb_ident.presentation import us_table
-from tpjb_ident.report.drawing.series import axis_of
+from tpjb_ident.report.drawing.picture import axis_label
 from tpjb_ident.schema import DAMPING, STIFFNESS, TABLES
 
 
@@ -34,7 +34,7 @@ def test_words_axes_and_coefficients_follow():
     assert amount(25.4e-6, "length") == "1 mil"
     assert degrees(40.0) == "104 °F"
     assert place_of(2224.11, 25.0) == "500 lbf, 25 Hz"
-    assert axis_of("load")[2] == "static load, lbf"
+    assert axis_label("load") == "static load, lbf"
     assert (STIFFNESS.display_unit, DAMPING.display_unit) == ("lbf/in", "lbf s/in")
     assert STIFFNESS.display_scale == pytest.approx(175.126835)
     assert shown_unit("N/m")[0] == "lbf/in"

@@ -119,7 +119,7 @@ def test_a_rival_that_the_data_do_not_rule_out_stands_beside_the_name(alone, bot
     rival = RankedCandidate("thermal_growth + oil_viscosity", 43.0, 0.2, GROWTH | oil(0.88), both)
     found = FoundEffect("thermal_growth", {"clearance_change": Estimate(9e-6, 8.8e-6, 9.2e-6, "m")})
     verdict = Verdict("named", (found,), (), (), "", (rival, named), (), {}, {}, Remainder(0.2, 0.0, "kyy", 0.5))
-    (section,) = _other_explanations(verdict)
+    section = _other_explanations(verdict)
     assert len(section.notes) == 1
     assert section.notes[0].endswith(says)
 

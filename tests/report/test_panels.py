@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tpjb_ident.report.drawing.series import longest_series
-from tpjb_ident.report.panels import coefficient_sections, position_panels
+from tpjb_ident.report.drawing.picture import longest_series
+from tpjb_ident.report.sections import coefficient_sections, position_panels
 
 NAMES = [f"{s}{e}_{u}" for s, u in (("k", "N_per_m"), ("c", "Ns_per_m")) for e in ("xx", "xy", "yx", "yy")]
 

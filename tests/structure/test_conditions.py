@@ -8,8 +8,7 @@ import pickle
 import pytest
 
 from tests.structure.sources import imports_and_calls, texts
-from tpjb_ident.condition_kinds import KINDS, UnknownConditionError
-from tpjb_ident.conditions import Condition, merged, sentences, untrusted
+from tpjb_ident.conditions import KINDS, Condition, UnknownConditionError, merged, sentences, untrusted
 
 
 def stated_names(source):

@@ -57,7 +57,7 @@ def test_the_site_lists_pages_that_exist_and_the_whole_guide():
 
 
 def test_troubleshooting_names_every_condition():
-    from tpjb_ident.condition_kinds import KINDS
+    from tpjb_ident.conditions import KINDS
 
     text = (ROOT / "docs" / "guide" / "troubleshooting.md").read_text(encoding="utf-8")
     by_line = {name for name in KINDS if name.endswith(" on excitation line")}  # one row for many lines

@@ -28,8 +28,7 @@ from tpjb_ident.compare.comparison import (
     possible_variants,
 )
 from tpjb_ident.compare.predictions import ModelSettings, predict_points
-from tpjb_ident.condition_kinds import KINDS
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import KINDS, Condition
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.identification import Identification

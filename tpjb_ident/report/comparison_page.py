@@ -14,22 +14,21 @@ from tpjb_ident.columns import amount, size, symbol
 from tpjb_ident.compare.comparison import predicted_loci
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
-from tpjb_ident.report.drawing.picture import MODEL_LABELS
-from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
-from tpjb_ident.report.laboratory_sections import (
+from tpjb_ident.report.drawing.picture import DIRECT, MODEL_LABELS, point_labels, points_table
+from tpjb_ident.report.page import Page, Section, Table, table_of, write_page
+from tpjb_ident.report.sections import (
     budget_table,
-    clearance_cells,
     coefficient_cells,
-    evidence_sections,
+    coefficient_sections,
+    evidence_section,
     flags_line,
+    pivot_panels,
+    position_panels,
     set_up_section,
-    stiffness_cell,
     tested_facts,
     values_table,
 )
-from tpjb_ident.report.page import Page, Section, Table, table_of, write_page
-from tpjb_ident.report.panels import coefficient_sections, pivot_panels, position_panels
-from tpjb_ident.rounding import fixed, percent, signed
+from tpjb_ident.rounding import fixed, percent, signed, with_interval
 from tpjb_ident.schema import DAMPING, KINDS, STIFFNESS, coefficient_column
 
 if TYPE_CHECKING:
@@ -114,55 +113,47 @@ def deviations_table(table: pd.DataFrame) -> Table:
 
 
 def _sections(comparison: Comparison, frame: pd.DataFrame, flagged: Sequence[tuple[str, Condition]]) -> list[Section]:
-    sections = [*coefficient_sections(frame), *_pivot_sections(comparison), *_position_sections(comparison)]
     campaign: Any = comparison.campaign
+    evidence: list[Section] = []
     tables = [measured_table(comparison.identification)]
     if comparison.has_records:
-        sections += evidence_sections(campaign, comparison.identification)
+        evidence.append(evidence_section(campaign, comparison.identification))
         tables.append(budget_table(comparison.identification))
-    sections.append(
-        Section(
-            "Operating points",
-            notes=[
-                "Intervals are 95 %, random and calibration errors together. Outliers is the share of record windows "
-                "that got no weight."
-            ],
-            tables=[*tables, _predicted_table(frame)],
-        )
+    note = (
+        "Intervals are 95 %, random and calibration errors together. Outliers is the share of record windows "
+        "that got no weight."
     )
-    if flagged:
-        sections.append(Section("Quality flags", tables=[_flag_table(flagged)]))
-    set_up = set_up_section(comparison)
-    return [*sections, set_up] if set_up.tables else sections
+    return [
+        *coefficient_sections(frame),
+        _pivot_section(comparison),
+        _position_section(comparison),
+        *evidence,
+        Section("Operating points", [note], tables=[*tables, _predicted_table(frame)]),
+        Section("Quality flags", tables=[_flag_table(flagged)]),
+        set_up_section(comparison),
+    ]
 
 
-def _pivot_sections(comparison: Comparison) -> list[Section]:
+def _pivot_section(comparison: Comparison) -> Section:
+    heading = "Pivots, from the dry tests"
     if not comparison.curves:
-        return []
+        return Section(heading)
     formula = printed_formula(comparison.bearing)
     note = (
         "The dry test sees pivot, pad back and housing seat together. Its tangent stiffness is what small vibrations "
         "feel; the formula as printed is a secant, about 10 % below its own tangent for line contact, a third below it "
         "for a sphere."
     )
-    return [
-        Section(
-            "Pivots, from the dry tests",
-            notes=[note],
-            panels=pivot_panels(comparison.curves, formula),
-            tables=[pivot_stiffness_table(comparison.curves, formula, _PIVOT_LOADS)],
-        )
-    ]
+    table = pivot_stiffness_table(comparison.curves, formula, _PIVOT_LOADS)
+    return Section(heading, [note], pivot_panels(comparison.curves, formula), [table])
 
 
-def _position_sections(comparison: Comparison) -> list[Section]:
+def _position_section(comparison: Comparison) -> Section:
     pads = () if comparison.bearing is None else comparison.bearing.pads
     drawn = (np.array([pad.pivot_angle for pad in pads]), np.array([pad.assembled_clearance for pad in pads]))
     panels = position_panels(comparison.clearance, drawn, comparison.locus, predicted_loci(comparison.loci))
-    if not panels:
-        return []
     tables = [] if comparison.clearance is None else [clearance_table(comparison.clearance, drawn[1])]
-    return [Section("Clearance and shaft centre locus", panels=panels, tables=tables)]
+    return Section("Clearance and shaft centre locus", panels=panels, tables=tables)
 
 
 #: Loads at which pivot stiffness is tabled [N].
@@ -220,30 +211,33 @@ def _flagged(comparison: Comparison) -> list[tuple[str, Condition]]:
 
 
 def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None, loads: Sequence[float]) -> Table:
-    """Tangent stiffness of every pad at some loads [N] beside the printed formula's."""
+    """Tangent stiffness of every pad at some loads [N], beside the printed formula's where there is one."""
     columns = ["pad", "law"]
+    rows = [[f"#{curve.pad}", curve.law.name] for curve in curves]
     for load in loads:
-        columns += [f"at {amount(load, 'load', '.4g')}, {symbol('stiffness')}", "of Kirk's tangent"]
-    rows = []
-    for curve in curves:
-        cells = []
-        for load in loads:
+        columns.append(f"at {amount(load, 'load', '.4g')}, {symbol('stiffness')}")
+        columns += [] if formula is None else ["of Kirk's tangent"]
+        for curve, row in zip(curves, rows, strict=True):
+            low, high = (float(end) for end in curve.stiffness_band(load))
             remark = " (extrapolated)" if bool(curve.is_extrapolated(load)) else ""
-            cells.append(stiffness_cell(curve, load) + remark)
-            cells.append(f"{100 * curve.stiffness(load) / formula(curve.pad, load)[1]:.0f} %" if formula else "–")
-        rows.append([f"#{curve.pad}", curve.law.name, *cells])
+            row.append(with_interval(float(curve.stiffness(load)), low, high, size("stiffness")) + remark)
+            if formula is not None:
+                row.append(f"{100 * curve.stiffness(load) / formula(curve.pad, load)[1]:.0f} %")
     return Table("Measured tangent stiffness, 95 %", columns, rows)
 
 
 def clearance_table(polygon: ClearancePolygon, drawn: FloatArray, calibrated: bool = False) -> Table:
-    """Clearance per pad beside the drawing's; see `clearance_cells`."""
+    """Clearance per pad at zero push load beside the drawing's; `calibrated` with the error of the probes' gains."""
     unit = size("length")
     digits = 2 if unit < 1e-5 else 4
+    gain = polygon.relative_calibration if calibrated else 0.0
+    halves = 1.96 * np.hypot(polygon.clearance_se, gain * polygon.clearance)
     rows = []
-    for k, (drawing, measured) in enumerate(zip(drawn, clearance_cells(polygon, calibrated), strict=True)):
-        off, pushed = polygon.clearance[k] - drawing, polygon.clearance_pushed[k]
-        rows.append([f"#{k + 1}", f"{drawing / unit:.4g}", measured, signed(off / unit, digits),
-                     fixed(pushed / unit, digits)])  # fmt: skip
+    for k, (drawing, value, half) in enumerate(zip(drawn, polygon.clearance, halves, strict=True)):
+        measured = with_interval(value, value - half, value + half, unit)
+        difference = signed((value - drawing) / unit, digits)
+        pushed = fixed(polygon.clearance_pushed[k] / unit, digits)
+        rows.append([f"#{k + 1}", f"{drawing / unit:.4g}", measured, difference, pushed])
     name = symbol("length")
     under = f"under {amount(polygon.push_load, 'force', '.3g')}, {name}"
     columns = ["pad", f"drawing, {name}", f"measured, {name}", f"difference, {name}", under]

@@ -18,12 +18,11 @@ from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap_at
-from tpjb_ident.report.drawing.series import DIRECT
+from tpjb_ident.report.drawing.picture import DIRECT
 from tpjb_ident.report.figure import Panel, panel
-from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
 from tpjb_ident.report.page import Page, Section, Table, plain_templates, write_page
-from tpjb_ident.report.panels import coefficient_sections
 from tpjb_ident.report.plots.residuals import gap, residual_frame, residual_map, residual_series
+from tpjb_ident.report.sections import coefficient_sections, flags_line, tested_facts, values_table
 from tpjb_ident.rounding import MINUS, fixed, percent, signed, significant
 
 if TYPE_CHECKING:
@@ -164,8 +163,7 @@ _GAPS = {
     "within_tolerances": "points that no fit has seen, clearances, oil, sensors, .. free within their tolerances too",
     "noise_floor": "what noise alone would leave",
 }
-_GROUP, _EFFECTS = "Where model and measurement part", "Effects added to the model, with 95 % intervals"
-OVER = (
+_SERIES = (
     ("load", "residuals-load", "Residuals over static load, the coefficients that disagree most"),
     ("frequency", "residuals-excitation", "Residuals over excitation frequency, the same coefficients"),
 )
@@ -195,14 +193,17 @@ def write_diagnosis_report(
         flags=flags_line([p.quality for p in points], len(points)),
         lead=worst,
         then=then,
-        key_table=Table(_EFFECTS, ["effect", "parameter", "value"], parameter_rows(verdict))
-        if verdict.effects
-        else _gap_table(verdict),
+        key_table=_effect_table(verdict) if verdict.effects else _gap_table(verdict),
         sections=_sections(result, coefficient_sections(table) if len(table) else []),
         settings=settings,
         inputs=inputs,
     )
     return write_page(folder, page)
+
+
+def _effect_table(verdict: Verdict) -> Table:
+    title = "Effects added to the model, with 95 % intervals"
+    return Table(title, ["effect", "parameter", "value"], parameter_rows(verdict))
 
 
 def _gap_table(verdict: Verdict) -> Table:
@@ -226,7 +227,7 @@ def _effect_sections(verdict: Verdict) -> list[Section]:
     return sections
 
 
-def _other_explanations(verdict: Verdict) -> list[Section]:
+def _other_explanations(verdict: Verdict) -> Section:
     """What else it could be, and the test that tells."""
     notes = []
     for group in verdict.indistinguishable:
@@ -236,7 +237,7 @@ def _other_explanations(verdict: Verdict) -> list[Section]:
         notes += _rivals(verdict)
     if verdict.next_test:
         notes.append(f"Next test: {in_words(verdict.next_test)}.")
-    return [Section("What else could it be, and the test that tells", notes)] if notes else []
+    return Section("What else could it be, and the test that tells", notes)
 
 
 def _rivals(verdict: Verdict) -> list[str]:
@@ -269,34 +270,29 @@ def _sections(result: CampaignDiagnosis, coefficients: list[Section]) -> list[Se
         [observable(d.observable), place(d.where), f"{d.size_sigma:.2f}", f"{100 * d.share:.1f} %"]
         for d in verdict.disagreement
     ]
+    columns = ["observable", "where", "size, sigma", "share"]
+    shares = Table("Largest shares of the squared gap", columns, places)
     tried = [
         [in_words(c.name), f"{c.score:.1f}", f"{c.heldout_gap:.2f}", f"{c.probability:.2f}"] for c in verdict.candidates
     ]
-    columns = ["observable", "where", "size, sigma", "share"]
-    sections = _effect_sections(verdict) + coefficients + _other_explanations(verdict)
-    sections.append(
-        Section(
-            _GROUP,
-            notes=[note],
-            panels=_diagnosis_panels(result.diagnosis),
-            tables=[Table("Largest shares of the squared gap", columns, places)],
-        )
-    )
-    sections += _evidence_sections(verdict)
-    if tried:
-        title = "Best first; log evidence in nats above the baseline's, everything free within its tolerance"
-        columns = ["explanation", "log evidence", "held-out gap", "probability"]
-        sections.append(Section("Explanations that were fitted", tables=[Table(title, columns, tried)]))
-    if verdict.effects:
-        sections.append(Section("The gap", tables=[_gap_table(verdict)]))
-    return sections
+    title = "Best first; log evidence in nats above the baseline's, everything free within its tolerance"
+    explanations = Table(title, ["explanation", "log evidence", "held-out gap", "probability"], tried)
+    return [
+        *_effect_sections(verdict),
+        *coefficients,
+        _other_explanations(verdict),
+        Section("Where model and measurement part", [note], _diagnosis_panels(result.diagnosis), [shares]),
+        *_evidence_sections(verdict),
+        Section("Explanations that were fitted", tables=[explanations]),
+        Section("The gap", tables=[_gap_table(verdict)] if verdict.effects else []),
+    ]
 
 
 def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
     """Draw the residuals over load, over frequency and as a map, and the gap by observable, before and after."""
     panels = []
     frame = residual_frame(diagnosis)
-    for over, name, title in OVER:
+    for over, name, title in _SERIES:
         try:
             panels.append(panel(name, title, residual_series(frame, over)))
         except ValueError:  # nothing varies over it

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.columns import per, place_of, size, spinning, symbol
 from tpjb_ident.compare.difference import Difference, changed_column, difference_sentences
-from tpjb_ident.condition_kinds import KINDS
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import KINDS, Condition
 from tpjb_ident.report.drawing.picture import (
     ENTRY_STYLES,
     INK,
@@ -22,11 +21,13 @@ from tpjb_ident.report.drawing.picture import (
     in_house_style,
     label,
     new_pictures,
+    point_labels,
+    set_point_ticks,
+    with_errors,
 )
-from tpjb_ident.report.drawing.series import point_labels, set_point_ticks, with_errors
 from tpjb_ident.report.figure import panel
-from tpjb_ident.report.laboratory_sections import coefficient_cells, flags_line, interval_cells, set_points
 from tpjb_ident.report.page import Page, Section, Table, table_of, write_page
+from tpjb_ident.report.sections import coefficient_cells, flags_line, interval_cells, set_points
 from tpjb_ident.schema import DAMPING, POINT_KEY, STIFFNESS, TANGENT, Coefficient
 
 _TITLE = (

@@ -54,12 +54,15 @@ def table_of(caption: str, cells: Mapping[str, Iterable[str]]) -> Table:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with what stands under it."""
+    """A heading with what stands under it; a page leaves out a table without rows and a section without anything."""
 
     heading: str
     notes: Sequence[str] = ()
     panels: Sequence[Panel] = ()
     tables: Sequence[Table] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.notes or self.panels or any(table.rows for table in self.tables))
 
 
 @dataclass(frozen=True)
@@ -85,15 +88,19 @@ class Page:
     @functools.cached_property
     def picture(self) -> Panel | None:
         """The panel of the first screen; its section does without it."""
-        panels = [panel for section in self.sections for panel in section.panels]
-        return next((panel for panel in panels if self.lead and panel.name.startswith(self.lead)), None)
+        return next((panel for panel in self.panels if self.lead and panel.name.startswith(self.lead)), None)
+
+    @property
+    def panels(self) -> list[Panel]:
+        """All panels, in order of the sections."""
+        return [panel for section in self.sections for panel in section.panels]
 
 
 def render_page(page: Page, svg: Mapping[str, str]) -> str:
     """Render a report as HTML."""
     script = _TEMPLATES.get_template("sort.js").render()
     running = f"{page.title} \N{MIDDLE DOT} {page.facts.get('Bearing', page.subtitle)}"
-    drawn, shapes = _elements(panels_of(page), svg)
+    drawn, shapes = _elements(page.panels, svg)
     return _TEMPLATES.get_template("report.html").render(
         page=page,
         drawn=drawn,
@@ -105,12 +112,6 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
         versions=versions(),
         finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )
-
-
-def panels_of(page: Page) -> list[Panel]:
-    """All panels of a page, that of its first screen first."""
-    panels = [panel for section in page.sections for panel in section.panels]
-    return sorted(panels, key=lambda panel: panel is not page.picture)
 
 
 def _css_text(text: str) -> markupsafe.Markup:
@@ -130,7 +131,7 @@ def render_section(section: Section) -> str:
 
 def write_page(folder: Path, page: Page) -> Path:
     """Write ``report.html`` and its figures, as SVG and PNG in ``figures``."""
-    texts = save_panels(panels_of(page), folder / "figures")
+    texts = save_panels(page.panels, folder / "figures")
     path = folder / "report.html"
     write_text(path, render_page(page, texts))
     return path

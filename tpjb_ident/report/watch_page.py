@@ -10,18 +10,16 @@ import numpy as np
 
 from tpjb_ident.columns import amount, per, spinning, symbol
 from tpjb_ident.conditions import untrusted
-from tpjb_ident.report.drawing.series import DIRECT
+from tpjb_ident.report.comparison_page import clearance_table, pivot_stiffness_table
+from tpjb_ident.report.drawing.picture import DIRECT
 from tpjb_ident.report.figure import Panel, panel, svg_text
-from tpjb_ident.report.laboratory_sections import (
-    clearance_cells,
+from tpjb_ident.report.page import Page, Section, Table, render_page
+from tpjb_ident.report.plots.coefficients import direct_coefficients
+from tpjb_ident.report.sections import (
     flags_line,
-    stiffness_cell,
     tested_facts,
     values_table,
 )
-from tpjb_ident.report.page import Page, Section, Table, panels_of, render_page
-from tpjb_ident.report.plots.coefficients import direct_coefficients
-from tpjb_ident.rounding import significant
 from tpjb_ident.runtime.tables import write_text
 from tpjb_ident.watch.next_steps import described, lacking, located
 
@@ -34,6 +32,8 @@ if TYPE_CHECKING:
 _WORDS = {"look": "good, with a remark", "replaced": "replaced by a repeat"}
 _KINDS = {"dynamic": "dynamic runs", "locus": "locus runs", "clearance": "clearance sweeps", "dry_pivot": "dry tests",
          "baseline": "baseline runs"}  # fmt: skip
+#: States of a run that has not landed.
+_WAITING = ("to run", "being written")
 
 
 def write_watch_page(
@@ -54,15 +54,15 @@ def write_watch_page(
         values=values_table(points),
         flags=flags_line([p.quality for p in points], len(points)) if points else "",
         lead="k-over-",
-        then="" if snapshot.count("to run", "being written") else then,
-        sections=_sections(snapshot),
+        then="" if snapshot.count(*_WAITING) else then,
+        sections=_sections(snapshot, bearing),
         settings=settings,
         inputs=snapshot.hashes,
         refresh=refresh,
         beside="coefficients.csv and watch.json are beside this file.",
     )
     path = folder / "watch.html"
-    write_text(path, render_page(page, {p.name: svg_text(p.figure, p.name) for p in panels_of(page)}))
+    write_text(path, render_page(page, {p.name: svg_text(p.figure, p.name) for p in page.panels}))
     return path
 
 
@@ -75,7 +75,7 @@ def coverage_table(snapshot: Snapshot) -> Table:
     for name, group in groups.items():
         good = sum(s.counts for s in group)
         again = sum(s.state == "repeat" for s in group)
-        missing = sum(s.state in ("to run", "being written") for s in group)
+        missing = sum(s.state in _WAITING for s in group)
         rows.append([name, str(good), str(again), str(missing)])
     return Table("How far the plan is", ["", "good", "to repeat", "to run"], rows)
 
@@ -89,36 +89,33 @@ def _group(status: RunStatus) -> str:
     return f"{set_point}, excited at {p.excitation_hz:g} Hz"
 
 
-def _sections(snapshot: Snapshot) -> list[Section]:
-    notes = [*snapshot.lacks, *(str(p) for p in snapshot.problems)]
-    sections = [Section("What the plan leaves out, and remarks", notes=notes)] if notes else []
-    measured = snapshot.measured
-    if measured.points or measured.refusals:
-        note = "From the good runs so far. They change while runs come in; tpjb identify has the last word."
-        tables = [points_table(measured.points)] if measured.points else []
-        sections.append(Section("Stiffness and damping so far", [note, *measured.refusals], _panels(snapshot), tables))
+def _sections(snapshot: Snapshot, bearing: Any) -> list[Section]:
+    measured, runs = snapshot.measured, [status.run for status in snapshot.states]
+    so_far = ["From the good runs so far. They change while runs come in; tpjb identify has the last word."]
+    points = points_table(measured.points)
+    pivots, clearances = [], []
     if measured.curves:
-        rows = [
-            [f"#{c.pad}", significant(c.valid_to * per("load"), ".3g"), stiffness_cell(c, c.valid_to)]
-            for c in measured.curves
-        ]
-        table = Table(
-            "Tangent stiffness of the pivots at the highest load",
-            ["pad", f"load, {symbol('load')}", symbol("stiffness")],
-            rows,
-        )
-        sections.append(Section("Pivots so far", tables=[table]))
+        full = min(curve.valid_to for curve in measured.curves)  # that all pads were tested at
+        pivots.append(pivot_stiffness_table(measured.curves, None, [full]))
     if measured.polygon is not None:
-        rows = [[f"#{pad}", cell] for pad, cell in enumerate(clearance_cells(measured.polygon), start=1)]
-        table = Table("Assembled clearance by pad, from the sweep", ["pad", symbol("length")], rows)
-        sections.append(Section("Clearance", tables=[table]))
-    sections.append(Section("Records", tables=[records_table(snapshot, [s.run.id for s in snapshot.states])]))
-    waiting = [s for s in snapshot.states if s.state in ("to run", "being written")]
-    if waiting:
-        rows = [[s.run.id, s.run.kind, described(s.run), s.run.file] for s in waiting]
-        table = Table("Runs to come", ["run", "kind", "set points", "file"], rows)
-        sections.append(Section("Still to run", tables=[table]))
-    return sections
+        clearances.append(clearance_table(measured.polygon, np.array([p.assembled_clearance for p in bearing.pads])))
+    waiting = []
+    for status in snapshot.states:
+        if status.state in _WAITING:
+            run = status.run
+            waiting.append([run.id, run.kind, described(run), run.file])
+    to_come = Table("Runs to come", ["run", "kind", "set points", "file"], waiting)
+    known = measured.points or measured.refusals
+    return [
+        Section("What the plan leaves out, and remarks", [*snapshot.lacks, *map(str, snapshot.problems)]),
+        Section(
+            "Stiffness and damping so far", [*so_far, *measured.refusals] if known else [], _panels(snapshot), [points]
+        ),
+        Section("Pivots so far", tables=pivots),
+        Section("Clearance", tables=clearances),
+        Section("Records", tables=[records_table(snapshot, [run.id for run in runs])]),
+        Section("Still to run", tables=[to_come]),
+    ]
 
 
 def _panels(snapshot: Snapshot) -> list[Panel]:

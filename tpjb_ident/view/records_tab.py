@@ -10,8 +10,7 @@ import numpy as np
 from rigdata.problem import RigDataError
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
 from tpjb_ident.columns import amount, channel_unit
-from tpjb_ident.report.drawing.picture import LIGHT
-from tpjb_ident.report.drawing.series import thinned
+from tpjb_ident.report.drawing.picture import LIGHT, thinned
 from tpjb_ident.report.figure import panel
 from tpjb_ident.report.page import Section, render_section
 from tpjb_ident.report.plots.records import orbit

@@ -15,13 +15,13 @@ from tpjb_ident.compare.comparison import joined
 from tpjb_ident.compare.predictions import ModelSettings, point_columns, predict_points
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.comparison_page import deviations_table, measured_table
-from tpjb_ident.report.drawing.series import DIRECT, longest_series
+from tpjb_ident.report.drawing.picture import DIRECT, longest_series
 from tpjb_ident.report.figure import panel
-from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
 from tpjb_ident.report.page import Section, render_section
 from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficients
 from tpjb_ident.report.plots.records import window_weights
 from tpjb_ident.report.plots.residuals import residual_map
+from tpjb_ident.report.sections import flags_line, tested_facts, values_table
 from tpjb_ident.rounding import counted
 from tpjb_ident.schema import POINT_COLUMNS, POINT_KEY
 from tpjb_ident.view.records_tab import follow, text_element

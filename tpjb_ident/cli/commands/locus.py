@@ -26,7 +26,7 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     from tpjb_ident.clearance.measure import pairs_frame
     from tpjb_ident.compare.static_tests import measure_static
     from tpjb_ident.report.comparison_page import clearance_table
-    from tpjb_ident.report.panels import position_panels
+    from tpjb_ident.report.sections import position_panels
 
     angles = np.array([pad.pivot_angle for pad in drawing.pads])
     drawn = np.array([pad.assembled_clearance for pad in drawing.pads])

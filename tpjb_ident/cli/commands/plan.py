@@ -52,7 +52,7 @@ def plan(
     from model.setup import Setup
     from tpjb_ident.diagnosis import plan as planning
     from tpjb_ident.diagnosis.from_python import planned_layout
-    from tpjb_ident.report.panels import isolability_panels
+    from tpjb_ident.report.sections import isolability_panels
 
     points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, rotation, drawing))
     tests = planned_layout(drawing, points, (locus, dry, push, temperatures))

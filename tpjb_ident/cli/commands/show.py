@@ -90,7 +90,7 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
         with c.results():
             c.table("channels", pd.DataFrame([_row(s, look_at(s.values, s.rate)) for s in series]))
             if picture:
-                from tpjb_ident.report.panels import quick_look
+                from tpjb_ident.report.sections import quick_look
 
                 c.draw([quick_look(title, displayed, looks)])
 

@@ -1,1 +1,1 @@
-"""What every picture shares: colours, panels, axes."""
+"""What every picture shares: colours, panels, axes, series."""

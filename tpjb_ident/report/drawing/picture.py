@@ -1,4 +1,4 @@
-"""Figures, panels, labels and legends, alike in all pictures, in colours that colour-blind readers can tell apart.
+"""What all pictures share: figures, panels, labels, legends, series of operating points, colours for the colour-blind.
 
 Pictures are matplotlib figures made without pyplot and without any global setting: what a user has set for plots of
 their own stays as it is. Margins are fixed in inches, so that pictures line up side by side and no layout solver runs.
@@ -7,15 +7,18 @@ their own stays as it is. Margins are fixed in inches, so that pictures line up 
 from __future__ import annotations
 
 import contextlib
+import functools
+import inspect
 import io
 import math
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
@@ -25,6 +28,12 @@ from matplotlib.ticker import ScalarFormatter
 from matplotlib.transforms import Bbox
 
 from rigdata.arrays import FloatArray
+from rigdata.operating_point import ROTATIONS
+from tpjb_ident.columns import amount, per, place_of, spinning, symbol
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
+
+if TYPE_CHECKING:
+    from tpjb_ident.results.point_result import PointResult
 
 #: Okabe and Ito's palette, told apart by most colour-blind readers; ink, rule and paper follow the page.
 LIGHT = {
@@ -103,6 +112,24 @@ def _house_style() -> Iterator[None]:
 in_house_style = _house_style()
 
 
+def plot(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+    """Decorator of each picture that users draw: the house's look, and above all panels the ``title`` that is given."""
+
+    @functools.wraps(draw)
+    @in_house_style
+    def drawn(*arguments: Any, title: str | None = None, **options: Any) -> Figure:
+        figure = draw(*arguments, **options)
+        if title:
+            add_title(figure, title)
+        return figure
+
+    signature = inspect.signature(draw)
+    named = inspect.Parameter("title", inspect.Parameter.KEYWORD_ONLY, default=None, annotation="str | None")
+    extended: Any = drawn
+    extended.__signature__ = signature.replace(parameters=[*signature.parameters.values(), named])
+    return drawn
+
+
 class Picture(Figure):
     """A figure that shows itself in a notebook, with or without pyplot."""
 
@@ -114,44 +141,45 @@ class Picture(Figure):
     draw = in_house_style(Figure.draw)  # ticks are made when they are drawn
 
 
-def new_picture(
-    x_label: str, y_label: str, *, title: str | None = None, width: float = _WIDTH, height: float = _HEIGHT
-) -> tuple[Picture, Axes]:
+def new_picture(x_label: str, y_label: str, *, width: float = _WIDTH, height: float = _HEIGHT) -> tuple[Picture, Axes]:
     """Make a picture with one empty panel."""
-    figure, ((axes,),) = new_pictures(1, 1, title=title, width=width, height=height)
+    figure, ((axes,),) = new_pictures(1, 1, width=width, height=height)
     label(axes, x_label, y_label)
     return figure, axes
 
 
 @in_house_style
 def new_pictures(
-    rows: int,
-    columns: int,
-    *,
-    title: str | None = None,
-    width: float = _WIDTH,
-    height: float | Sequence[float] = _HEIGHT,
+    rows: int, columns: int, *, width: float = _WIDTH, height: float | Sequence[float] = _HEIGHT
 ) -> tuple[Picture, Any]:
     """Make a picture with (rows, columns) empty panels, each with its own margins; a height for all or each."""
     inner, gap = np.broadcast_to(height, rows) - _BOTTOM - _TOP, _BOTTOM + _TOP
-    total = float(inner.sum()) + rows * gap
-    size = columns * width, total + (1.6 * _LINE if title else 0.0)
-    figure = Picture(figsize=size)
+    across, down = columns * width, float(inner.sum()) + rows * gap
+    figure = Picture(figsize=(across, down))
     FigureCanvasAgg(figure)
     places = {
-        "left": LEFT / size[0],
-        "right": 1.0 - _RIGHT / size[0],
-        "bottom": _BOTTOM / size[1],
-        "top": (total - _TOP) / size[1],
+        "left": LEFT / across,
+        "right": 1.0 - _RIGHT / across,
+        "bottom": _BOTTOM / down,
+        "top": 1.0 - _TOP / down,
         "wspace": (LEFT + _RIGHT) / (width - LEFT - _RIGHT),
         "hspace": gap / float(inner.mean()),
     }
     grid = figure.subplots(rows, columns, squeeze=False, height_ratios=inner.tolist(), gridspec_kw=places)
     for axes in grid.flat:
         axes.yaxis.set_major_formatter(_Millions())
-    if title:
-        figure.suptitle(title, y=1.0 - 0.06 / size[1], wrap=True)
     return figure, grid
+
+
+def add_title(figure: Figure, title: str) -> None:
+    """Put a title above all panels, for which the figure grows."""
+    width, height = figure.get_size_inches()
+    taller = height + 1.6 * _LINE
+    for axes in figure.axes:
+        corners = axes.get_position(original=True).get_points()
+        axes.set_position(Bbox(corners * [1.0, height / taller]))
+    figure.set_size_inches(width, taller)
+    figure.suptitle(title, y=1.0 - 0.06 / taller, wrap=True)
 
 
 class _Millions(ScalarFormatter):
@@ -230,3 +258,94 @@ def add_colour_bar(axes: Axes, image: Any, text: str) -> Axes:
     figure: Any = axes.figure
     figure.colorbar(image, cax=bar, label=text).outline.set_visible(False)
     return bar
+
+
+#: Column that a series runs over, its quantity and its name.
+_AXES = {
+    "load": ("static_load_N", "load", "static load"),
+    "frequency": ("excitation_Hz", "frequency", "excitation frequency"),
+}
+#: Points from which on a line joins them; between fewer nobody knows what it would do.
+CURVE = 5
+#: Height of a further line of ticks [inches].
+_TICKS = 0.16
+COEFFICIENTS = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
+DIRECT = ("kxx", "kyy", "cxx", "cyy")
+CROSS = ("kxy", "kyx", "cxy", "cyx")
+
+
+def axis_label(over: str) -> str:
+    """Label of the axis that a series runs along."""
+    _, quantity, name = _AXES[over]
+    return f"{name}, {symbol(quantity)}"
+
+
+def as_table(source: Any) -> pd.DataFrame:
+    """Table of coefficients of a result, or the table that was given."""
+    return source if isinstance(source, pd.DataFrame) else source.to_dataframe()
+
+
+def longest_series(table: pd.DataFrame, over: str) -> pd.DataFrame | None:
+    """Rows of the longest series over load (at one frequency) or over frequency (at one load); None if none varies.
+
+    In order, with their places `at` in the unit of the axis.
+    """
+    column, quantity, _ = _AXES[over]
+    fixed = ["excitation_Hz" if over == "load" else "static_load_N", *STATIC_KEY[1:]]
+    best, length = None, 1
+    for _, group in table.groupby([name for name in fixed if name in table], sort=True):
+        if group[column].nunique() > length:
+            best, length = group, group[column].nunique()
+    return None if best is None else best.sort_values(column, kind="stable").assign(at=best[column] * per(quantity))
+
+
+def constant_along(series: pd.DataFrame, over: str) -> str:
+    """What is constant along a series, in words."""
+    first = series.iloc[0]
+    fixed = f"{first.excitation_Hz:g} Hz excitation" if over == "load" else amount(first.static_load_N, "load")
+    return f"{fixed}, shaft at {spinning(first.shaft_speed_Hz, first.get('rotation', ROTATIONS[0]))}"
+
+
+def points_table(points: Sequence[PointResult]) -> pd.DataFrame:
+    """Set points of results, by the columns of every table."""
+    return pd.DataFrame([p.point.key for p in points], columns=list(POINT_KEY))
+
+
+def point_labels(table: pd.DataFrame) -> list[str]:
+    """Load and excitation of every row, in words, and what else tells the rows apart."""
+    return [", ".join([place_of(load, excitation), *others]) for load, excitation, others in _set_points(table)]
+
+
+def set_point_ticks(axes: Axes, table: pd.DataFrame) -> None:
+    """Name places 0 to n - 1 of a panel by operating points: a line for load, excitation and what else differs."""
+    lines = [[f"{load * per('load'):.4g}", f"{hz:g}", *others] for load, hz, others in _set_points(table)]
+    axes.set_xticks(range(len(lines)), ["\n".join(texts) for texts in lines], fontsize=SMALL)
+    shrink(axes, bottom=0.09 + _TICKS * (len(lines[0]) - 1 if lines else 0))
+
+
+def _set_points(table: pd.DataFrame) -> list[tuple[float, float, list[str]]]:
+    """Load, excitation and, in words, what of these differs between rows: direction of the load, speed and sense."""
+    forms = {"static_load_direction_deg": "{:g}°", "shaft_speed_Hz": "shaft {:g} Hz", "rotation": "{}"}
+    varied = [name for name in forms if name in table and len(table[name].drop_duplicates()) > 1]
+    short = table.replace({"rotation": dict(zip(ROTATIONS, ("ccw", "cw"), strict=True))}) if varied else table
+    return [
+        (row["static_load_N"], row["excitation_Hz"], [forms[name].format(row[name]) for name in varied])
+        for row in short.to_dict("records")
+    ]
+
+
+def thinned(time: FloatArray, values: FloatArray, most: int) -> tuple[FloatArray, FloatArray]:
+    """Lows and highs of as many blocks as a screen can show; short records as they are."""
+    step = -(-len(values) // (most // 2))
+    if step <= 2:
+        return time, values
+    count = len(values) // step
+    blocks = np.ma.masked_invalid(values[: count * step].reshape(count, step))
+    ends = np.stack([blocks.min(axis=1).filled(np.nan), blocks.max(axis=1).filled(np.nan)], axis=1)
+    return np.repeat(time[: count * step : step], 2), ends.ravel()
+
+
+def with_errors(rows: pd.DataFrame, column: str, scale: float) -> tuple[FloatArray, FloatArray]:
+    """Values (n,) of a column, and the lengths (2, n) of their intervals below and above."""
+    value, low, high = (rows[f"{column}{end}"].to_numpy(float) / scale for end in ("", "_lo", "_hi"))
+    return value, np.abs([value - low, high - value])

@@ -1,8 +1,9 @@
 """Pictures of results: a function for each, which takes result objects and returns a matplotlib figure.
 
-No global style is set and pyplot is not needed: a figure saves itself (`savefig`) and shows itself in a notebook. Units
-are in the axis labels, bands and bars are 95 % intervals, and line and marker tell curves apart without colour. What
-each function shows, and which figure of the paper it is, docs/plots.md tells.
+No global style is set and pyplot is not needed: a figure saves itself (`savefig`) and shows itself in a notebook. Each
+takes ``title=``, which stands above all panels. Units are in the axis labels, bands and bars are 95 % intervals, and
+line and marker tell curves apart without colour. What each function shows, and which figure of the paper it is,
+docs/plots.md tells.
 """
 
 from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficients, frf

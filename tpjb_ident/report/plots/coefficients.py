@@ -13,20 +13,26 @@ from matplotlib.figure import Figure
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import per, size, symbol
 from tpjb_ident.report.drawing.picture import (
+    COEFFICIENTS,
+    CURVE,
+    DIRECT,
     ENTRY_STYLES,
     INK,
     MODEL_LABELS,
     PAPER,
     add_legend,
+    as_table,
+    axis_label,
     from_zero,
-    in_house_style,
     label,
+    longest_series,
     model_styles,
     new_picture,
     new_pictures,
+    plot,
     style_of,
+    with_errors,
 )
-from tpjb_ident.report.drawing.series import COEFFICIENTS, CURVE, DIRECT, as_table, axis_of, longest_series, with_errors
 from tpjb_ident.schema import ENTRIES, KINDS, STATIC_KEY, coefficient_column
 
 if TYPE_CHECKING:
@@ -44,14 +50,8 @@ _EXACT = 1e-3
 _BARS: dict[str, Any] = {"fmt": "o", "color": INK, "zorder": 5, "label": "measured, 95 %"}
 
 
-@in_house_style
-def coefficient(
-    comparison: Comparison | pd.DataFrame,
-    name: str,
-    *,
-    over: str = "load",
-    title: str | None = None,
-) -> Figure:
+@plot
+def coefficient(comparison: Comparison | pd.DataFrame, name: str, over: str = "load") -> Figure:
     """Draw one coefficient over load or frequency (the paper's Fig. 17 to 20).
 
     Parameters
@@ -64,7 +64,6 @@ def coefficient(
         ``"kxx"``, ``"kxy"``, .. ``"cyy"``.
     over : {"load", "frequency"}
         The longest series over it is drawn.
-    title : str, optional
 
     Raises
     ------
@@ -78,19 +77,17 @@ def coefficient(
         raise ValueError(f"the campaign has no two points that differ in {over} alone")
     kind = KINDS[name[0]]
     scale, key = kind.display_scale, coefficient_column(name)
-    column, axis_scale, axis_label = axis_of(over)
-    series = series.sort_values(column)
     predicted = series[f"{key}_predicted"]
     off = 100.0 * (predicted / series[key] - 1.0)
-    series = series.assign(at=series[column] / axis_scale, predicted=predicted / scale, off=off)
+    series = series.assign(predicted=predicted / scale, off=off)
     series["beyond"] = series.get("pivot_extrapolated", False) & (series["pivots"] == "measured")
-    measured = series.drop_duplicates(column).dropna(subset=[key])
+    measured = series.drop_duplicates("at").dropna(subset=[key])
     value, errors = with_errors(measured, key, scale)
     shares = 100.0 * errors / np.maximum(np.abs(value), np.finfo(float).tiny)
     apart = len(value) > 0 and float(np.median(shares)) < _SMALL
-    figure, grid = new_pictures(2 if apart else 1, 1, title=title, height=(2.3, 1.5) if apart else 3.1)
+    figure, grid = new_pictures(2 if apart else 1, 1, height=(2.3, 1.5) if apart else 3.1)
     axes = grid[0, 0]
-    label(axes, axis_label, f"{name}, {kind.display_unit}")
+    label(axes, axis_label(over), f"{name}, {kind.display_unit}")
     _draw_predictions(axes, series, "predicted")
     axes.errorbar(measured["at"], value, yerr=errors, **_BARS)
     axes.margins(x=0.06, y=0.1)
@@ -98,7 +95,7 @@ def coefficient(
         from_zero(axes)
     add_legend(axes)
     if apart:
-        label(grid[1, 0], axis_label, "off measured, %")
+        label(grid[1, 0], axis_label(over), "off measured, %")
         _draw_deviations(grid[1, 0], series, measured["at"], shares)
     return figure
 
@@ -126,14 +123,13 @@ def _draw_predictions(axes: Axes, series: pd.DataFrame, column: str) -> None:
             axes.plot(beyond["at"], beyond[column], **frame, label="beyond the dry tests")
 
 
-@in_house_style
+@plot
 def direct_coefficients(
     bearings: Mapping[str, Identification | pd.DataFrame],
     part: Literal["k", "c"] = "k",
     *,
     over: str = "load",
     entries: tuple[str, ...] = ("xx", "yy"),
-    title: str | None = None,
 ) -> Figure:
     """Draw measured coefficients of one or several bearings with their 95 % intervals (the paper's Fig. 15, 16).
 
@@ -147,7 +143,6 @@ def direct_coefficients(
         The longest series over it is drawn; the points that lie apart from it are not.
     entries : tuple of str
         Out of ``"xx"``, ``"xy"``, ``"yx"``, ``"yy"``.
-    title : str, optional
 
     Raises
     ------
@@ -155,21 +150,20 @@ def direct_coefficients(
         When no bearing was measured at two loads or frequencies.
     """
     kind = KINDS[part]
-    column, axis_scale, axis_label = axis_of(over)
-    figure, axes = new_picture(axis_label, f"{kind.quantity}, {kind.display_unit}", title=title)
+    figure, axes = new_picture(axis_label(over), f"{kind.quantity}, {kind.display_unit}")
     drawn = False
     for number, (name, source) in enumerate(bearings.items()):
         series = longest_series(as_table(source), over)
         if series is None:
             continue
         drawn = True
-        rows = series.drop_duplicates(column).sort_values(column)
+        rows = series.drop_duplicates("at")
         for entry in entries:
             colour = style_of(number)["color"]
             style = ENTRY_STYLES[entry] | {"color": colour, "markerfacecolor": colour if entry == "yy" else PAPER}
             style |= {} if len(rows) >= CURVE else {"linestyle": "none"}
             value, errors = with_errors(rows, kind.column(entry), kind.display_scale)
-            axes.errorbar(rows[column] / axis_scale, value, yerr=errors, **style, label=f"{name}, {part}{entry}")
+            axes.errorbar(rows["at"], value, yerr=errors, **style, label=f"{name}, {part}{entry}")
     if not drawn:
         raise ValueError(f"no bearing was measured at two points over {over}: give a campaign with a series over it")
     axes.margins(x=0.06)
@@ -179,12 +173,11 @@ def direct_coefficients(
     return figure
 
 
-@in_house_style
+@plot
 def frf(
     source: BandResult | Identification | pd.DataFrame,
     *,
     entries: tuple[str, ...] = ("xx", "yy"),
-    title: str | None = None,
 ) -> Figure:
     """Draw the real and the imaginary part of h over frequency with 95 % intervals, over a band the coherence below.
 
@@ -196,7 +189,6 @@ def frf(
         support is drawn through them.
     entries : tuple of str
         Of ``"xx"``, ``"xy"``, ``"yx"``, ``"yy"``.
-    title : str, optional
 
     Raises
     ------
@@ -211,7 +203,7 @@ def frf(
     over_band = "coherence_x" in table
     if over_band and table.filter([*STATIC_KEY, "excitation"]).nunique().max() > 1:
         raise ValueError("the table holds several operating points; give the rows of one")
-    figure, grid = new_pictures(3 if over_band else 2, 1, title=title, height=2.3)
+    figure, grid = new_pictures(3 if over_band else 2, 1, height=2.3)
     for axes, part in zip(grid[:2, 0], ("real", "imag"), strict=True):
         label(axes, "frequency, Hz", f"{part.capitalize()[:2]} h, {symbol('stiffness')}")
         for entry in entries:
@@ -263,7 +255,7 @@ def _rows_of_sines(series: pd.DataFrame | None) -> pd.DataFrame | None:
     """K and C as h = K + i omega C, with the names that ``frf.csv`` has."""
     if series is None:
         return None
-    rows = series.drop_duplicates("excitation_Hz").sort_values("excitation_Hz", kind="stable")
+    rows = series.drop_duplicates("excitation_Hz")
     omega = 2 * np.pi * rows["excitation_Hz"]
     columns = {}
     for entry, end in itertools.product(ENTRIES, ("", "_lo", "_hi")):

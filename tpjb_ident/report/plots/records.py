@@ -21,14 +21,15 @@ from tpjb_ident.report.drawing.picture import (
     RULE,
     SMALL,
     add_legend,
-    in_house_style,
+    as_table,
     label,
     logarithmic,
     new_picture,
     new_pictures,
+    plot,
+    set_point_ticks,
     style_of,
 )
-from tpjb_ident.report.drawing.series import as_table, set_point_ticks
 from tpjb_ident.rounding import listed
 
 if TYPE_CHECKING:
@@ -43,15 +44,14 @@ if TYPE_CHECKING:
 _MOST_SAMPLES = 4000
 
 
-@in_house_style
-def orbit(run: Run, *, title: str | None = None) -> Figure:
+@plot
+def orbit(run: Run) -> Figure:
     """Draw the shaft's path about its mean position, and the ellipse at the excitation frequency.
 
     Parameters
     ----------
     run : Run
         With two displacement channels.
-    title : str, optional
 
     Raises
     ------
@@ -64,7 +64,7 @@ def orbit(run: Run, *, title: str | None = None) -> Figure:
     if good.sum() < 2:
         raise ValueError(f"run {run.id} has no displacements to draw")
     path = per("length") * (path - np.median(path[good], axis=0))
-    figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title)
+    figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}")
     shown = path[:_MOST_SAMPLES]
     axes.plot(*shown.T, color=GREY, linewidth=0.5, label="as measured")
     drive = run.point.excitation
@@ -99,8 +99,8 @@ def _mark_excitation(axes: Axes, run: Run) -> None:
         axes.axvline(hz, color=GREY, linewidth=0.9, zorder=0, label=f"excitation, {hz:g} Hz")
 
 
-@in_house_style
-def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -> Figure:
+@plot
+def spectra(run: Run, *, up_to: float | None = None) -> Figure:
     """Draw the amplitudes of displacement and force over frequency (Hann window over the whole record).
 
     Parameters
@@ -109,7 +109,6 @@ def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -
         A dynamic run.
     up_to : float, optional
         Highest frequency [Hz]; default: four times the excitation frequency, half the sample rate without one.
-    title : str, optional
 
     Returns
     -------
@@ -121,7 +120,7 @@ def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -
     ValueError
         When the run is too short, or empty.
     """
-    figure, grid = new_pictures(2, 1, title=title, height=2.3)
+    figure, grid = new_pictures(2, 1, height=2.3)
     top = _highest(run, up_to, run.sample_rate)
     for axes, (quantity, unit) in zip(grid[:, 0], _ROWS, strict=True):
         label(axes, "frequency, Hz", f"{quantity}, 0-peak, {symbol(unit)}")
@@ -147,10 +146,8 @@ _FEWEST_SEGMENTS = 5
 _LEVEL = 0.95
 
 
-@in_house_style
-def coherence_spectrum(
-    run: Run, *, up_to: float | None = None, segment: float | None = None, title: str | None = None
-) -> Figure:
+@plot
+def coherence_spectrum(run: Run, *, up_to: float | None = None, segment: float | None = None) -> Figure:
     """Draw the multiple coherence of each force component with both displacements, over frequency (Welch's method).
 
     It is near one where something drives the bearing, and scatters below the dashed line where nothing does.
@@ -163,7 +160,6 @@ def coherence_spectrum(
         Highest frequency [Hz]; default: four times the excitation frequency, half the sample rate without one.
     segment : float, optional
         Length of the averaged pieces [s]; default: as many pieces as give 16 averages at half overlap.
-    title : str, optional
 
     Raises
     ------
@@ -178,7 +174,7 @@ def coherence_spectrum(
     if piece < 16 or n < _FEWEST_SEGMENTS * piece // 2:
         raise ValueError(f"run {run.id} has {n} samples: too few for segments of {piece}; give a shorter segment")
     frequency, value, averages = _multiple_coherence(force, move, rate, piece)
-    figure, axes = new_picture("frequency, Hz", "multiple coherence", title=title)
+    figure, axes = new_picture("frequency, Hz", "multiple coherence")
     for number, (axis, row) in enumerate(zip(_AXES, value, strict=True)):
         axes.plot(frequency, row, **style_of(number) | {"marker": ""}, label=f"{axis} force")
     # under no coherence at all, two inputs and m averages: Beta(2, m - 2)
@@ -215,15 +211,14 @@ _FLAGGED = 0.9
 _SMALLEST = 1e-7
 
 
-@in_house_style
-def coherence(identification: Identification | pd.DataFrame, *, title: str | None = None) -> Figure:
+@plot
+def coherence(identification: Identification | pd.DataFrame) -> Figure:
     """Draw what part of the force the displacements do not explain, 1 - coherence, for every operating point.
 
     Parameters
     ----------
     identification : Identification or DataFrame
         Or its table, ``coefficients.csv``.
-    title : str, optional
 
     Returns
     -------
@@ -237,7 +232,7 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
     unexplained = np.clip(1.0 - rows["coherence"].to_numpy(float), _SMALLEST, None)
     width = max(4.6, 0.36 * len(rows) + 1.2)
     place = f"static load, {symbol('load')}, and excitation, Hz"
-    figure, axes = new_picture(place, "1 - coherence", title=title, width=width, height=3.4)
+    figure, axes = new_picture(place, "1 - coherence", width=width, height=3.4)
     low = unexplained > 1.0 - _FLAGGED
     at = np.arange(len(rows))
     for mask, colour, marker, name in ((~low, BLUE, "o", "operating point"), (low, RED, "X", "flagged")):
@@ -256,21 +251,20 @@ _REJECTED = 0.3
 _NAMED = 6  # rejected windows that are named in the picture
 
 
-@in_house_style
-def window_weights(result: PointResult | DynamicStiffness, *, title: str | None = None) -> Figure:
+@plot
+def window_weights(result: PointResult | DynamicStiffness) -> Figure:
     """Draw the final weight of every record window, 1 fully used, 0 thrown out.
 
     Parameters
     ----------
     result : PointResult or DynamicStiffness
         From a `PointResult` the rejected windows carry run, time and reason.
-    title : str, optional
     """
     estimate = result.stiffness if hasattr(result, "stiffness") else result
     weights = np.asarray(estimate.weights, dtype=float)
     if not weights.size:
         raise ValueError("the estimate has no windows")
-    figure, axes = new_picture("window, in the order of the runs", "robust weight", title=title, width=6.4)
+    figure, axes = new_picture("window, in the order of the runs", "robust weight", width=6.4)
     at = np.arange(1, len(weights) + 1)
     names = ["horizontal force", "vertical force"]
     if np.allclose(weights[:, 0], weights[:, 1], equal_nan=True):

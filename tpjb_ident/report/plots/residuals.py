@@ -21,6 +21,8 @@ from tpjb_ident.diagnosis.observations.gap import gap_at, residuals
 from tpjb_ident.report.drawing.picture import (
     BLUE,
     CHARACTER,
+    COEFFICIENTS,
+    CURVE,
     DIVERGING,
     INK,
     LEFT,
@@ -34,14 +36,17 @@ from tpjb_ident.report.drawing.picture import (
     Style,
     add_colour_bar,
     add_legend,
-    in_house_style,
+    as_table,
+    axis_label,
     label,
+    longest_series,
     new_picture,
     new_pictures,
+    plot,
+    set_point_ticks,
     shrink,
     style_of,
 )
-from tpjb_ident.report.drawing.series import COEFFICIENTS, CURVE, as_table, axis_of, longest_series, set_point_ticks
 from tpjb_ident.rounding import plain
 from tpjb_ident.schema import POINT_KEY, coefficient_column
 
@@ -105,8 +110,8 @@ _HEIGHT = 2.9
 _LINEAR = 2.0  # within two standard deviations the colour hardly changes: that is noise
 
 
-@in_house_style
-def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | None = None) -> Figure:
+@plot
+def residual_map(source: Diagnosis | Comparison | pd.DataFrame) -> Figure:
     """Draw (measured - predicted) / sigma as a heat map: coefficients by rows, operating points by columns.
 
     Operating points stand in order of load, then of excitation frequency. One panel per model: baseline and model with
@@ -117,7 +122,6 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | 
     ----------
     source : Diagnosis, Comparison or DataFrame
         See `residual_frame`.
-    title : str, optional
     """
     frame = residual_frame(source)
     models = list(dict.fromkeys(frame["model"]))
@@ -126,7 +130,7 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | 
     place = [name for name in ("static_load_N", "excitation_Hz", *POINT_KEY[1:3], "rotation") if name in frame]
     points = frame[place].drop_duplicates().sort_values(place)
     width = max(_SHORTEST, _CELL * len(points) + 1.9)
-    figure, grid = new_pictures(len(models), 1, title=title, width=width, height=_HEIGHT)
+    figure, grid = new_pictures(len(models), 1, width=width, height=_HEIGHT)
     limit = max(float(np.nanmax(np.abs(frame["z"].to_numpy(float)))), 3.0 * _LINEAR)
     norm = SymLogNorm(linthresh=_LINEAR, linscale=0.6, vmin=-limit, vmax=limit, base=10)
     for (axes,), model in zip(grid, models, strict=True):
@@ -160,13 +164,12 @@ def _draw_map(axes: Axes, frame: pd.DataFrame, points: pd.DataFrame, norm: Any, 
 _WORST = 3
 
 
-@in_house_style
+@plot
 def residual_series(
     source: Diagnosis | Comparison | pd.DataFrame,
     over: str = "load",
     *,
     entries: Sequence[str] | None = None,
-    title: str | None = None,
 ) -> Figure:
     """Draw (measured - predicted) / sigma over load or frequency, one line per coefficient and model.
 
@@ -180,7 +183,6 @@ def residual_series(
         The longest series over it is drawn.
     entries : sequence of str, optional
         Coefficients, four at most; default: the three that disagree most with the first model.
-    title : str, optional
 
     Raises
     ------
@@ -188,33 +190,30 @@ def residual_series(
         When nothing varies over `over`.
     """
     frame = residual_frame(source)
-    column, scale, text = axis_of(over)
     series = longest_series(frame, over)
     if series is None:
         raise ValueError(f"there are no two points that differ in {over} alone")
     models = list(dict.fromkeys(frame["model"]))
     squares = (frame["z"] ** 2).groupby(frame["entry"].where(frame["model"] == models[0])).sum()
     chosen = list(entries or squares.sort_values(ascending=False).index[:_WORST])
-    figure, axes = new_picture(text, "(measured - predicted) / sigma", title=title, width=5.2, height=3.4)
+    figure, axes = new_picture(axis_label(over), "(measured - predicted) / sigma", width=5.2, height=3.4)
     axes.axhspan(-2, 2, color=RULE, alpha=0.6, linewidth=0)
     for number, entry in enumerate(chosen):
         colour, marker = style_of(number)["color"], style_of(number)["marker"]
         for k, model in enumerate(models):
-            rows = series[(series["entry"] == entry) & (series["model"] == model)].sort_values(column)
+            rows = series[(series["entry"] == entry) & (series["model"] == model)]
             line = style_of(len(models) - 1 - k)["linestyle"] if len(rows) >= CURVE else "none"
             face = colour if model == models[-1] else PAPER
             name = f"{entry}, {MODEL_LABELS.get(model, model)}"
-            axes.plot(rows[column] / scale, rows["z"], color=colour, marker=marker, linestyle=line,
+            axes.plot(rows["at"], rows["z"], color=colour, marker=marker, linestyle=line,
                       markerfacecolor=face, markersize=4.5, label=name)  # fmt: skip
     add_legend(axes)
     return figure
 
 
-@in_house_style
+@plot
 def gap(
     source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]],
-    *,
-    title: str | None = None,
 ) -> Figure:
     """Draw the root mean square of (measured - predicted) / sigma per observable, before and after.
 
@@ -225,7 +224,6 @@ def gap(
     ----------
     source : Diagnosis, Verdict or mapping
         Or ``gap_by_observable`` of ``diagnosis.json``: ``{"kxx": {"heldout_before": 9.1, "heldout_after": 1.0}}``.
-    title : str, optional
     """
     # a diagnosis holds a verdict, whose own `verdict` is a word
     verdict: Any = source if hasattr(source, "gap_by_observable") else getattr(source, "verdict", None)
@@ -238,7 +236,7 @@ def gap(
         star = "" if any(key.startswith("heldout") for key in values) else "*"
         worse = " (worse)" if right > max(1.05 * left, 1.0) else ""
         words.append(f"{name.replace('_', ' ')}{star}{worse}")
-    figure, axes = new_picture("gap, sigma", "", title=title, height=0.2 * len(words) + 1.3)
+    figure, axes = new_picture("gap, sigma", "", height=0.2 * len(words) + 1.3)
     shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
     y = np.arange(len(words))
     added = not np.array_equal(before, after)  # else there is no after
@@ -263,10 +261,8 @@ _CONFUSABLE = 3.0
 _VISIBLE = 6.0
 
 
-@in_house_style
-def isolability(
-    plan: CampaignPlan | ArrayLike, names: Sequence[str] | None = None, *, title: str | None = None
-) -> Figure:
+@plot
+def isolability(plan: CampaignPlan | ArrayLike, names: Sequence[str] | None = None) -> Figure:
     """Draw how far each effect stands from what every other one can imitate, in standard deviations.
 
     Row A, column B: distance of A, at a size that is seen with 6 standard deviations, from all that B can do. Pairs
@@ -278,7 +274,6 @@ def isolability(
         As `tpjb_ident.diagnosis.plan.plan` makes it, or its matrix.
     names : sequence of str, optional
         Of the k effects; default: the plan's own.
-    title : str, optional
     """
     matrix = np.asarray(getattr(plan, "separation", plan), dtype=float)
     names = names or [c.label for c in getattr(plan, "candidates", ())]
@@ -290,7 +285,7 @@ def isolability(
     # the panel's own margins and the colour bar come on top of cells and names
     width, height = _SQUARE * k + room + 2.0, max(_SQUARE * k, _TALL) + room + 1.0
     across, down = "could pass for (framed: closer than 3)", "effect at work"
-    figure, axes = new_picture(across, down, title=title, width=width, height=height)
+    figure, axes = new_picture(across, down, width=width, height=height)
     shrink(axes, left=room - 0.1, bottom=room - 0.1)
     image = axes.imshow(matrix, cmap=SEQUENTIAL, vmin=0.0, vmax=_VISIBLE)
     axes.grid(False)

@@ -26,11 +26,11 @@ from tpjb_ident.report.drawing.picture import (
     Style,
     add_legend,
     from_zero,
-    in_house_style,
     label,
     model_styles,
     new_picture,
     new_pictures,
+    plot,
     style_of,
 )
 
@@ -43,12 +43,11 @@ if TYPE_CHECKING:
 _LAW_POINTS = 200
 
 
-@in_house_style
+@plot
 def load_deflection(
     curves: PivotCurve | Sequence[PivotCurve],
     *,
     up_to: float | None = None,
-    title: str | None = None,
 ) -> Figure:
     """Draw the settled steps of dry tests and the laws fitted to them (the paper's Fig. 11).
 
@@ -62,14 +61,11 @@ def load_deflection(
         One or several pads.
     up_to : float, optional
         Largest load [N]; default: the largest measured one.
-    title : str, optional
     """
     chosen = list(curves) if isinstance(curves, Sequence) else [curves]
     if not chosen:
         raise ValueError("curves must hold at least one PivotCurve")
-    figure, axes = new_picture(
-        f"radial deflection, {symbol('length')}", f"load on the pad, {symbol('load')}", title=title
-    )
+    figure, axes = new_picture(f"radial deflection, {symbol('length')}", f"load on the pad, {symbol('load')}")
     for curve in chosen:
         _draw_law(axes, curve, up_to or curve.valid_to)
         _draw_steps(axes, curve)
@@ -111,8 +107,8 @@ def _draw_law(axes: Axes, curve: PivotCurve, top: float) -> None:
         axes.plot(reading[coming], shown[coming], color=colour, linewidth=0.7)
 
 
-@in_house_style
-def pad_projection(curves: Sequence[PivotCurve], *, title: str | None = None) -> Figure:
+@plot
+def pad_projection(curves: Sequence[PivotCurve]) -> Figure:
     """Draw measured load and displacement vectors of every pad's test beside their projection (the paper's Fig. 10).
 
     Hollow markers are what was measured, filled ones its projection on the pad's direction (dashed). Displacements
@@ -123,7 +119,6 @@ def pad_projection(curves: Sequence[PivotCurve], *, title: str | None = None) ->
     ----------
     curves : sequence of PivotCurve
         As `fit_pivots` gives them.
-    title : str, optional
 
     Returns
     -------
@@ -132,7 +127,7 @@ def pad_projection(curves: Sequence[PivotCurve], *, title: str | None = None) ->
     """
     if not curves:
         raise ValueError("curves must hold at least one PivotCurve")
-    figure, ((forces, places),) = new_pictures(1, 2, title=title, width=4.4, height=4.8)
+    figure, ((forces, places),) = new_pictures(1, 2, width=4.4, height=4.8)
     for curve in curves:
         steps = curve.steps
         used = steps.weight > 0
@@ -175,13 +170,12 @@ _STIFFNESS_POINTS = 120
 _LOWEST = 0.04  # of the largest load: Hertz's stiffness has no value at zero
 
 
-@in_house_style
+@plot
 def pivot_stiffness(
     curves: Sequence[PivotCurve],
     formula: Formula | None = None,
     *,
     loads: ArrayLike | None = None,
-    title: str | None = None,
 ) -> Figure:
     """Draw the stiffness of every pad's pivot over its load (the paper's Fig. 12).
 
@@ -197,15 +191,12 @@ def pivot_stiffness(
         paper prints is the secant.
     loads : (n,) array_like, optional
         Pad loads [N]; default: up to the largest measured one.
-    title : str, optional
     """
     if not curves:
         raise ValueError("curves must hold at least one PivotCurve")
     top = max(curve.valid_to for curve in curves)
     grid = np.linspace(_LOWEST * top, top, _STIFFNESS_POINTS) if loads is None else np.asarray(loads, dtype=float)
-    figure, axes = new_picture(
-        f"load on the pad, {symbol('load')}", f"tangent stiffness, {symbol('stiffness')}", title=title
-    )
+    figure, axes = new_picture(f"load on the pad, {symbol('load')}", f"tangent stiffness, {symbol('stiffness')}")
     shown = grid * per("load")
     for curve in curves:
         _draw_stiffness(axes, curve, grid)
@@ -239,14 +230,13 @@ def _draw_stiffness(axes: Axes, curve: PivotCurve, grid: FloatArray) -> None:
 _TWO_SIGMA = 2.4477  # radius of the 95 % region of two normal variables, in standard deviations
 
 
-@in_house_style
+@plot
 def clearance_and_locus(
     polygons: ClearancePolygon | Mapping[str, ClearancePolygon] | None = None,
     locus: Locus | FloatArray | None = None,
     predicted: Mapping[str, FloatArray] | None = None,
     *,
     drawing: tuple[FloatArray, FloatArray] | None = None,
-    title: str | None = None,
 ) -> Figure:
     """Draw clearance polygons and shaft positions about the bearing centre (the paper's Fig. 14).
 
@@ -261,7 +251,6 @@ def clearance_and_locus(
         Predicted positions [m] by name; names of pivot models keep their colours.
     drawing : (n_pads,), (n_pads,) ndarray, optional
         Pad angles [rad] and assembled clearances [m] of the drawing.
-    title : str, optional
 
     Raises
     ------
@@ -271,7 +260,7 @@ def clearance_and_locus(
     named = {} if polygons is None else polygons if isinstance(polygons, Mapping) else {"measured": polygons}
     if not named and locus is None and not predicted and drawing is None:
         raise ValueError("nothing to draw: give polygons, a locus, predicted positions or a drawing")
-    figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title, width=4.6, height=4.8)
+    figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", width=4.6, height=4.8)
     if drawing is not None:
         angles, clearances = (np.asarray(values) for values in drawing)
         order = np.argsort(angles % (2 * np.pi))  # its pads stand in any order

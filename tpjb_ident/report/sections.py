@@ -1,42 +1,67 @@
-"""What a test laboratory's report holds beside results: set-up, sensors, bearing and oil, run matrix, raw evidence."""
+"""What pages and commands share: what was tested, tables and panels of results, set-up, runs, raw evidence."""
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
+from rigdata.arrays import FloatArray
 from rigdata.problem import RigDataError
-from tpjb_ident.columns import amount, channel_unit, degrees, per, size, spinning, symbol
+from tpjb_ident.columns import amount, channel_unit, degrees, per, place_of, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.conditions import SEVERITIES
-from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels, points_table
+from tpjb_ident.report.drawing.picture import (
+    BLUE,
+    CROSS,
+    DIRECT,
+    INK,
+    add_title,
+    constant_along,
+    in_house_style,
+    label,
+    longest_series,
+    new_pictures,
+    point_labels,
+    points_table,
+    thinned,
+)
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table, plain_templates
-from tpjb_ident.report.plots.coefficients import frf
+from tpjb_ident.report.plots.coefficients import coefficient, frf
 from tpjb_ident.report.plots.records import coherence, coherence_spectrum, orbit, spectra
+from tpjb_ident.report.plots.residuals import isolability
+from tpjb_ident.report.plots.static_tests import clearance_and_locus, load_deflection, pad_projection, pivot_stiffness
 from tpjb_ident.rounding import counted, fixed, with_interval
-from tpjb_ident.schema import DAMPING, ENTRIES, STIFFNESS, Coefficient
+from tpjb_ident.runtime.tables import printable
+from tpjb_ident.schema import DAMPING, ENTRIES, KINDS, STIFFNESS, Coefficient
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from rigdata.calibration import Channel
     from rigdata.campaign import Campaign
+    from rigdata.readers.series import Series
     from rigdata.run import Run
+    from rigdata.survey.spectrum import Look
+    from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.comparison import Comparison
+    from tpjb_ident.compare.predictions import Formula
     from tpjb_ident.conditions import Condition
+    from tpjb_ident.diagnosis.plan import CampaignPlan
     from tpjb_ident.pivot import PivotCurve
     from tpjb_ident.results.identification import Identification
     from tpjb_ident.results.point_result import PointResult
 
 _KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "clearance sweep",
                   "dry_pivot": "dry pivot test"}  # fmt: skip
-_EVIDENCE = "Raw evidence of one run"
 
 
 def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequence[PointResult]) -> dict[str, str]:
@@ -83,13 +108,12 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
     if not solved:
         return None
     p = solved[len(solved) // 2]
-    cells = p.stiffness.cells()
+    cells, point = p.stiffness.cells(), p.point
     rows = [[entry, cells[i], cells[4 + i]] for i, entry in enumerate(ENTRIES)]
     columns = ["", *(f"{kind.symbol.upper()}, {kind.display_unit}" for kind in (STIFFNESS, DAMPING))]
-    caption = (
-        f"Measured at {point_label(p)}, shaft at {spinning(p.point.shaft_speed_hz, p.point.rotation)}; 95 % intervals"
-    )
-    return Table(caption, columns, rows)
+    place = place_of(point.static_load, point.excitation_hz)
+    shaft = spinning(point.shaft_speed_hz, point.rotation)
+    return Table(f"Measured at {place}, shaft at {shaft}; 95 % intervals", columns, rows)
 
 
 def interval_cells(frame: pd.DataFrame, column: str, scale: float) -> list[str]:
@@ -137,31 +161,11 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
             continue
         axis = "" if channel.axis is None else f"{math.degrees(channel.axis):g}°"
         place = axis if channel.pad is None else f"pad #{channel.pad}"
+        calibration = f"{channel.slope / scale:.5g} {unit} per {channel.unit or 'unit'}"
         uncertainty = "not stated" if channel.uncertainty is None else f"{100 * channel.uncertainty:.2g} %"
-        rows.append(
-            [
-                channel.name,
-                channel.quantity,
-                place,
-                f"{channel.slope / scale:.5g} {unit} per {channel.unit or 'unit'}",
-                uncertainty,
-            ]
-        )
+        rows.append([channel.name, channel.quantity, place, calibration, uncertainty])
     columns = ["channel", "quantity", "direction or pad", "calibration", "uncertainty (1 standard deviation)"]
     return Table("Sensors", columns, rows)
-
-
-def stiffness_cell(curve: PivotCurve, load: float) -> str:
-    """Tangent stiffness of a pivot at a load [N], with its interval."""
-    low, high = (float(v) for v in curve.stiffness_band(load))
-    return with_interval(float(curve.stiffness(load)), low, high, size("stiffness"))
-
-
-def clearance_cells(polygon: ClearancePolygon, calibrated: bool = False) -> list[str]:
-    """Clearance of every pad at zero push load with its interval, `calibrated` with that of the probes' gains."""
-    gain = polygon.relative_calibration if calibrated else 0.0
-    ends = zip(polygon.clearance, 1.96 * np.hypot(polygon.clearance_se, gain * polygon.clearance), strict=True)
-    return [with_interval(value, value - half, value + half, size("length")) for value, half in ends]
 
 
 def _by_pad(values: Iterable[str]) -> str:
@@ -188,49 +192,35 @@ def _bearing_tables(bearing: Any) -> list[Table]:
 
 def _run_matrix(runs: Sequence[Run]) -> Table:
     """Operating points with their number of runs."""
-    counted: dict[tuple[str, ...], int] = {}
+    counts: Counter[tuple[str, ...]] = Counter()
     for run in runs:
         p = run.point
         several = run.kind in {"locus", "dry_pivot"}
-        key = (
-            _KINDS_IN_WORDS.get(run.kind, run.kind), f"{p.static_load * per('load'):.6g}" if p.static_load else "–",
-            "several" if several else f"{p.static_load_direction_deg:g}",
-            f"{p.shaft_speed_hz:g} ({60 * p.shaft_speed_hz:.6g})",
-            f"{p.excitation_hz:g}" if p.excitation else "–", f"{run.sample_rate:g}",
-        )  # fmt: skip
-        counted[key] = counted.get(key, 0) + 1
-    columns = [
-        "kind",
-        f"load, {symbol('load')}",
-        "load direction, °",
-        "shaft speed, Hz (rpm)",
-        "excitation, Hz",
-        "rate, Hz",
-        "runs",
-    ]
-    return Table("Runs", columns, [[*key, str(n)] for key, n in counted.items()])
+        load = f"{p.static_load * per('load'):.6g}" if p.static_load else "–"
+        direction = "several" if several else f"{p.static_load_direction_deg:g}"
+        shaft = f"{p.shaft_speed_hz:g} ({60 * p.shaft_speed_hz:.6g})"
+        excitation = f"{p.excitation_hz:g}" if p.excitation else "–"
+        kind = _KINDS_IN_WORDS.get(run.kind, run.kind)
+        counts[kind, load, direction, shaft, excitation, f"{run.sample_rate:g}"] += 1
+    columns = ["kind", f"load, {symbol('load')}", "load direction, °", "shaft speed, Hz (rpm)", "excitation, Hz"]
+    return Table("Runs", [*columns, "rate, Hz", "runs"], [[*key, str(n)] for key, n in counts.items()])
 
 
-def evidence_sections(campaign: Campaign, result: Identification) -> list[Section]:
-    """Orbit, spectra, coherence of one run in the middle of the campaign; h over frequency.
-
-    Coherence of every point.
-    """
-    panels = [*_run_panels(campaign, result), *_stiffness_panels(result)]
+def evidence_section(campaign: Campaign, result: Identification) -> Section:
+    """Orbit, spectra, coherence of one run in the middle of the campaign; h over frequency; coherence of all points."""
+    panels = _stiffness_panels(result)
     if result.points:
         title = "Force that the displacements do not explain"
-        panels.append(panel("coherence-points", title, coherence, result))
-    return [Section(_EVIDENCE, panels=panels)] if panels else []
+        panels = [*_run_panels(campaign, result), *panels, panel("coherence-points", title, coherence, result)]
+    return Section("Raw evidence of one run", panels=panels)
 
 
 def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
     """Of the first run of the middle point that is whole."""
-    if not result.points:
-        return []
     point = result.points[len(result.points) // 2]
     for run in (r for r in campaign.of_kind("dynamic") if r.id in point.runs):
         try:
-            label = f"run {run.id}, {point_label(point)}"
+            label = f"run {run.id}, {place_of(point.point.static_load, point.point.excitation_hz)}"
             return [
                 panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
                       orbit(run)),
@@ -275,3 +265,89 @@ def budget_table(result: Identification) -> Table:
             rows.append([place, name, value, *parts])
     caption = "Uncertainty budget: value ± half of its 95 % interval, then the standard uncertainty by source"
     return Table(caption, ["point", "", "value", *sources], rows)
+
+
+def coefficient_sections(table: pd.DataFrame) -> list[Section]:
+    """Draw every series of at least two points."""
+    sections = []
+    for over in ("load", "frequency"):
+        series = longest_series(table, over)
+        if series is None:
+            continue
+        for names, kind in ((DIRECT, "Stiffness and damping"), (CROSS, "Cross-coupled stiffness and damping")):
+            panels = []
+            for name in names:
+                title = f"{name} ({KINDS[name[0]].quantity}) over {over}, at {constant_along(series, over)}"
+                panels.append(panel(f"{name}-over-{over}", title, coefficient, table, name, over))
+            sections.append(Section(f"{kind} over {over}", panels=panels))
+    return sections
+
+
+def pivot_panels(curves: Sequence[PivotCurve], formula: Formula | None = None) -> list[Panel]:
+    """Draw the tangent stiffness of every pad, its load steps, and how they were projected."""
+    if not curves:
+        return []
+    bands = "Pivot tangent stiffness over load, 95 % bands"
+    steps = "Load steps and fitted laws, pivot and housing together"
+    across = "Load and displacement vectors, and what of them lies on each pad's direction"
+    return [
+        panel("pivot-stiffness", bands, pivot_stiffness, curves, formula),
+        panel("pivot-steps", steps, load_deflection, curves),
+        panel("pivot-projection", across, pad_projection, curves),
+    ]
+
+
+def position_panels(
+    polygon: ClearancePolygon | None,
+    drawn: tuple[FloatArray, FloatArray],
+    measured: Locus | FloatArray | None,
+    predicted: Mapping[str, FloatArray],
+    others: Sequence[ClearancePolygon] = (),
+) -> list[Panel]:
+    """Draw polygon and locus in one square panel.
+
+    `drawn` is the drawing's (n_pads,) pad angles [rad] and clearances [m]; positions are (n, 2) [m].
+    """
+    if isinstance(measured, np.ndarray) and not len(measured):
+        measured = None
+    if polygon is None and measured is None:
+        return []
+    polygons = None if polygon is None else {"measured": polygon} | {f"run {p.run}": p for p in others}
+    figure = functools.partial(clearance_and_locus, polygons, measured, predicted, drawing=drawn)
+    return [panel("locus-and-clearance", "Shaft centre locus inside the clearance polygon", figure)]
+
+
+def isolability_panels(plans: Mapping[str, CampaignPlan]) -> list[Panel]:
+    """Draw the isolability matrix of every plan."""
+    return [panel(name.replace("_", "-"), f"Isolability, {name}", isolability, plan) for name, plan in plans.items()]
+
+
+#: A picture of more channels could not be read.
+_MOST = 24
+_ROW, _WIDTH = 1.35, 4.6
+_POINTS = 4000
+
+
+def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Panel:
+    """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
+    return panel("quick-look", title, _quick_look, title, list(series)[:_MOST], looks)
+
+
+@in_house_style
+def _quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:
+    figure, grid = new_pictures(len(series), 2, width=_WIDTH, height=_ROW)
+    for (over_time, spectrum), channel in zip(grid, series, strict=True):
+        label(over_time, "time, s", printable(", ".join(filter(None, (channel.name, channel.unit)))))
+        label(spectrum, "frequency, Hz", "")
+        time = np.arange(len(channel), dtype=float) if channel.time is None else channel.time
+        over_time.plot(*thinned(time, channel.values, _POINTS), color=INK, linewidth=0.6)
+        look = looks[channel.name]
+        spectrum.plot(look.frequency[4:], np.maximum(look.amplitude[4:], 1e-300), color=BLUE, linewidth=0.7)
+        spectrum.set_yscale("log")
+        over_time.locator_params(axis="y", nbins=3)
+        spectrum.yaxis.set_major_locator(LogLocator(numticks=4))
+        spectrum.minorticks_off()
+        for axes in (over_time, spectrum):
+            axes.margins(x=0.0)
+    add_title(figure, printable(title))
+    return figure
