@@ -24,7 +24,6 @@ class Coefficient:
     symbol: str
     quantity: str
     suffix: str
-    meaning: str
 
     @property
     def display_unit(self) -> str:
@@ -46,9 +45,9 @@ class Coefficient:
         return tuple(self.column(entry) for entry in ENTRIES)
 
 
-STIFFNESS = Coefficient("k", "stiffness", "N_per_m", "Re h at the excitation frequency")
-DAMPING = Coefficient("c", "damping", "Ns_per_m", "Im h / omega at the excitation frequency")
-MASS = Coefficient("m", "mass", "kg", "apparent mass of K - omega^2 M")
+STIFFNESS = Coefficient("k", "stiffness", "N_per_m")  # Re h at the excitation frequency
+DAMPING = Coefficient("c", "damping", "Ns_per_m")  # Im h / omega there
+MASS = Coefficient("m", "mass", "kg")  # apparent mass of K - omega^2 M
 KINDS = {kind.symbol: kind for kind in (STIFFNESS, DAMPING, MASS)}
 #: Columns of K and C, row by row.
 COEFFICIENT_COLUMNS = (*STIFFNESS.columns, *DAMPING.columns)
@@ -67,14 +66,13 @@ def coefficient_column(name: str) -> str:
     return KINDS[name[0]].column(name[1:])
 
 
-#: Unit that a name ends in: the quantity, and the unit as people write it.
-_UNITS = {
-    "N_per_m": ("stiffness", "N/m"), "Ns_per_m": ("damping", "N s/m"), "N": ("force", "N"), "kg": ("mass", "kg"),
-    "m3_per_s": ("flow", "m^3/s"), "m": ("length", "m"), "deg": ("angle", "deg"), "rad": ("angle", "rad"),
-    "degC": ("temperature", "degC"), "K": ("temperature", "K"), "Pa": ("pressure", "Pa"), "Hz": ("frequency", "Hz"),
-    "s": ("time", "s"), "J": ("energy", "J"), "W": ("power", "W"),
+#: Quantity of the unit that a name ends in.
+_QUANTITIES = {
+    "N_per_m": "stiffness", "Ns_per_m": "damping", "N": "force", "kg": "mass", "m3_per_s": "flow", "m": "length",
+    "deg": "angle", "rad": "angle", "degC": "temperature", "K": "temperature", "Pa": "pressure", "Hz": "frequency",
+    "s": "time", "J": "energy", "W": "power",
 }  # fmt: skip
-_NAME = re.compile(rf".+?_({'|'.join(_UNITS)})(?:_predicted)?")
+_NAME = re.compile(rf".+?_({'|'.join(_QUANTITIES)})(?:_predicted)?")
 #: Least value of a quantity in a table, and endings that are widths; anything else may be negative.
 _LEAST = {"force": 0.0, "frequency": 0.0, "count": 0.0}
 _WIDTHS = ("_se", "_se_systematic", "_random95", "_systematic95", "_dof")
@@ -92,15 +90,15 @@ class Column:
     endings: tuple[str, ...] = ()
 
     @property
-    def measured(self) -> tuple[str, str]:
-        """Quantity and unit of its cells, by the end of the name; of what has no unit its kind."""
+    def unit(self) -> str:
+        """Unit of its cells as the name ends in it; empty where it has none."""
         match = _NAME.fullmatch(self.name)
-        return _UNITS[match[1]] if match else (self.kind, "")
+        return match[1] if match else ""
 
     @property
     def quantity(self) -> str:
-        """What its cells are."""
-        return self.measured[0]
+        """What its cells are, by the unit; of what has none its kind."""
+        return _QUANTITIES.get(self.unit, self.kind)
 
     def least(self, ending: str = "") -> float:
         """Least value that a cell can hold."""
@@ -127,18 +125,6 @@ def _listed() -> dict[str, tuple[Column, ...]]:
     return tables
 
 
-_LISTED = _listed()
-#: What each ending means.
-ENDINGS = {column.name: column.meaning for column in _LISTED["@endings"]}
 #: Columns of every table by file name; what begins with @ is a group that several share.
-TABLES = {name: columns for name, columns in _LISTED.items() if not name.startswith("@")}
-
-
-def markdown(table: str) -> str:
-    """Rows of the documentation's table of one file: name, unit, meaning."""
-    rows = ["| column | unit | meaning |", "|---|---|---|"]
-    for column in TABLES[table]:
-        dots = " .. `" + column.name.replace("{e}", "yy") + "`" if "{e}" in column.name else ""
-        names = [f"`{column.name.replace('{e}', 'xx')}`{dots}", *(f"`{ending}`" for ending in column.endings)]
-        rows.append(f"| {', '.join(names)} | {column.measured[1]} | {column.meaning} |")
-    return "\n".join(rows)
+LISTED = _listed()
+TABLES = {name: columns for name, columns in LISTED.items() if not name.startswith("@")}

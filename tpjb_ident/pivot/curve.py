@@ -271,8 +271,8 @@ class PivotCurve(Presented):
         outside = np.maximum(loads / self.valid_to, float(np.min(self.steps.load)) / loads)
         return total + np.diag((EXTRAPOLATION_SPREAD * np.log(np.maximum(outside, 1.0))) ** 2)
 
-    def reading_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Deflection that the steps should show while loading, and its interval.
+    def reading_band(self, load: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Deflection that the steps should show while loading, and its 95 % interval.
 
         Other than `deflection` it holds the way into contact, and its interval is that of the reading about the
         steps' own zero: what the fit leaves open among the points, not how far the zero load's reading is known.
@@ -281,8 +281,6 @@ class PivotCurve(Presented):
         ----------
         load : array_like
             Pad loads [N].
-        level : float
-            Coverage.
 
         Returns
         -------
@@ -296,7 +294,7 @@ class PivotCurve(Presented):
         for fit, weight in zip(self.fits, self.weights, strict=True):
             reading, gradient = fit.reading_gradient(applied, up)
             variance += weight * (np.sum(gradient @ fit.covariance * gradient, axis=1) + (reading - centre) ** 2)
-        half = (_quantile(level) * np.sqrt(variance)).reshape(values.shape)
+        half = (_quantile(0.95) * np.sqrt(variance)).reshape(values.shape)
         value = (centre - self.law.theta[OFFSET]).reshape(values.shape)
         return value, value - half, value + half
 

@@ -25,20 +25,20 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Formula = Callable[[int, float], tuple[float, float]]
-_ROWS = 20  # up to the largest measured load
+_ROWS, _BEYOND = 20, 1.6  # rows up to the largest measured load, and how far beyond it they go
 
 
-def load_grid(curves: Sequence[PivotCurve], extrapolate_to: float = 1.6) -> FloatArray:
-    """Round loads [N] up to `extrapolate_to` times the largest measured one (n,)."""
+def load_grid(curves: Sequence[PivotCurve]) -> FloatArray:
+    """Round loads [N] to beyond the largest measured one (n,)."""
     largest = max(curve.valid_to for curve in curves)
     raw = largest / _ROWS
     decade = 10.0 ** np.floor(np.log10(raw))
     step = decade * next(m for m in (1.0, 2.0, 2.5, 5.0, 10.0) if m * decade >= 0.99 * raw)
-    return np.asarray(step * np.arange(1, int(extrapolate_to * largest / step + 1e-9) + 1))
+    return np.asarray(step * np.arange(1, int(_BEYOND * largest / step + 1e-9) + 1))
 
 
 def pivot_table(
-    curves: Sequence[PivotCurve], loads: FloatArray | None = None, formula: Formula | None = None, level: float = 0.95
+    curves: Sequence[PivotCurve], loads: FloatArray | None = None, formula: Formula | None = None
 ) -> pd.DataFrame:
     """Curves at given loads.
 
@@ -51,13 +51,11 @@ def pivot_table(
     formula : callable, optional
         ``formula(pad, load)`` gives the printed formula's (secant, tangent) stiffness [N/m]; adds the
         ``formula_*`` columns (paper: measured pivots are 2-3 times softer).
-    level : float
-        Coverage of the intervals.
 
     Returns
     -------
     DataFrame
-        ``pad``, ``force_N``, ``deflection_m``, ``stiffness_N_per_m`` (tangent) with ``_lo``, ``_hi``,
+        ``pad``, ``force_N``, ``deflection_m``, ``stiffness_N_per_m`` (tangent) with ``_lo``, ``_hi`` (95 %),
         ``secant_N_per_m`` likewise, ``law``, ``extrapolated`` (outside the measured loads) and
         ``contact_complete``.
 
@@ -82,7 +80,7 @@ def pivot_table(
             (TANGENT, curve.stiffness, curve.stiffness_band),
             (SECANT, curve.secant, curve.secant_band),
         ):
-            lo, hi = band(grid, level)
+            lo, hi = band(grid)
             columns |= {name: value(grid), f"{name}_lo": lo, f"{name}_hi": hi}
         extrapolated, complete = curve.is_extrapolated(grid), grid >= curve.onset_load
         columns |= {"law": curve.law.name, "extrapolated": extrapolated, "contact_complete": complete}

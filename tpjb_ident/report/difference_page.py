@@ -18,9 +18,9 @@ from tpjb_ident.report.drawing.picture import (
     INK,
     PAPER,
     add_legend,
-    in_house_style,
     label,
     new_pictures,
+    plot,
     point_labels,
     set_point_ticks,
     with_errors,
@@ -45,12 +45,13 @@ def write_difference_report(
     """Write report.html and its figure into an existing folder."""
     answer, *more = difference_sentences(difference)
     a, b, points = difference.a, difference.b, difference.points
+    flags = [Condition(name) for name in "; ".join(_flags(points)).split("; ") if name in KINDS]
     page = Page(
         title=f"{a.name} and {b.name}: what changed",
         subtitle="Second less first, with 95 % intervals",
         facts=_facts(difference) | set_points(list(points[list(POINT_KEY)].itertuples(index=False, name=None))),
         values=_values_table(difference) if len(points) else None,
-        flags=flags_line([_flags(points)], len(points)),
+        flags=flags_line([flags], len(points)),
         lead="difference",
         answer=answer,
         more=more,
@@ -89,19 +90,17 @@ def _values_table(difference: Difference) -> Table:
     return table_of(f"At {place}, shaft at {shaft}; 95 % intervals", cells)
 
 
-def _flags(points: pd.DataFrame) -> list[Condition]:
-    """Flags of both sides at the common points."""
-    texts = points.reindex(columns=["quality_a", "quality_b"]).to_numpy(str).ravel()
-    return [Condition(name) for name in "; ".join(texts).split("; ") if name in KINDS]
+def _flags(points: pd.DataFrame) -> pd.Series:
+    """Names of the flags of both sides at every common point, in one text."""
+    return points.reindex(columns=["quality_a", "quality_b"], fill_value="ok").astype(str).agg("; ".join, axis=1)
 
 
 def _sections(difference: Difference) -> list[Section]:
-    sections = []
     points, pivots, clearance = difference.points, difference.pivots, difference.clearance
+    sections = []
     if len(points):
         tables = [_coefficient_table(points, kind) for kind in (STIFFNESS, DAMPING)]
-        panels = [panel("difference", _TITLE, _drawn, points)]
-        sections.append(Section("Coefficients", panels=panels, tables=tables))
+        sections.append(Section("Coefficients", panels=[panel("difference", _TITLE, _drawn, points)], tables=tables))
     if len(pivots):
         loads = (per("load") * pivots["force_N"]).map("{:.3g}".format)
         cells = {"pad": _pads(pivots), f"load, {symbol('load')}": loads, **_both(pivots, TANGENT, "stiffness")}
@@ -132,15 +131,14 @@ def _coefficient_table(points: pd.DataFrame, kind: Coefficient) -> Table:
     for heading in list(cells)[1:]:
         star = points[f"{heading[:3]}_changed"].map({"yes": " *"}).fillna("")
         cells[heading] = list(cells[heading] + star)
-    both = points.reindex(columns=["quality_a", "quality_b"], fill_value="ok").astype(str).agg("; ".join, axis=1)
     cells["flags of both"] = []
-    for text in both:
+    for text in _flags(points):
         flags = dict.fromkeys(flag for flag in text.split("; ") if flag != "ok")
         cells["flags of both"].append(", ".join(flags) or "ok")
     return table_of(f"Difference of {kind.quantity}, 95 %; * changed beyond what both intervals allow", cells)
 
 
-@in_house_style
+@plot
 def _drawn(points: pd.DataFrame) -> Figure:
     """Draw differences of K and C with their intervals, point by point; logarithmic beyond the widest interval."""
     figure, grid = new_pictures(2, 1, height=2.7)

@@ -29,7 +29,7 @@ from tpjb_ident.runtime.tables import printable, write_atomic, write_text
 
 _PNG_DPI = 160
 _FONT = re.compile(r"font: (?:(italic|oblique) )?(?:(bold|\d+) )?([\d.]+)px [^;\"]*")
-_SIZE = re.compile(r'viewBox="0 0 ([\d.]+) ')
+_WIDTH = re.compile(r'viewBox="0 0 ([\d.]+) ')
 _USE = re.compile(r'<use xlink:href="#[^"]*" x="([-\d.]+)" y="([-\d.]+)"([^>]*)/>')
 _POINTS_PER_INCH = 72.0
 #: Markers are found again by their place in the drawing [points].
@@ -55,11 +55,10 @@ class Panel:
         return figure
 
 
-def shape(svg: str) -> str:
-    """How a picture stands on a page: ``"wide"`` where half a page would make its text too small, or ""."""
-    size = _SIZE.search(svg)
-    assert size is not None
-    return "wide" if float(size[1]) > 6.5 * _POINTS_PER_INCH else ""
+def is_wide(svg: str) -> bool:
+    """Whether a picture takes a whole row of a page: half a page would make its text too small."""
+    width = _WIDTH.search(svg)
+    return width is not None and float(width[1]) > 6.5 * _POINTS_PER_INCH
 
 
 #: Panels from which on a second process draws too, and how many processes do at most.

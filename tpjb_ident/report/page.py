@@ -10,19 +10,17 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jinja2
 import markupsafe
 
-from tpjb_ident.report.figure import Panel, inline_svg, save_panels, shape, svg_text
+from tpjb_ident.report.figure import Panel, inline_svg, is_wide, save_panels, svg_text
 from tpjb_ident.runtime.provenance import versions
 from tpjb_ident.runtime.tables import printable, readable, write_text
 
 #: A number with what may stand beside it, such as its interval or unit.
 _NUMBER = re.compile(r"–|[-−+#(]*\d(?!.*[A-Za-z]{3}).*")
-
-
 #: Characters of a number with its interval; a cell that holds more must wrap on a phone.
 _LONG = 26
 
@@ -100,15 +98,13 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
     """Render a report as HTML."""
     script = _TEMPLATES.get_template("sort.js").render()
     running = f"{page.title} \N{MIDDLE DOT} {page.facts.get('Bearing', page.subtitle)}"
-    drawn, shapes = _elements(page.panels, svg)
     return _TEMPLATES.get_template("report.html").render(
         page=page,
-        drawn=drawn,
+        drawn=_drawings(page.panels, svg),
         # our own text; the one text from outside is escaped, character by character
         style=markupsafe.Markup(_TEMPLATES.get_template("style.css").render(running=_css_text(running))),
         script=markupsafe.Markup(script),  # likewise
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        shapes=shapes,
         versions=versions(),
         finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )
@@ -125,7 +121,7 @@ def render_section(section: Section) -> str:
     svg = {panel.name: svg_text(panel.figure, panel.name) for panel in section.panels}
     style = _TEMPLATES.get_template("style.css").render(running="").replace(":root", ":host")
     macros: Any = _TEMPLATES.get_template("section.html").module
-    html = macros.section(section, *_elements(section.panels, svg), "")
+    html = macros.section(section, _drawings(section.panels, svg), "")
     return f"<style>{style} :host {{ background: var(--paper); color: var(--ink); }}</style>{html}"
 
 
@@ -137,14 +133,22 @@ def write_page(folder: Path, page: Page) -> Path:
     return path
 
 
-def _elements(panels: Iterable[Panel], svg: Mapping[str, str]) -> tuple[dict[str, markupsafe.Markup], dict[str, str]]:
-    """Drawings as elements of a page, and how each stands on it, by name."""
-    elements = {}
+class _Drawing(NamedTuple):
+    """A picture as an element of a page."""
+
+    element: markupsafe.Markup
+    wide: bool  #: takes a whole row
+
+
+def _drawings(panels: Iterable[Panel], svg: Mapping[str, str]) -> dict[str, _Drawing]:
+    """Drawings of panels by name."""
+    drawings = {}
     for panel in panels:
         # matplotlib has escaped the labels inside the drawing already; the title is ours to escape
         title = str(markupsafe.escape(printable(panel.title)))
-        elements[panel.name] = markupsafe.Markup(inline_svg(svg[panel.name], panel.name, title))
-    return elements, {name: shape(svg[name]) for name in elements}
+        element = markupsafe.Markup(inline_svg(svg[panel.name], panel.name, title))
+        drawings[panel.name] = _Drawing(element, is_wide(svg[panel.name]))
+    return drawings
 
 
 def _printable_cell(value: object) -> object:

@@ -22,12 +22,11 @@ from tpjb_ident.report.drawing.picture import (
     CROSS,
     DIRECT,
     INK,
-    add_title,
     constant_along,
-    in_house_style,
     label,
     longest_series,
     new_pictures,
+    plot,
     point_labels,
     points_table,
     thinned,
@@ -330,11 +329,12 @@ _POINTS = 4000
 
 def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Panel:
     """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
-    return panel("quick-look", title, _quick_look, title, list(series)[:_MOST], looks)
+    figure = functools.partial(_quick_look, list(series)[:_MOST], looks, title=printable(title))
+    return panel("quick-look", title, figure)
 
 
-@in_house_style
-def _quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:
+@plot
+def _quick_look(series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:
     figure, grid = new_pictures(len(series), 2, width=_WIDTH, height=_ROW)
     for (over_time, spectrum), channel in zip(grid, series, strict=True):
         label(over_time, "time, s", printable(", ".join(filter(None, (channel.name, channel.unit)))))
@@ -349,5 +349,4 @@ def _quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look])
         spectrum.minorticks_off()
         for axes in (over_time, spectrum):
             axes.margins(x=0.0)
-    add_title(figure, printable(title))
     return figure

@@ -120,7 +120,7 @@ def plot(draw: Callable[..., Figure]) -> Callable[..., Figure]:
     def drawn(*arguments: Any, title: str | None = None, **options: Any) -> Figure:
         figure = draw(*arguments, **options)
         if title:
-            add_title(figure, title)
+            _add_title(figure, title)
         return figure
 
     signature = inspect.signature(draw)
@@ -171,7 +171,7 @@ def new_pictures(
     return figure, grid
 
 
-def add_title(figure: Figure, title: str) -> None:
+def _add_title(figure: Figure, title: str) -> None:
     """Put a title above all panels, for which the figure grows."""
     width, height = figure.get_size_inches()
     taller = height + 1.6 * _LINE

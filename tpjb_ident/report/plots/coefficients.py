@@ -234,43 +234,30 @@ def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
 
 def _frf_rows(source: BandResult | Identification | pd.DataFrame) -> tuple[pd.DataFrame | None, FrequencyModel | None]:
     """Rows as in ``frf.csv`` (without coherence where sines were run), and the model through them."""
-    import pandas as pd
+    if hasattr(source, "supported"):  # one band
+        from tpjb_ident.results.band_result import frf_frame
 
-    from tpjb_ident.results.identification import Identification
-
-    if isinstance(source, Identification):
-        series = longest_series(source.to_frame(), "frequency")
-        return _rows_of_sines(series), _model_of_sines(source, series)
-    if isinstance(source, pd.DataFrame):
-        if "hxx_real_N_per_m" in source:
-            return source.sort_values("excitation_Hz", kind="stable"), None
-        return _rows_of_sines(longest_series(source, "frequency")), None
-    from tpjb_ident.results.band_result import frf_frame
-
-    model = source.models.get(source.supported)
-    return frf_frame([source]), model
-
-
-def _rows_of_sines(series: pd.DataFrame | None) -> pd.DataFrame | None:
-    """K and C as h = K + i omega C, with the names that ``frf.csv`` has."""
+        return frf_frame([source]), source.models.get(source.supported)
+    table = as_table(source)
+    if "hxx_real_N_per_m" in table:
+        return table.sort_values("excitation_Hz", kind="stable"), None
+    series = longest_series(table, "frequency")
     if series is None:
-        return None
+        return None, None
     rows = series.drop_duplicates("excitation_Hz")
     omega = 2 * np.pi * rows["excitation_Hz"]
     columns = {}
-    for entry, end in itertools.product(ENTRIES, ("", "_lo", "_hi")):
+    for entry, end in itertools.product(ENTRIES, ("", "_lo", "_hi")):  # h = K + i omega C
         columns[f"h{entry}_real_N_per_m{end}"] = rows[f"k{entry}_N_per_m{end}"]
         columns[f"h{entry}_imag_N_per_m{end}"] = rows[f"c{entry}_Ns_per_m{end}"] * omega
-    return rows[["excitation_Hz"]].assign(**columns)
+    return rows[["excitation_Hz"]].assign(**columns), _model_of_sines(source, series)
 
 
-def _model_of_sines(source: Identification, series: pd.DataFrame | None) -> FrequencyModel | None:
-    """The model that the frequencies of the series support, None where they refuse all."""
-    if series is None:
-        return None
-    wanted = tuple(series.iloc[0][list(STATIC_KEY)])
-    for group in source.frequency_fits():
-        fit = group.fits.get(group.supported)
+def _model_of_sines(source: Identification | pd.DataFrame, series: pd.DataFrame) -> FrequencyModel | None:
+    """The model that the frequencies of the series support; None where they refuse all, and for a table."""
+    wanted = tuple(series.iloc[0].reindex(list(STATIC_KEY)))
+    for group in getattr(source, "frequency_fits", list)():
+        fit: FrequencyModel | None = group.fits.get(group.supported)
         if fit is not None and group.points[0].point.static_key == wanted:
             return fit
     return None

@@ -57,7 +57,6 @@ if TYPE_CHECKING:
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 _COLUMNS = ("model", "entry", *POINT_KEY, "z")
-
 _TWO_SIDED_95 = 1.959964
 
 
@@ -102,11 +101,7 @@ def _of_comparison(table: pd.DataFrame) -> pd.DataFrame:
 
 
 _ON_COLOUR = "#1b1f23"  # ink that stays dark on its coloured ground when the page turns dark
-
-_CELL, _SHORTEST = 0.42, 4.4  # width of a cell and of the whole picture [inches]
-
-_HEIGHT = 2.9
-
+_CELL, _SHORTEST, _HEIGHT = 0.42, 4.4, 2.9  # width of a cell, least width of the picture, height of a panel [inches]
 _LINEAR = 2.0  # within two standard deviations the colour hardly changes: that is noise
 
 
@@ -252,13 +247,8 @@ def gap(
     return figure
 
 
-_SQUARE = 0.3  # [inches]
-
-_TALL = 2.0  # the colour bar needs it [inches]
-
-_CONFUSABLE = 3.0
-
-_VISIBLE = 6.0
+_SQUARE, _TALL = 0.3, 2.0  # side of a cell, and height that the colour bar needs [inches]
+_CONFUSABLE, _VISIBLE = 3.0, 6.0  # standard deviations
 
 
 @plot

@@ -166,7 +166,6 @@ def _draw_vectors(axes: Axes, curve: PivotCurve, vectors: FloatArray, off: float
 
 
 _STIFFNESS_POINTS = 120
-
 _LOWEST = 0.04  # of the largest load: Hertz's stiffness has no value at zero
 
 
@@ -300,15 +299,13 @@ def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
 
 
 def _draw_locus(axes: Axes, locus: Locus | FloatArray) -> None:
-    places = locus
-    if not isinstance(places, np.ndarray):
-        points = places.points
-        places = np.array([point.position for point in points]).reshape(-1, 2)
-        for point in points:
-            variances, directions = np.linalg.eigh(per("length") ** 2 * point.covariance)
-            sides = 2.0 * _TWO_SIGMA * np.sqrt(np.maximum(variances, 0.0))
-            turn = np.degrees(np.arctan2(directions[1, 0], directions[0, 0]))
-            place = tuple(per("length") * point.position)
-            axes.add_patch(Ellipse(place, *sides, angle=float(turn), color=INK, alpha=0.25, linewidth=0))
+    points = () if isinstance(locus, np.ndarray) else locus.points
+    places = locus if isinstance(locus, np.ndarray) else np.array([p.position for p in points]).reshape(-1, 2)
+    for point in points:
+        variances, directions = np.linalg.eigh(per("length") ** 2 * point.covariance)
+        sides = 2.0 * _TWO_SIGMA * np.sqrt(np.maximum(variances, 0.0))
+        turn = np.degrees(np.arctan2(directions[1, 0], directions[0, 0]))
+        place = tuple(per("length") * point.position)
+        axes.add_patch(Ellipse(place, *sides, angle=float(turn), color=INK, alpha=0.25, linewidth=0))
     if len(places):
         axes.plot(*(per("length") * places).T, "o", markersize=4.0, color=INK, label="locus, measured")
