@@ -232,7 +232,7 @@ def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
     add_legend(axes)
 
 
-def _frf_rows(source: BandResult | Identification | pd.DataFrame) -> tuple[pd.DataFrame | None, FrequencyModel | None]:
+def _frf_rows(source: Any) -> tuple[pd.DataFrame | None, FrequencyModel | None]:
     """Rows as in ``frf.csv`` (without coherence where sines were run), and the model through them."""
     if hasattr(source, "supported"):  # one band
         from tpjb_ident.results.band_result import frf_frame

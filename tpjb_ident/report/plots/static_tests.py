@@ -43,6 +43,13 @@ if TYPE_CHECKING:
 _LAW_POINTS = 200
 
 
+def _listed(curves: PivotCurve | Sequence[PivotCurve]) -> list[PivotCurve]:
+    chosen = list(curves) if isinstance(curves, Sequence) else [curves]
+    if not chosen:
+        raise ValueError("curves must hold at least one PivotCurve")
+    return chosen
+
+
 @plot
 def load_deflection(
     curves: PivotCurve | Sequence[PivotCurve],
@@ -62,11 +69,8 @@ def load_deflection(
     up_to : float, optional
         Largest load [N]; default: the largest measured one.
     """
-    chosen = list(curves) if isinstance(curves, Sequence) else [curves]
-    if not chosen:
-        raise ValueError("curves must hold at least one PivotCurve")
     figure, axes = new_picture(f"radial deflection, {symbol('length')}", f"load on the pad, {symbol('load')}")
-    for curve in chosen:
+    for curve in _listed(curves):
         _draw_law(axes, curve, up_to or curve.valid_to)
         _draw_steps(axes, curve)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
@@ -125,10 +129,8 @@ def pad_projection(curves: Sequence[PivotCurve]) -> Figure:
     Figure
         Left the loads [kN], right the displacements [µm].
     """
-    if not curves:
-        raise ValueError("curves must hold at least one PivotCurve")
     figure, ((forces, places),) = new_pictures(1, 2, width=4.4, height=4.8)
-    for curve in curves:
+    for curve in _listed(curves):
         steps = curve.steps
         used = steps.weight > 0
         loads = np.column_stack([steps.load, steps.across_load])[used] * per("load")
@@ -191,8 +193,7 @@ def pivot_stiffness(
     loads : (n,) array_like, optional
         Pad loads [N]; default: up to the largest measured one.
     """
-    if not curves:
-        raise ValueError("curves must hold at least one PivotCurve")
+    curves = _listed(curves)
     top = max(curve.valid_to for curve in curves)
     grid = np.linspace(_LOWEST * top, top, _STIFFNESS_POINTS) if loads is None else np.asarray(loads, dtype=float)
     figure, axes = new_picture(f"load on the pad, {symbol('load')}", f"tangent stiffness, {symbol('stiffness')}")
