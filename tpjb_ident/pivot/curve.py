@@ -321,7 +321,7 @@ class PivotCurve(Presented):
         Parameters
         ----------
         **options
-            ``formula``, ``loads``, ``secant``, ``level``, ``title``.
+            ``formula``, ``loads``, ``title``.
         """
         from tpjb_ident.report.plots import pivot_stiffness
 

@@ -142,20 +142,17 @@ class _Prior:
 
 
 def _prior(law: Law, contact: bool, data: FitData) -> _Prior:
-    p = SCALE + 1 + len(law.parameters) + (2 if contact else 0)
-    prior = _Prior(np.zeros(p), np.zeros((p, p)), np.full(p, -np.inf), np.full(p, np.inf))
-    shape = _shape(law)
-    prior.mean[shape], (prior.low[shape], prior.high[shape]) = law.prior_mean, law.bounds
-    prior.root[shape, shape] = np.linalg.cholesky(law.prior_precision).T
-    single = {FRICTION: (*data.friction, -0.2, 0.2)}
+    largest, flat = float(np.max(data.load)), (0.0, np.inf, -np.inf, np.inf)
+    # mean, standard deviation, lowest and highest of each parameter
+    rows: list[tuple[float, ...]] = [flat, (*data.friction, -0.2, 0.2), flat]
+    rows += zip(law.prior_mean, np.ones(len(law.parameters)), *law.bounds, strict=True)
     if contact:
-        largest = float(np.max(data.load))
-        single[p - 2] = (0.0, CONTACT_GAP, 0.0, np.inf)
         ends = np.log(0.01 * largest), np.log(largest)
-        single[p - 1] = (np.log(0.1 * largest), CONTACT_LOAD_SPREAD, *ends)
-    for k, (mean, spread, low, high) in single.items():
-        prior.mean[k], prior.root[k, k], prior.low[k], prior.high[k] = mean, 1.0 / spread, low, high
-    return prior
+        rows += [(0.0, CONTACT_GAP, 0.0, np.inf), (np.log(0.1 * largest), CONTACT_LOAD_SPREAD, *ends)]
+    mean, spread, low, high = np.array(rows).T
+    root = np.diag(1.0 / spread)
+    root[_shape(law), _shape(law)] = np.linalg.cholesky(law.prior_precision).T
+    return _Prior(mean, root, low, high)
 
 
 def fit_law(law: Law, contact: bool, data: FitData, start: FloatArray | None = None) -> LawFit:

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tpjb_ident.columns import amount, per, spinning, symbol
-from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.comparison_page import clearance_table, pivot_stiffness_table
-from tpjb_ident.report.drawing.picture import DIRECT
+from tpjb_ident.report.drawing.picture import DIRECT, longest_series
 from tpjb_ident.report.figure import Panel, panel, svg_text
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.plots.coefficients import direct_coefficients
@@ -21,6 +20,7 @@ from tpjb_ident.report.sections import (
     values_table,
 )
 from tpjb_ident.runtime.tables import write_text
+from tpjb_ident.schema import STIFFNESS
 from tpjb_ident.watch.next_steps import described, lacking, located
 
 if TYPE_CHECKING:
@@ -120,14 +120,14 @@ def _sections(snapshot: Snapshot, bearing: Any) -> list[Section]:
 
 def _panels(snapshot: Snapshot) -> list[Panel]:
     identification = snapshot.measured.identification
-    if identification is None:
+    if identification is None or not identification.points:
         return []
-    good = [p for p in identification.points if np.isfinite(p.stiffness.h).all() and not untrusted(p.quality)]
+    table = identification.to_frame().dropna(subset=list(STIFFNESS.columns))
     panels = []
-    for over, set_point in (("load", "static_load"), ("frequency", "excitation")):
-        if len({getattr(p.point, set_point) for p in good}) > 1:
-            figure = direct_coefficients({identification.campaign: identification}, part="k", over=over)
-            panels.append(panel(f"k-over-{over}", f"Direct stiffness over {over}, 95 % intervals", figure))
+    for over in ("load", "frequency"):
+        if longest_series(table, over) is not None:
+            title, bearings = f"Direct stiffness over {over}, 95 % intervals", {identification.campaign: table}
+            panels.append(panel(f"k-over-{over}", title, direct_coefficients, bearings, "k", over))
     return panels
 
 

@@ -127,8 +127,8 @@ def _draw_predictions(axes: Axes, series: pd.DataFrame, column: str) -> None:
 def direct_coefficients(
     bearings: Mapping[str, Identification | pd.DataFrame],
     part: Literal["k", "c"] = "k",
-    *,
     over: str = "load",
+    *,
     entries: tuple[str, ...] = ("xx", "yy"),
 ) -> Figure:
     """Draw measured coefficients of one or several bearings with their 95 % intervals (the paper's Fig. 15, 16).

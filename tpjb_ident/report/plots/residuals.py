@@ -212,8 +212,7 @@ def gap(
 ) -> Figure:
     """Draw the root mean square of (measured - predicted) / sigma per observable, before and after.
 
-    Observables that got worse have their name in brackets with a minus; those that no held-out point shows are
-    marked with an asterisk.
+    Observables that got worse say so; those that no held-out point shows are marked with an asterisk.
 
     Parameters
     ----------
