@@ -29,9 +29,8 @@ from tpjb_ident.check.signals import check_signal, is_spare
 from tpjb_ident.check.wiring import definiteness, explanation, indefiniteness, plane_of, pointing, repairs
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.phasors.bad_samples import robust_fit
+from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.run_phasors import run_phasors
-from tpjb_ident.phasors.windows import line_design
 
 SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
 #: Probes of the virtual rig.
@@ -126,8 +125,8 @@ def test_the_excitation_is_seen_through_bad_samples_and_gaps_channel_by_channel(
     assert lines.scatter[:2] == pytest.approx(0.01, rel=0.1)
     assert np.isnan([lines.mean[2], lines.floor[2], lines.scatter[2]]).all()
     assert np.isnan(lines.phasor[2])
-    used = robust_fit(line_design(time, np.array([25.0, 22.0, 44.0])), data["DX"], np.inf).used
-    assert 1900 - used.sum() == 40 + 2 * 3
+    fit = LineFitter(2000, 1000.0, np.array([25.0, 22.0, 44.0])).fit(data["DX"][None, None], np.zeros(1))
+    assert 2000 * fit.lost[0, 0] == pytest.approx(100 + 40 + 2 * 3)
 
 
 def test_the_mean_of_a_run_without_excitation_leaves_the_shafts_lines_out():

@@ -10,7 +10,7 @@ import pytest
 from rigdata.operating_point import OperatingPoint
 from rigdata.vector import directions
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.positions import check_shaft_lines
+from tpjb_ident.check.run_gain import check_shaft_lines
 from tpjb_ident.check.set_points import check_excitation
 
 

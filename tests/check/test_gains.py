@@ -4,36 +4,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import t as student
 
-import rigdata
-from rigdata.virtual_rig import Fault, Noise
+from rigdata.virtual_rig import Fault
 from tests.good_campaigns import DAMPING, PLAN, RUN, STIFFNESS, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
 from tests.seeds import seeds
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.lines import excitation_line
-from tpjb_ident.check.observation import observe
-from tpjb_ident.check.point_runs import PointRuns, probe_centres
-from tpjb_ident.check.run_gain import (
-    Difference,
-    Evidence,
-    dynamic_difference,
-    evidence,
-    gain_of_run,
-    static_difference,
-    wrong_gains,
-)
+from tpjb_ident.check.response import PointRuns
+from tpjb_ident.check.run_gain import Difference, Evidence, deviating_runs, dynamic_difference, gain_of_run
 from tpjb_ident.phasors.run_phasors import run_phasors
 
 OMEGA = 2 * math.pi * 25.0
 H = STIFFNESS + 1j * OMEGA * DAMPING
 #: What the probes read at the bearing's centre [m].
 CENTRE = (1.03e-3, 1.01e-3)
-UNKNOWN = (math.nan, math.nan)
+#: Sizes of what turns with the shaft [m, N].
+TURNING = np.array([1.5e-6, 1.2e-6, 30.0, 40.0])
 PROBES = np.linalg.inv(np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)).T
 LOAD = np.array([900.0, -4900.0])
 
@@ -51,31 +43,31 @@ def point(runs: int = 6, scatter: float = 0.0, seed: int = 1, softer: float = 0.
     place = np.linalg.solve(STIFFNESS, load.T).T + 1e-6 * scatter * rng.standard_normal((runs, 2))
     noise = rng.standard_normal((2, runs, 2)) + 1j * rng.standard_normal((2, runs, 2))
     to_probes = np.linalg.inv(PROBES).T
+    four = ("X1A", "X1B", "L1H", "L1V")
     return PointRuns(
         phasors=np.hstack([(shaft + scatter * 1e-6 * noise[0]) @ to_probes, force * 0.9 + scatter * 300.0 * noise[1]]),
         means=np.hstack([place @ to_probes + np.array(CENTRE), load]),
         inertia=force * 0.1,
         probe_plane=PROBES,
         cell_plane=np.eye(2),
-        centre=CENTRE,
+        turning=TURNING * (1 + 2 * scatter * rng.standard_normal((runs, 4))),
+        channels=tuple(SimpleNamespace(name=name) for name in four),
     )
 
 
 def spoilt(readings: PointRuns, run: int, channel: int, gain: float, zero: float = 0.0) -> PointRuns:
     """One channel reads `gain` times the truth, counted from `zero`."""
     changed = {}
-    for name, base in (("phasors", 0.0), ("means", zero)):
+    for name, base in (("phasors", 0.0), ("means", zero), ("turning", 0.0)):
         values = getattr(readings, name).copy()
         values[run, channel] = base + gain * (values[run, channel] - base)
         changed[name] = values
     return replace(readings, **changed)
 
 
-def differences(readings, one, others):
-    """How a run differs from the others, dynamically and statically."""
-    stiffness = readings.stiffness(others)
-    assert stiffness is not None
-    return tuple(f(readings, one, others, stiffness) for f in (dynamic_difference, static_difference))
+def wrong_gains(readings):
+    """Gains that explain runs which differ."""
+    return {run: gain for run, gain in deviating_runs(readings).items() if gain is not None}
 
 
 @pytest.mark.parametrize("gain", [0.95, 0.97, 1.03, 1.05])
@@ -88,14 +80,18 @@ def test_a_gain_in_one_run_comes_back(channel, gain):
     assert 0 < found.error < 0.01
 
 
-@pytest.mark.parametrize(
-    ("centre", "zero", "gain"), [(CENTRE, 0.0, 1.03), (UNKNOWN, 0.0, 1.03), (UNKNOWN, CENTRE[0], 0.9)]
-)
-def test_gains_count_from_zero_volts_or_the_centre_or_where_that_is_not_known_the_phasors_decide(centre, zero, gain):
-    readings = spoilt(replace(point(), centre=centre), 2, 0, gain, zero)
-    (found,) = wrong_gains(readings).values()
-    assert found.channels[0] == 0
+@pytest.mark.parametrize("gain", [0.9, 1.05])
+@pytest.mark.parametrize("zero", [0.0, CENTRE[0], -3e-3])
+def test_a_probe_may_count_from_anywhere(zero, gain):
+    (found,) = wrong_gains(spoilt(point(), 2, 0, gain, zero)).values()
+    assert found.channels == (0,)
     assert found.gain == pytest.approx(gain, rel=1e-9)
+
+
+def test_what_turns_with_the_shaft_tells_a_gain_that_the_drive_leaves_to_chance():
+    readings = spoilt(point(scatter=2e-3), 2, 0, 1.05)
+    assert {run: gain.channels for run, gain in wrong_gains(readings).items()} == {2: (0,)}
+    assert wrong_gains(replace(readings, turning=np.full((6, 4), np.nan))) == {}
 
 
 def wandering_mean(channel, change):
@@ -125,6 +121,7 @@ NO_GAIN = {
     "first probe's mean off by 30 um": wandering_mean(0, lambda mean: mean + 30e-6),
     "cell's mean a twentieth more": wandering_mean(3, lambda mean: 1.05 * mean),
     "gain of a loaded cell whose mean stays": replace(spoilt(point(), 2, 3, 1.05), means=point().means),
+    "gain of a probe whose shaft line stays": replace(spoilt(point(), 2, 0, 1.05), turning=point().turning),
 }
 
 
@@ -142,9 +139,7 @@ def test_a_bearing_that_wanders_from_run_to_run_is_learnt(seed):
         made, phasors=made.phasors * np.hstack([share**0, share**0, share, share]), inertia=made.inertia * share
     )
     others = [0, 1, 3, 4, 5, 6, 7]
-    steady, wandering = (differences(some, 2, others)[0] for some in (made, readings))
-    assert steady is not None
-    assert wandering is not None
+    steady, wandering = (dynamic_difference(some, 2, others, some.stiffness(others)) for some in (made, readings))
     # 1 % is what honest runs are credited with; these show some 3 % more
     assert 3 < np.trace(wandering.honest) / np.trace(steady.honest) < 30
     assert wrong_gains(readings) == {}
@@ -155,10 +150,9 @@ def test_a_gain_below_one_per_cent_is_no_fault():
     assert list(wrong_gains(spoilt(point(), 2, 3, 1.02))) == [2]
 
 
-def test_runs_that_are_known_to_differ_are_not_told_again():
-    readings = spoilt(point(9), 2, 3, 1.05)
-    assert wrong_gains(readings, outliers=[2]) == {}
-    assert list(wrong_gains(spoilt(readings, 5, 0, 0.95, CENTRE[0]), outliers=[2])) == [5]
+def test_runs_that_clearly_differ_are_named_with_those_that_differ_by_little():
+    readings = spoilt(spoilt(point(9), 2, 3, 1.3), 5, 0, 0.95, CENTRE[0])
+    assert {run: gain.channels for run, gain in wrong_gains(readings).items()} == {2: (3,), 5: (0,)}
 
 
 def test_a_third_of_the_runs_at_most():
@@ -166,7 +160,6 @@ def test_a_third_of_the_runs_at_most():
     for run in (1, 4, 6):
         readings = spoilt(readings, run, 3, 1.04 if run != 4 else 0.95)
     assert sorted(wrong_gains(readings)) == [1, 4, 6]
-    assert wrong_gains(spoilt(point(6), 2, 3, 1.04), outliers=[0, 1]) == {}
     assert wrong_gains(spoilt(point(3), 2, 3, 1.04)) == {}
 
 
@@ -195,15 +188,16 @@ def test_estimates_scatter_as_their_standard_errors_say(seed):
 
 def test_a_difference_is_weighted_by_its_covariance():
     made = Difference(np.array([1.0, 3.0]), np.diag([1.0, 3.0]), np.zeros((2, 2)), 8)
-    found = evidence([made], [np.array([1.0, 1.0])])
+    found = made.evidence(np.array([1.0, 1.0]))
     assert found.part == pytest.approx(1.5)
     assert found.error == pytest.approx(math.sqrt(3 / 4))
     assert found.chance == pytest.approx(2 * student.sf(math.sqrt(3), 8))
-    assert made.misfit(np.array([1.0, 1.0]), 1.0) == pytest.approx(4 / 3 / 2)
-    assert evidence([made], [np.zeros(2)]) == Evidence()
+    assert made.misfit(np.array([1.0, 1.0]), 1.0) == pytest.approx(4 / 3)
+    nothing = made.evidence(np.zeros(2))
+    assert (nothing.part, nothing.error, nothing.chance) == (0.0, math.inf, 1.0)
     # two independent ones: the mean by information, and the freedom adds up
     second = made._replace(residual=made.residual + 2)
-    both = evidence([made, second], [np.ones(2), np.ones(2)])
+    both = Evidence(*np.sum([made.evidence(np.ones(2)), second.evidence(np.ones(2))], axis=0))
     assert both.part == pytest.approx(2.5)
     assert both.error == pytest.approx(math.sqrt(3 / 8))
     assert both.chance == pytest.approx(2 * student.sf(2.5 * math.sqrt(8 / 3), 16))
@@ -217,15 +211,6 @@ def test_a_speed_that_misses_its_set_point_leaks_nothing_into_the_line_wanted():
     run = run_of(HeldReader(dict(zip(described, wave + noise)), 1000.0), described)
     phasor = excitation_line(run_phasors(run, 0.0), 0, list(described.values())).phasor
     assert np.abs(phasor - 1).max() < 2e-3
-
-
-def test_probe_centres_come_from_a_load_that_goes_around(tmp_path):
-    plan = replace(PLAN, dynamic=(), locus=(), dry=())
-    campaign = rigdata.load_campaign(written(tmp_path / "c.h5", stiff_rig(3, plan=plan, noise=Noise.like_samples())))
-    seen = observe(campaign.runs[0])
-    centres = probe_centres([seen])
-    assert centres == {n: pytest.approx(8.0 / 7.78e3 * -1, abs=2e-6) for n in ("X1A", "X1B")}
-    assert probe_centres([]) == {}
 
 
 @pytest.mark.slow

@@ -15,10 +15,11 @@ from tpjb_ident.arguments import as_campaign
 from tpjb_ident.check.findings import is_shared, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.check.positions import check_positions, check_shaft_lines
-from tpjb_ident.check.response import check_responses
+from tpjb_ident.check.positions import check_positions
+from tpjb_ident.check.response import check_film, point_runs
 from tpjb_ident.check.rig_fit import check_accelerometers, rig_fit
 from tpjb_ident.check.rotation import check_rotation
+from tpjb_ident.check.run_gain import check_agreement, check_shaft_lines
 from tpjb_ident.check.set_points import check_excitation, check_speed, check_static_loads
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
 from tpjb_ident.conditions import SEVERITIES, Condition
@@ -87,7 +88,9 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     _spread_doubts(observations)
     check_dry(of_kind("dry_pivot"))
     _spread_doubts(observations)
-    check_responses(sines, campaign.housing_mass, of_kind("clearance"))
+    for runs in point_runs(sines, campaign.housing_mass):
+        check_film(runs)
+        check_agreement(runs)
     check_rotation(sines)
     check_shaft_lines(sines)
     check_sweeps(of_kind("clearance"))

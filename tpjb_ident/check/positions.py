@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from operator import attrgetter
-from typing import NamedTuple
 
 import numpy as np
 
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.questions import far
 
-#: Runs needed before one can be told apart, and distance from their median in ranges of the middle 80 % of them.
-_MIN_PLACES, _FAR = 5, 3.0
-#: A smaller distance is no jump: dry runs press the shaft against pads on all sides [m].
-_MIN_JUMP = {"running": 100e-6, "dry": 300e-6}
-#: Distance from the median of an operating point, over the runs' median one, and the least [m]: a probe that drifts by
-#: 1.5 % of a gap of 1 mm within an operating point was touched, or its amplifier was.
-_STEP, _LEAST_STEP = 9.0, 15e-6
-#: Logarithm by which what turns with the shaft differs in one run, at one load and at others, and over the median one.
-_SAME_LINE, _LIKE_LINE, _MANY_LINES = 0.06, 0.5, 6.0
-
-
-class _Mean(NamedTuple):
-    """What a probe shows in a run: its mean [m], or the logarithm of a size."""
-
-    observation: Observation
-    value: float
+#: Distance from the median of all runs over their median one, and the least: a smaller one is no jump [m], dry runs
+#: press the shaft against pads on all sides; runs that tell it.
+_FAR, _MIN_JUMP, _MIN_PLACES = 8.0, {("dynamic", "locus"): 100e-6, ("dry_pivot", "clearance"): 300e-6}, 5
+#: The same within an operating point: a probe that drifts by 1.5 % of a gap of 1 mm was touched, or its amplifier was.
+_STEP, _LEAST_STEP, _MIN_STEPS = 9.0, 15e-6, 4
 
 
 def check_positions(runs: Sequence[Observation]) -> None:
@@ -36,56 +23,40 @@ def check_positions(runs: Sequence[Observation]) -> None:
         for index in observation.pick("displacement"):
             low, _, high = observation.spread[:, index]
             observation.report.ask("travel", high - low, observation.channels[index].name)
-    for state, kinds in (("running", {"dynamic", "locus"}), ("dry", {"dry_pivot", "clearance"})):
-        alike = [observation for observation in runs if observation.run.kind in kinds]
-        for name, means in _groups(alike, type, _middle):
-            low, middle, high = 1e6 * np.quantile([mean.value for mean in means], [0.1, 0.5, 0.9])
-            allowed = max(1e-6 * _FAR * (high - low), _MIN_JUMP[state])
-            for mean in _outlying(means, allowed, 0.0, _MIN_PLACES):
-                mean.observation.report.ask("position", 1.0, name, mean=1e6 * mean.value, low=low, high=high)
-                mean.observation.report.doubts.add("displacement")
-    dynamic = [observation for observation in runs if observation.run.kind == "dynamic"]
-    for name, means in _groups(dynamic, attrgetter("run.point"), _middle):
-        middle = float(np.median([mean.value for mean in means]))
-        for mean in _outlying(means, _LEAST_STEP, _STEP, 4):
-            if "displacement" not in mean.observation.report.doubts:
-                mean.observation.report.ask("step", 1.0, name, off=1e6 * (mean.value - middle))
-
-
-def check_shaft_lines(runs: Sequence[Observation]) -> None:
-    """What turns with the shaft, run against run: nearly the same at all loads, the same whatever the excitation."""
-    shown = [observation for observation in runs if len(observation.shaft_line)]
-    for alike, least in (("run.point.static_key", _SAME_LINE), ("run.point.spin", _LIKE_LINE)):
-        for name, sizes in _groups(shown, attrgetter(alike), _shaft_size):
-            middle = float(np.median([size.value for size in sizes]))
-            for size in _outlying(sizes, least, _MANY_LINES, _MIN_PLACES):
-                if f"shaft line {name}" not in size.observation.report.keys:
-                    size.observation.report.ask("shaft line", math.exp(size.value - middle), name)
+    for kinds, least in _MIN_JUMP.items():
+        alike = [run for run in runs if run.run.kind in kinds]
+        for name, observation, off in outlying(by_probe(alike, type, _middle), least, _FAR, _MIN_PLACES):
+            observation.report.ask("position", 1.0, name, off=1e6 * off)
+            observation.report.doubts.add("displacement")
+    dynamic = [run for run in runs if run.run.kind == "dynamic" and "displacement" not in run.report.doubts]
+    points = by_probe(dynamic, attrgetter("run.point"), _middle)
+    for name, observation, off in outlying(points, _LEAST_STEP, _STEP, _MIN_STEPS):
+        observation.report.ask("step", 1.0, name, off=1e6 * off)
 
 
 def _middle(observation: Observation, place: int) -> float:
     return float(observation.spread[1, place])
 
 
-def _shaft_size(observation: Observation, place: int) -> float:
-    return math.log(max(float(np.nan_to_num(observation.shaft_line[place])), 1e-300))
-
-
-def _groups(
+def by_probe(
     runs: Sequence[Observation], key: Callable[[Observation], object], value: Callable[[Observation, int], float]
-) -> Iterator[tuple[str, list[_Mean]]]:
-    """Every probe's values by name and by what is alike of their runs."""
-    groups: dict[tuple[str, object], list[_Mean]] = {}
+) -> dict[tuple[str, object], list[tuple[Observation, float]]]:
+    """Every probe's values by its name and by what is alike of their runs."""
+    groups: dict[tuple[str, object], list[tuple[Observation, float]]] = {}
     for observation in runs:
         for index in observation.pick("displacement"):
-            mean = _Mean(observation, value(observation, index))
-            if np.isfinite(mean.value):
-                groups.setdefault((observation.channels[index].name, key(observation)), []).append(mean)
-    for (name, _), means in groups.items():
-        yield name, means
+            shown = value(observation, index)
+            if np.isfinite(shown):
+                groups.setdefault((observation.channels[index].name, key(observation)), []).append((observation, shown))
+    return groups
 
 
-def _outlying(means: Sequence[_Mean], least: float, many: float, count: int) -> list[_Mean]:
-    values = np.array([mean.value for mean in means])
-    outlying = far(np.abs(values - np.median(values)), least, many, count)
-    return [mean for mean, is_apart in zip(means, outlying) if is_apart]
+def outlying(
+    groups: dict[tuple[str, object], list[tuple[Observation, float]]], least: float, many: float, count: int
+) -> Iterator[tuple[str, Observation, float]]:
+    """Probe, run and distance from its group's median of values that lie `far` off."""
+    for (name, _), values in groups.items():
+        off = np.array([value for _, value in values])
+        off -= np.median(off)
+        for k in np.flatnonzero(far(np.abs(off), least, many, count)):
+            yield name, values[k][0], float(off[k])

@@ -195,8 +195,7 @@ QUESTIONS = {
     "position": Question(
         _ERROR,
         _CHANNEL,
-        "reads {mean:.0f} um on average, others of its kind {low:.0f} to {high:.0f} um; the gap voltage is constant "
-        "within a campaign",
+        "reads {off:+.0f} um on average beside other runs of its kind; the gap voltage is constant within a campaign",
         "Check the probe: moved, wrong sign, wrong sensitivity in this run?",
     ),
     "step": Question(
@@ -222,11 +221,10 @@ QUESTIONS = {
     ),
     "disagrees": Question((_NEVER, 0.0, 0.5), _ANSWER, _DIFFERS, _RUN),
     "miswired": Question((_NEVER, 0.0, 0.2), _ANSWER, _DIFFERS, _RUN),
-    "gain of the run": Question((_NEVER, 0.0, 0.2), _ANSWER, _DIFFERS, _RUN),
     "gain": Question(
-        _WARNING,
+        (_NEVER, 0.0, 0.2),
         _CHANNEL,
-        "reads {size:.1%} too {direction} (standard error {error:.1%}) beside the other runs at this operating point",
+        "reads {share:.1%} too {direction} (standard error {error:.1%}) beside the other runs at this operating point",
         "Check this channel's amplifier, range and cable in this run; leave it out or repeat it",
     ),
     "housing": Question(

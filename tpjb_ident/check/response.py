@@ -1,42 +1,98 @@
-"""What the runs of an operating point answer to force: as a film can, and as the other runs do.
+"""What the runs of an operating point answer to force: the H that they share, and whether a film can be like that.
 
-A bearing film pushes back: the symmetric parts of stiffness and damping are positive definite. A probe
-wired to the wrong input or with the wrong sign turns the answer into its mirror image, which is not.
-
-All runs of a point share one matrix H. Each run is held against the matrix of the others, in units of what these
-scatter about it themselves, so that a quiet rig shows a gain that is some per cent off and a noisy one does not cry.
+A bearing film pushes back: the symmetric parts of stiffness and damping are positive definite. A probe wired to the
+wrong input or with the wrong sign turns the answer into its mirror image, which is not.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
-from scipy.special import fdtri
 
 from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.calibration import Channel
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.point_runs import PointRuns, point_runs, probe_centres
-from tpjb_ident.check.questions import far
-from tpjb_ident.check.run_gain import CHANCE, WrongGain, dynamic_difference, gain_of_run, wrong_gains
-from tpjb_ident.check.wiring import explanation, indefiniteness, repairs
+from tpjb_ident.check.wiring import explanation, indefiniteness, plane_of, repairs
 from tpjb_ident.phasors.shaft import shaft_order
 
+#: Smaller over larger extent of displacements that move along one line.
+_ONE_LINE = 0.2
+#: Runs whose pairs are tried.
+_PAIRED = 24
 #: Where half of the runs differ by more than this share there is no one answer to judge.
 _NO_ANSWER = 0.08
-_DEFINITE = 0.05
-#: A mended answer is at least as definite as this.
-_MENDED = 0.15
-#: A run that differs by this share stands apart in any case, where the others agree to the second share.
-_OUTLIER, _AGREE = 0.08, 0.03
-#: Differences below this share are no fault: loads and temperatures differ from run to run.
-_LEAST = 0.03
-#: Runs needed before one can be told apart from the others.
-_MIN_RUNS = 4
+#: Least over largest eigenvalue of a film's stiffness and damping, and of one whose probes were mended.
+_DEFINITE, _MENDED = 0.05, 0.15
 
 
-def check_responses(observations: Sequence[Observation], mass: float, sweeps: Sequence[Observation]) -> None:
-    """Compare the dynamic runs of every operating point with each other and with what a film can do."""
+@dataclass(frozen=True)
+class PointRuns:
+    """Readings of the n runs of one operating point, SI: of two probes and two cells."""
+
+    phasors: ComplexArray  #: (n, 4): X and Y in place of the cells where the runs have not the same two
+    means: FloatArray  #: (n, 4)
+    inertia: ComplexArray  #: (n, 2), N: housing mass times acceleration, X and Y
+    probe_plane: FloatArray  #: `probe_plane`, `cell_plane` (2, 2): from the two readings to X and Y
+    cell_plane: FloatArray
+    turning: FloatArray  #: (n, 4): size of what turns with the shaft; NaN where that is not told
+    observations: tuple[Observation, ...] = field(default=(), repr=False)
+    channels: tuple[Channel, ...] = ()  #: the probes, and the cells where there are two in all runs
+
+    def __len__(self) -> int:
+        return len(self.phasors)
+
+    @property
+    def displacement(self) -> ComplexArray:
+        """X, Y of every run, (n, 2) [m]."""
+        return np.asarray(self.phasors[:, :2] @ self.probe_plane.T)
+
+    @property
+    def force(self) -> ComplexArray:
+        """Of the film, X, Y of every run, (n, 2) [N]."""
+        return np.asarray(self.phasors[:, 2:] @ self.cell_plane.T + self.inertia)
+
+    def stiffness(self, runs: Sequence[int]) -> ComplexArray | None:
+        """H (2, 2) of F = H D over some runs, each weighted by one over its displacement.
+
+        None where they move along one line.
+        """
+        D, F = self.displacement[list(runs)], self.force[list(runs)]
+        sizes = np.linalg.norm(D, axis=1)
+        if len(sizes) < 2 or not np.all(sizes > 0):
+            return None
+        unit = D / sizes[:, None]
+        solution, _, _, singular = np.linalg.lstsq(unit, F / sizes[:, None], rcond=None)
+        return np.asarray(solution.T) if singular[-1] >= _ONE_LINE * singular[0] else None
+
+    def misfits(self, stiffness: ComplexArray) -> FloatArray:
+        """Share of every run's force that H does not explain, (n,)."""
+        residual = self.force - self.displacement @ stiffness.T
+        return np.asarray(np.linalg.norm(residual, axis=1) / np.linalg.norm(self.force, axis=1))
+
+    @cached_property
+    def robust_stiffness(self) -> ComplexArray | None:
+        """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it."""
+        tried = (self.stiffness(pair) for pair in combinations(range(min(len(self), _PAIRED)), 2))
+        pairs = [h for h in tried if h is not None]
+        if not pairs:
+            return None
+        medians = [float(np.median(self.misfits(h))) for h in pairs]
+        least = int(np.argmin(medians))
+        close = np.flatnonzero(self.misfits(pairs[least]) <= max(3 * medians[least], 1e-9))
+        refined = self.stiffness(close.tolist())
+        return pairs[least] if refined is None else refined
+
+    def without(self, outliers: Collection[int]) -> list[int]:
+        """Runs that are none of some outliers."""
+        return [i for i in range(len(self)) if i not in outliers]
+
+
+def point_runs(observations: Sequence[Observation], mass: float) -> list[PointRuns]:
+    """Dynamic runs by operating point: of those that show what two probes and the cells answer."""
     groups: dict[object, list[Observation]] = {}
     for observation in observations:
         point, probes = observation.run.point, observation.of("displacement")
@@ -46,14 +102,25 @@ def check_responses(observations: Sequence[Observation], mass: float, sweeps: Se
         measured = np.array([observation.film_force(mass), observation.line("displacement")])
         if is_clear and len(probes) == 2 and "force" not in observation.report.doubts and np.isfinite(measured).all():
             groups.setdefault((point, *((c.name, c.axis) for c in probes)), []).append(observation)
-    centres = probe_centres(sweeps)
-    for group in groups.values():
-        runs = point_runs(group, mass, centres)
-        stiffness = runs.robust_stiffness()
-        if stiffness is not None:
-            _check_film(runs, stiffness)
-            if len(runs) >= _MIN_RUNS:
-                _check_agreement(runs, stiffness)
+    return [_readings(group, mass) for group in groups.values()]
+
+
+def _readings(runs: Sequence[Observation], mass: float) -> PointRuns:
+    """Readings of all runs of a point, by channel."""
+    probes, cells = runs[0].of("displacement"), runs[0].of("force")
+    force = np.array([run.film_force(mass) for run in runs])
+    if len(cells) == 2 and all(run.names("force") == runs[0].names("force") for run in runs):
+        plane = plane_of(cells)
+        places = [[*run.pick("displacement"), *run.pick("force")] for run in runs]
+        phasors = np.array([run.lines.phasor[k] for run, k in zip(runs, places)])
+        means = np.array([run.lines.mean[k] for run, k in zip(runs, places)])
+        turning = np.array([run.shaft_line[k] for run, k in zip(runs, places)])
+    else:
+        cells, plane = [], np.eye(2)
+        phasors = np.hstack([[run.lines.phasor[run.pick("displacement")] for run in runs], force])
+        means, turning = np.zeros((2, len(runs), 4))
+    inertia = np.asarray(force - phasors[:, 2:] @ plane.T, dtype=complex)
+    return PointRuns(phasors, means, inertia, plane_of(probes), plane, turning, tuple(runs), (*probes, *cells))
 
 
 def _film_like(stiffness: ComplexArray) -> float:
@@ -61,9 +128,10 @@ def _film_like(stiffness: ComplexArray) -> float:
     return max(indefiniteness(stiffness.real), indefiniteness(stiffness.imag))
 
 
-def _check_film(runs: PointRuns, stiffness: ComplexArray) -> None:
+def check_film(runs: PointRuns) -> None:
     """Positive stiffness and damping, alike along both probes; most of the runs must agree on them."""
-    if np.median(runs.misfits(stiffness)) > _NO_ANSWER:
+    stiffness = runs.robust_stiffness
+    if stiffness is None or np.median(runs.misfits(stiffness)) > _NO_ANSWER:
         return
     probes = runs.channels[:2]
     names = [probe.name for probe in probes]
@@ -79,64 +147,3 @@ def _check_film(runs: PointRuns, stiffness: ComplexArray) -> None:
     is_grave = bool(hint) or np.linalg.eigvalsh(stiffness.imag + stiffness.imag.T)[0] < 0
     for observation in runs.observations:
         observation.report.ask("signs", 2.0 if is_grave else 1.0, *names, hint=hint)
-
-
-def _check_agreement(runs: PointRuns, stiffness: ComplexArray) -> None:
-    """Name runs that answer otherwise than the others, then those in which one channel has a gain of its own."""
-    misfits = runs.misfits(stiffness)
-    clear = far(misfits, _OUTLIER, 6.0) & (np.median(misfits) <= _AGREE)
-    outliers = runs.outlying(np.flatnonzero(clear).tolist(), lambda run, peers: _distance(runs, run, peers))
-    consistent = runs.without(outliers)
-    common = runs.stiffness(consistent) if outliers else stiffness
-    for run in sorted(outliers):
-        _report(runs, run, consistent, stiffness if common is None else common)
-    for run, gain in wrong_gains(runs, outliers).items() if len(runs.channels) == 4 else ():
-        name, *alike = _names(runs, gain)
-        hint = f" (or {' or '.join(alike)} another gain)" if alike else ""
-        report, direction = runs.observations[run].report, _direction(gain)
-        report.ask("gain", abs(gain.gain - 1), name, hint=hint, direction=direction, error=gain.error)
-
-
-def _names(runs: PointRuns, gain: WrongGain) -> list[str]:
-    return [runs.channels[k].name for k in gain.channels]
-
-
-def _direction(gain: WrongGain) -> str:
-    return "much" if gain.gain > 1 else "little"
-
-
-def _distance(runs: PointRuns, run: int, peers: list[int]) -> float:
-    """How far a run is from the others' matrix, over what chance allows; zero where it is no fault.
-
-    The residual's square over its variance, by the others' scatter, follows an F distribution.
-    """
-    stiffness = runs.stiffness(peers)
-    difference = None if stiffness is None else dynamic_difference(runs, run, peers, stiffness)
-    if stiffness is None or difference is None or runs.misfits(stiffness)[run] < _LEAST:
-        return 0.0
-    ratio = float(np.mean(difference.residual**2 / np.diag(difference.noise)))
-    return ratio / float(fdtri(4, difference.spare, 1 - CHANCE))
-
-
-def _report(runs: PointRuns, run: int, consistent: Sequence[int], stiffness: ComplexArray) -> None:
-    """Name a run that differs, with the wiring fault of probes or cells that explains it, or the gain."""
-    misfit, report = float(runs.misfits(stiffness)[run]), runs.observations[run].report
-    probes, cells = runs.channels[:2], runs.channels[2:]
-    tried = [(words, np.hstack([repair, np.eye(2)])) for words, repair in repairs(probes, scales=True)]
-    tried += [(words, np.hstack([np.eye(2), repair])) for words, repair in repairs(cells, scales=True)]
-
-    def unexplained(repair: FloatArray) -> float:
-        # the inertia part of the force stays: only the cells are supposed to be at fault
-        force = repair[:, 2:] @ (runs.force - runs.inertia)[run] + runs.inertia[run]
-        answer = stiffness @ repair[:, :2] @ runs.displacement[run]
-        return float(np.linalg.norm(force - answer) / np.linalg.norm(force))
-
-    if hint := explanation(tried, unexplained, misfit / 4):
-        report.ask("miswired", misfit, hint=hint)
-        return
-    gain = gain_of_run(runs, run, consistent) if cells else None
-    if gain is not None and gain.chance <= CHANCE:
-        hint = f"; as if {_names(runs, gain)[0]} read {abs(gain.gain - 1):.0%} too {_direction(gain)}"
-        report.ask("gain of the run", misfit, hint=hint)
-    else:
-        report.ask("disagrees", misfit)

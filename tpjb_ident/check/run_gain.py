@@ -1,49 +1,61 @@
-"""The one run of an operating point in which one probe or cell reads some per cent too much or too little.
+"""The one run of an operating point that answers otherwise than its fellows, and the channel whose gain explains it.
 
 Two probes and two cells serve all runs of a point. If one of them reads g times the truth in one run, the part
-1 - 1/g of its own reading is too much there, at the excitation line and in the mean alike. The part is estimated from
-the run against the others, by generalised least squares: noise is what the others scatter by, and beside it stands
-what honest runs differ by: a bearing that answers a little softer or less damped in one run, a load that misses its set
-point and moves the shaft as well. A gain is named where phasors and means together leave no room for chance, the
-phasors show it by themselves, the means do not contradict it, and nothing else in the run is strange. Where no
-clearance run tells what a probe reads at the centre its mean may have moved by anything: then the phasors decide.
+1 - 1/g of its own reading is too much there: at the excitation line, in what turns with the shaft, and in the mean load
+alike. Each of the three foretells the run by its fellows; the part is estimated from all of them, by generalised least
+squares: noise is what the fellows scatter by, and beside it stands what honest runs differ by: a bearing that answers a
+little softer or less damped, a load that misses its set point and moves the shaft as well, a shaft that is balanced a
+little otherwise. A gain is named where all evidence together leaves no room for chance, the excitation line shows it by
+itself, nothing contradicts it, and nothing else in the run is strange. The mean of the probe that is asked may have
+moved by anything.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Sequence
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import stdtr
+from scipy.special import fdtri, stdtr
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.check.point_runs import PointRuns
+from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.positions import by_probe, outlying
+from tpjb_ident.check.questions import far
+from tpjb_ident.check.response import PointRuns
+from tpjb_ident.check.wiring import explanation, repairs
 
+#: A run that differs by this share stands apart in any case, where the others agree to the second share.
+_OUTLIER, _AGREED = 0.08, 0.03
+#: Differences below this share are no fault: loads and temperatures differ from run to run.
+_LEAST_MISFIT = 0.03
+#: Runs needed before one can be told apart from the others, and share of them that can be.
+_MIN_RUNS, _MOST = 4, 1 / 3
 #: Stiffness, damping and static load of one run may differ from the others' by this share, one standard deviation:
-#: oil gets warmer, loads are set by hand.
-_HONEST = 0.01
+#: oil gets warmer, loads are set by hand; what turns with the shaft by the second.
+_HONEST, _HONEST_TURNING = 0.01, 0.005
 #: Least scatter that runs are credited with: phasors and mean loads as a share, mean positions [m].
 _LEAST_PHASOR, _LEAST_LOAD, _LEAST_POSITION = 1e-4, 1e-3, 10e-9
 #: Probability at which chance is no explanation any more, for all runs of an operating point.
-CHANCE = 1e-4
+_CHANCE = 1e-4
 #: The phasors must show the gain themselves, with this probability of chance at most.
 _PHASORS_SHOW = 0.05
 #: Rest that a lone gain may leave, per equation in units of its covariance: 1 % of honest runs leave more.
 _STRANGE = 6.0
-#: The estimates by phasors and by means may differ by this many standard deviations.
+#: The estimates by phasors and by others may differ by this many standard deviations.
 _AGREE = 3.0
 #: Smaller gains are no fault: calibrations promise no more. A part beyond the other is no gain some per cent off.
 _LEAST, _MOST_PART = 0.01, 0.9
 #: Another channel explains a run as well if it leaves no more than this: a thousandth of the likelihood.
 _AS_WELL = 2 * math.log(1e3)
-#: An explanation that lets the mean move freely must leave this much less: ln of the equations, times one more unknown.
-_FREE = 2.0
-#: How well the zero of a probe, and so its distance from there, is known from a clearance run.
-_LEVER_KNOWN = 0.25
-#: Shift of a probe's mean that may have moved by anything [m].
-_ANYTHING = 1.0
+#: Variance of a probe's mean that may have moved by anything [m^2], and what that must leave less of the squares: ln of
+#: the equations, times one more unknown.
+_ANYWHERE, _FREE = 1.0, 2.0
+#: Logarithm by which what turns with the shaft differs in one run, at one load and at others, over the median one, and
+#: runs that tell it.
+_SAME_LINE, _LIKE_LINE, _MANY_LINES, _MIN_LINES = 0.06, 0.5, 6.0, 5
 
 
 class WrongGain(NamedTuple):
@@ -55,117 +67,178 @@ class WrongGain(NamedTuple):
     chance: float
 
 
+class Evidence(NamedTuple):
+    """Evidence of a part 1 - 1/g; what is independent adds up, field by field."""
+
+    weighted: float  #: estimate of the part times the information
+    information: float
+    doubt: float  #: variance of the information over it, by the freedom of the noise
+
+    @property
+    def part(self) -> float:
+        """Estimate."""
+        return self.weighted / self.information if self.information > 0 else 0.0
+
+    @property
+    def error(self) -> float:
+        """Standard error."""
+        return 1 / math.sqrt(self.information) if self.information > 0 else math.inf
+
+    @property
+    def chance(self) -> float:
+        """Probability of so large a part where there is none: two-sided, by the freedom of Welch and Satterthwaite."""
+        freedom = min(self.information**2 / max(self.doubt, 1e-300), 1e9)  # infinite freedom is the normal distribution
+        return float(2 * stdtr(freedom, -abs(self.part) / self.error)) if freedom > 0 else 1.0
+
+
 class Difference(NamedTuple):
-    """How one run differs from what the others foretell, with its covariance."""
+    """How one run differs from what its fellows foretell, with its covariance."""
 
     residual: FloatArray  #: (m,)
     noise: FloatArray  #: (m, m): covariance that the others' scatter tells
     honest: FloatArray  #: (m, m): covariance of what honest runs differ by beyond it
     spare: int
 
+    def evidence(self, pattern: FloatArray) -> Evidence:
+        """What the difference says of the part of a pattern (m,) in it."""
+        weight = np.linalg.solve(self.noise + self.honest, pattern)
+        information = float(pattern @ weight)
+        return Evidence(
+            float(weight @ self.residual), information, float(weight @ self.noise @ weight) ** 2 / self.spare
+        )
+
     def misfit(self, pattern: FloatArray, part: float) -> float:
-        """Squared distance of the residual from `part` times the pattern, per equation, in units of its covariance."""
+        """Squared distance of the residual from `part` times the pattern, in units of its covariance."""
         remaining = self.residual - part * pattern
-        return float(remaining @ np.linalg.solve(self.noise + self.honest, remaining)) / len(remaining)
+        return float(remaining @ np.linalg.solve(self.noise + self.honest, remaining))
 
 
-class Evidence(NamedTuple):
-    """An estimate of 1 - 1/g, and the probability of so large a one where there is none."""
+def check_agreement(runs: PointRuns) -> None:
+    """Name runs that answer otherwise than their fellows, with the wiring fault or the gain that explains it."""
+    gains = deviating_runs(runs)
+    stiffness = runs.stiffness(runs.without(gains)) if gains else None
+    if stiffness is None:
+        stiffness = runs.robust_stiffness
+    if stiffness is None:
+        return
+    misfits = runs.misfits(stiffness)
+    for run, gain in gains.items():
+        report, hint = runs.observations[run].report, _miswired(runs, run, stiffness)
+        if hint:
+            report.ask("miswired", misfits[run], hint=hint)
+        elif gain is None:
+            report.ask("disagrees", misfits[run])
+        else:
+            name, *alike = (runs.channels[k].name for k in gain.channels)
+            hint = f" (or {' or '.join(alike)} another gain)" if alike else ""
+            direction = "much" if gain.gain > 1 else "little"
+            words = {"share": abs(gain.gain - 1), "direction": direction, "error": gain.error}
+            report.ask("gain", misfits[run], name, hint=hint, **words)
 
-    part: float = 0.0
-    error: float = math.inf
-    chance: float = 1.0
+
+def _miswired(runs: PointRuns, run: int, stiffness: ComplexArray) -> str:
+    """The wiring fault of probes or cells that explains a run; "" where none does."""
+    probes, cells = runs.channels[:2], runs.channels[2:]
+    tried = [(words, np.hstack([repair, np.eye(2)])) for words, repair in repairs(probes, scales=True)]
+    tried += [(words, np.hstack([np.eye(2), repair])) for words, repair in repairs(cells, scales=True)]
+
+    def unexplained(repair: FloatArray) -> float:
+        # the inertia part of the force stays: only the cells are supposed to be at fault
+        force = repair[:, 2:] @ (runs.force - runs.inertia)[run] + runs.inertia[run]
+        answer = stiffness @ repair[:, :2] @ runs.displacement[run]
+        return float(np.linalg.norm(force - answer) / np.linalg.norm(force))
+
+    return explanation(tried, unexplained, float(runs.misfits(stiffness)[run]) / 4)
 
 
-def evidence(differences: Sequence[Difference], patterns: Sequence[FloatArray]) -> Evidence:
-    """The part of the patterns that independent differences show together; of nothing where no pattern shows.
+def deviating_runs(runs: PointRuns) -> dict[int, WrongGain | None]:
+    """Runs that differ from their fellows, with the gain that explains it or without one.
 
-    The chance is two-sided, by Student's t with the freedom of Welch and Satterthwaite.
+    Those that clearly do, then the oddest until none is odd or too many are.
     """
-    weights = [np.linalg.solve(d.noise + d.honest, pattern) for d, pattern in zip(differences, patterns)]
-    information = sum(float(pattern @ w) for pattern, w in zip(patterns, weights))
-    if not information > 0:
-        return Evidence()
-    part = sum(float(w @ d.residual) for d, w in zip(differences, weights)) / information
-    doubt = sum(float(w @ d.noise @ w) ** 2 / d.spare for d, w in zip(differences, weights)) / information**2
-    freedom = min(1 / max(doubt, 1e-300), 1e9)  # infinite freedom is the normal distribution
-    chance = float(2 * stdtr(freedom, -abs(part) * math.sqrt(information)))
-    return Evidence(part, 1 / math.sqrt(information), chance)
+    if runs.robust_stiffness is None:
+        return {}
+    misfits = runs.misfits(runs.robust_stiffness)
+    clear = far(misfits, _OUTLIER, 6.0) & (np.median(misfits) <= _AGREED)
+    deviating = set(np.flatnonzero(clear).tolist())
+    while len(deviating) + 1 <= _MOST * len(runs) and len(runs) - len(deviating) >= _MIN_RUNS:
+        remaining = runs.without(deviating)
+        oddness = [_oddness(runs, run, [fellow for fellow in remaining if fellow != run]) for run in remaining]
+        if max(oddness) < 1.0:
+            break
+        deviating.add(remaining[int(np.argmax(oddness))])
+    fellows = runs.without(deviating)
+    return {run: gain_of_run(runs, run, fellows) for run in sorted(deviating)}
 
 
-def wrong_gains(runs: PointRuns, outliers: Collection[int] = ()) -> dict[int, WrongGain]:
-    """Runs with one wrong gain; `known` are runs that stand apart anyway."""
+def _oddness(runs: PointRuns, run: int, fellows: list[int]) -> float:
+    """How far a run is from its fellows' matrix or how likely one channel's gain, over what chance allows.
 
-    def oddness(run: int, peers: list[int]) -> float:
-        gain = gain_of_run(runs, run, peers)
-        # each run is tried with two cells and two probes, a probe with two zeros
-        return 0.0 if gain is None else CHANCE / (6 * (len(peers) + 1)) / max(gain.chance, 1e-300)
+    The residual's square over its variance, by the fellows' scatter, follows an F distribution.
+    """
+    stiffness = runs.stiffness(fellows)
+    dynamic = None if stiffness is None else dynamic_difference(runs, run, fellows, stiffness)
+    if stiffness is None or dynamic is None:
+        return 0.0
+    gain = gain_of_run(runs, run, fellows)
+    # each run is tried with two cells and two probes
+    by_gain = 0.0 if gain is None else _CHANCE / (4 * (len(fellows) + 1)) / max(gain.chance, 1e-300)
+    if runs.misfits(stiffness)[run] < _LEAST_MISFIT:
+        return by_gain
+    ratio = float(np.mean(dynamic.residual**2 / np.diag(dynamic.noise)))
+    return max(by_gain, ratio / float(fdtri(4, dynamic.spare, 1 - _CHANCE)))
 
-    wrong = runs.outlying(outliers, oddness)
-    gains = {run: gain_of_run(runs, run, runs.without(wrong)) for run in sorted(wrong.difference(outliers))}
-    return {run: gain for run, gain in gains.items() if gain is not None}
 
-
-def gain_of_run(runs: PointRuns, run: int, peers: Sequence[int]) -> WrongGain | None:
-    """The gain of one channel that explains `run` best beside the others; None where no single one does.
+def gain_of_run(runs: PointRuns, run: int, fellows: Sequence[int]) -> WrongGain | None:
+    """The gain of one channel that explains `run` best beside its fellows; None where no single one does.
 
     Where the best is too small to be a fault, no worse one is named in its place.
     """
-    tried = sorted(_explanations(runs, run, peers))
-    if not tried or abs(tried[0][2].part) < _LEAST:
+    stiffness = runs.stiffness(fellows) if len(runs.channels) == 4 else None
+    dynamic = None if stiffness is None else dynamic_difference(runs, run, fellows, stiffness)
+    if stiffness is None or dynamic is None:
         return None
-    least, _, best = tried[0]
-    alike = dict.fromkeys(channel for misfit, channel, _ in tried if misfit < least + _AS_WELL)
+    static, turning = static_difference(runs, run, fellows, stiffness), turning_difference(runs, run, fellows)
+    forces = np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]  # of every channel
+    tried = []
+    for channel, selector in enumerate(np.eye(4)):
+        is_probe = channel < 2
+        mean = static._replace(honest=static.honest + np.diag(selector * _ANYWHERE * is_probe))
+        load = selector * runs.means[run] * (not is_probe)
+        patterns = _stacked(forces[:, channel]), load, selector * np.nan_to_num(runs.turning[run])
+        pairs = list(zip((dynamic, mean, turning), patterns))
+        evidence = [difference.evidence(pattern) for difference, pattern in pairs]
+        joint = Evidence(*np.sum(evidence, axis=0))
+        misfits = [difference.misfit(pattern, joint.part) for difference, pattern in pairs]
+        if _is_consistent(evidence) and max(misfits) <= 4 * _STRANGE:
+            tried.append((sum(misfits) + _FREE * is_probe, channel, joint))
+    least, _, best = min(tried, default=(0.0, 0, Evidence(0.0, 0.0, 0.0)))
+    if abs(best.part) < _LEAST or best.chance > _CHANCE:
+        return None
+    alike = [channel for misfit, channel, _ in sorted(tried) if misfit < least + _AS_WELL]
     gain = 1 / (1 - best.part)
     return WrongGain(tuple(alike), gain, gain**2 * best.error, best.chance)
 
 
-def _explanations(runs: PointRuns, run: int, peers: Sequence[int]) -> Iterator[tuple[float, int, Evidence]]:
-    """Explanations of `run` by one channel's gain that nothing in it contradicts, with the squares that they leave."""
-    stiffness = runs.stiffness(peers)
-    dynamic = None if stiffness is None else dynamic_difference(runs, run, peers, stiffness)
-    if stiffness is None or dynamic is None:
-        return
-    static = static_difference(runs, run, peers, stiffness)
-    forces = np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]  # of every channel
-    for channel, pattern in enumerate(map(_stacked, forces.T)):
-        shown = evidence([dynamic], [pattern])
-        if shown.chance > _PHASORS_SHOW or shown.part > _MOST_PART:
-            continue
-        selector = np.diag(np.arange(4) == channel).astype(float)
-        for lever, slack in _levers(runs, run, channel, shown.part):
-            means = static._replace(honest=static.honest + slack**2 * selector)
-            by_mean = evidence([means], [lever * selector[channel]])
-            distance = abs(by_mean.part - shown.part) / math.hypot(by_mean.error, shown.error)
-            joint = evidence([dynamic, means], [pattern, lever * selector[channel]])
-            misfits = dynamic.misfit(pattern, joint.part), means.misfit(lever * selector[channel], joint.part)
-            if distance <= _AGREE and max(misfits) <= _STRANGE:
-                yield len(pattern) * sum(misfits) + (_FREE if slack == _ANYTHING else 0.0), channel, joint
+def _is_consistent(evidence: Sequence[Evidence]) -> bool:
+    """Whether the phasors show a part, the first, and nothing else contradicts it."""
+    shown, *others = evidence
+    if shown.chance > _PHASORS_SHOW or shown.part > _MOST_PART:
+        return False
+    return all(abs(e.part - shown.part) <= _AGREE * math.hypot(e.error, shown.error) for e in others)
 
 
-def _levers(runs: PointRuns, run: int, channel: int, part: float) -> list[tuple[float, float]]:
-    """Readings that a gain would multiply in the mean, with the uncertainty of the shift.
-
-    A probe's gain may count from the bearing's centre, or, as that of an amplifier, from 0 V.
-    """
-    mean = float(runs.means[run, channel])
-    if channel >= 2:
-        return [(mean, 0.0)]
-    lever = mean - runs.centre[channel]
-    return [(mean, 0.0), (lever, abs(_LEVER_KNOWN * lever * part)) if np.isfinite(lever) else (0.0, _ANYTHING)]
-
-
-def dynamic_difference(runs: PointRuns, run: int, peers: Sequence[int], stiffness: ComplexArray) -> Difference | None:
+def dynamic_difference(runs: PointRuns, run: int, fellows: Sequence[int], stiffness: ComplexArray) -> Difference | None:
     """Force of `run` minus H (2, 2) [N/m] of the others times its displacement: Re X, Re Y, Im X, Im Y [N].
 
     None where they leave no scatter.
     """
-    spare = 2 * (2 * len(peers) - 4)
+    spare = 2 * (2 * len(fellows) - 4)
     D, residual = runs.displacement, runs.force - runs.displacement @ stiffness.T
     sizes = np.linalg.norm(D, axis=1)
     if spare < 4 or not sizes[run] > 0:
         return None
-    rows = list(peers)
+    rows = list(fellows)
     unit, direction = D[rows] / sizes[rows, None], D[run] / sizes[run]
     leverage = float(np.real(direction.conj() @ np.linalg.solve(unit.T @ unit.conj(), direction)))
     scatter = float(np.sum(np.abs(residual[rows] / sizes[rows, None]) ** 2)) / spare
@@ -184,13 +257,13 @@ def _changes(stiffness: ComplexArray, displacement: ComplexArray) -> FloatArray:
     return np.stack([_stacked(stiffness.real @ displacement), _stacked(1j * stiffness.imag @ displacement)], axis=1)
 
 
-def static_difference(runs: PointRuns, run: int, peers: Sequence[int], stiffness: ComplexArray) -> Difference:
+def static_difference(runs: PointRuns, run: int, fellows: Sequence[int], stiffness: ComplexArray) -> Difference:
     """Mean readings of `run` minus those of the others: probe, probe [m], cell, cell [N].
 
     A load that misses its set point shows in the cells and, over the stiffness (2, 2) [N/m], in the probes; what
     positions wander by besides is their scatter. Means tell nothing where the stiffness cannot carry a load.
     """
-    means = runs.means[list(peers)]
+    means = runs.means[list(fellows)]
     residual = runs.means[run] - means.mean(axis=0)
     if np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
         return Difference(residual, np.zeros((4, 4)), 1e30 * np.eye(4), 1)
@@ -209,6 +282,34 @@ def static_difference(runs: PointRuns, run: int, peers: Sequence[int], stiffness
     return Difference(residual, (1 + 1 / len(means)) * (squares[0] + squares[1]), honest, spare)
 
 
+def turning_difference(runs: PointRuns, run: int, fellows: Sequence[int]) -> Difference:
+    """Size of what turns with the shaft in `run` minus that in the others, by channel (4,) [m, N]."""
+    sizes = runs.turning[[run, *fellows]]
+    known = np.isfinite(sizes).all(axis=0)
+    residual, others = np.where(known, sizes[0] - sizes[1:].mean(axis=0), 0.0), sizes[1:, known]
+    scatter, honest = np.zeros(4), np.full(4, 1e30)
+    scatter[known] = (1 + 1 / len(others)) * others.var(axis=0, ddof=1)
+    honest[known] = (_HONEST_TURNING * others.mean(axis=0)) ** 2 + np.finfo(float).tiny
+    return Difference(residual, np.diag(scatter), np.diag(honest), len(others) - 1)
+
+
 def _stacked(vector: ComplexArray) -> FloatArray:
     """Real parts, then imaginary ones."""
     return np.concatenate([vector.real, vector.imag])
+
+
+def check_shaft_lines(runs: Sequence[Observation]) -> None:
+    """What turns with the shaft, run against run: nearly the same at all loads, the same whatever the excitation.
+
+    Whole operating points are told so in which a channel has another gain: their runs have no fellow without it.
+    """
+    shown = [observation for observation in runs if len(observation.shaft_line)]
+    for alike, least in (("run.point.static_key", _SAME_LINE), ("run.point.spin", _LIKE_LINE)):
+        sizes = by_probe(shown, attrgetter(alike), _log_size)
+        for name, observation, off in outlying(sizes, least, _MANY_LINES, _MIN_LINES):
+            if f"shaft line {name}" not in observation.report.keys:
+                observation.report.ask("shaft line", math.exp(off), name)
+
+
+def _log_size(observation: Observation, place: int) -> float:
+    return math.log(max(float(np.nan_to_num(observation.shaft_line[place])), 1e-300))

@@ -15,17 +15,18 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.phasors.bad_samples import (
     BAD_LIMIT,
     SCALE_LIMIT,
+    absolute_residual,
     is_present,
     robust_deviation,
-    robust_fit,
     usual_scale,
     with_flanks,
 )
 from tpjb_ident.phasors.windows import line_design
 
-#: Outlying samples up to this share are left out again and again until fit and verdict agree.
-_FEW = 0.1
-_FEW_ROUNDS = 8
+#: Outlying samples up to this share are few; a window that has lost more than the other gives no phasor.
+_FEW, _MAX_LOST = 0.1, 0.5
+#: Verdicts on a window's samples, at most.
+_ROUNDS = 8
 #: Samples of a block of waves.
 BLOCK = 256
 
@@ -109,13 +110,11 @@ class LineFitter:
         lost = np.zeros(q * n)
         for k in np.flatnonzero(self._is_unclean(residual, scale, limit, np.abs(coefficients).sum(axis=1))).tolist():
             gaps = ~present[k]
-            robust = self._without_few(residual[k], gaps, coefficients[k], scale[k], limit[k])
-            if robust is None:
-                fit = robust_fit(self.design, np.where(gaps, np.nan, values[k]), limit[k])
-                robust = fit.coefficients, fit.scale, fit.lost
-            coefficients[k], scale[k], lost[k] = robust
-            remainder = np.where(gaps, np.inf, np.abs(values[k] - self.design @ coefficients[k]))
-            residual[k] = np.where(remainder <= BAD_LIMIT * scale[k], values[k] - self.design @ coefficients[k], 0.0)
+            change, scale[k], lost[k] = self._without_bad(values[k], residual[k], gaps, scale[k], limit[k])
+            coefficients[k] -= change
+            remainder = np.abs(values[k] - self.design @ coefficients[k])
+            is_good = ~gaps & (remainder <= BAD_LIMIT * scale[k])
+            residual[k] = np.where(is_good, values[k] - self.design @ coefficients[k], 0.0)
         mean = coefficients @ self._level + offset[:, 0]
         z = _phasors(coefficients.reshape(q, n, -1), self.frequencies, start)
         figures = (np.ascontiguousarray(part.reshape(q, n).T) for part in (mean, scale, lost))
@@ -133,36 +132,52 @@ class LineFitter:
         clean = np.isfinite(scale) & (largest <= np.maximum(BAD_LIMIT * scale, rounding))
         return ~(clean & (scale <= np.maximum(SCALE_LIMIT * usual, rounding)))
 
-    def _without_few(
-        self, residual: FloatArray, gaps: BoolArray, coefficients: FloatArray, scale: float, usual: float
-    ) -> tuple[FloatArray, float, float] | None:
-        """Leave the few outlying samples out of a window's fit until no verdict changes; None where it cannot.
+    def _without_bad(
+        self, values: FloatArray, residual: FloatArray, gaps: BoolArray, scale: float, usual: float
+    ) -> tuple[FloatArray, float, float]:
+        """What a window's coefficients lose without its bad samples, its scale, and the share of these.
 
-        Their rows are taken off the normal equations: no need to go through all samples again.
+        Where they are few the plain fit tells them; else least absolute deviations. NaN where too few are left.
 
-        `residual` (length,), `gaps` (length,) where there is no value, `coefficients` (n_columns,); `scale` is infinite
-        where these rest on what fills the gaps.
+        `values`, `residual` (length,), `gaps` (length,) where there is no value; `scale` is infinite where the residual
+        rests on what fills the gaps.
         """
-        first, limit = scale, SCALE_LIMIT * usual
-        if limit < first < np.inf:
-            return None
-        size, solution, left_out = np.abs(residual), coefficients, None
-        for _ in range(_FEW_ROUNDS):
-            previous, left_out = left_out, np.flatnonzero(gaps | with_flanks(size > BAD_LIMIT * scale))
-            if previous is not None and np.array_equal(previous, left_out):
-                return (solution, scale, len(left_out) / self.length) if min(first, scale) <= limit else None
-            if len(left_out) > _FEW * self.length:
+        limit = SCALE_LIMIT * usual
+        if not limit < scale < np.inf:
+            settled = self._settled(residual, gaps, np.abs(residual) > BAD_LIMIT * scale, limit, _FEW)
+            if settled is not None:
+                return settled
+        missing = np.full(self.design.shape[1], np.nan), np.nan
+        if gaps.mean() > _MAX_LOST or np.sum(~gaps) <= 2 * self.design.shape[1]:
+            return *missing, float(gaps.mean())
+        size = absolute_residual(self.design[~gaps], values[~gaps])
+        outlying = np.zeros(self.length, dtype=bool)
+        outlying[~gaps] = size > BAD_LIMIT * min(robust_deviation(size), limit)
+        return self._settled(residual, gaps, outlying, limit, _MAX_LOST) or (*missing, 1.0)
+
+    def _settled(
+        self, residual: FloatArray, gaps: BoolArray, outlying: BoolArray, limit: float, most: float
+    ) -> tuple[FloatArray, float, float] | None:
+        """Leave `outlying` samples out until no verdict changes; None where they are more than a share of `most`.
+
+        Their rows are taken off the normal equations of the plain fit, whose `residual` (length,) is what they
+        contribute beyond it: no need to go through all samples again. `limit` of the scale.
+        """
+        left_out = np.flatnonzero(gaps | with_flanks(outlying))
+        for _ in range(_ROUNDS):
+            if len(left_out) > most * self.length:
                 return None
             rows = self.design[left_out]
-            # the residual of the left-out samples is what they contributed beyond the fit
             try:
                 change = np.linalg.solve(self._gram - rows.T @ rows, residual[left_out] @ rows)
             except np.linalg.LinAlgError:  # what is left does not tell its lines apart
                 return None
-            solution = coefficients - change
             size = np.where(gaps, 0.0, np.abs(residual + self.design @ change))
-            scale = robust_deviation(size[~gaps])
-        return None
+            scale = min(robust_deviation(size[~gaps]), limit)
+            previous, left_out = left_out, np.flatnonzero(gaps | with_flanks(size > BAD_LIMIT * scale))
+            if np.array_equal(previous, left_out):
+                return change, scale, len(left_out) / self.length
+        return None if most == _FEW else (change, scale, len(left_out) / self.length)
 
 
 def even_design(length: int, rate: float, frequencies: FloatArray, drift_order: int = 1) -> FloatArray:
