@@ -14,7 +14,7 @@ from tests.good_campaigns import directions, rocker_rig
 from tpjb_ident import load_campaign
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.observation import observe
-from tpjb_ident.check.rotation import check_rotation
+from tpjb_ident.check.set_points import check_rotation
 
 PLAN = RigPlan(dynamic=operating_points([(5000.0, 25.0)]), directions=directions(4))
 

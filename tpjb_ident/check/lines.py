@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -20,6 +21,8 @@ _BAND_LINES = 8
 _CLEAR_OF = 5
 #: Noise is looked at from this many times the band's top on.
 _ABOVE = 1.3
+#: A part of the 1X force counts from this many standard errors of its windows.
+_CLEAR = 8.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,26 @@ def shaft_line(phasors: RunPhasors, channels: Sequence[Channel]) -> FloatArray:
     if place is None:
         return np.full(len(channels), np.nan)
     return _by_channel(_window_median(np.abs(phasors.z[:, place])), phasors, channels)
+
+
+def shaft_force(phasors: RunPhasors) -> float:
+    """Logarithm of the 1X force's counter-clockwise part over its clockwise one; NaN where neither is clear.
+
+    What is out of balance turns with the shaft, and so does the force that the film passes on. The cells are asked,
+    not the probes: run-out, which differs from probe to probe, can turn an orbit of a micrometre round.
+    """
+    place = phasors.lines.place("1X")
+    if place is None:
+        return math.nan
+    force = phasors.cell_force.phasors[:, place]
+    force = force[np.isfinite(force).all(axis=1)]
+    if len(force) < 2:
+        return math.nan
+    parts = np.abs(force[:, :1] + np.array([1j, -1j]) * force[:, 1:])
+    forward, backward = parts.mean(axis=0)
+    if not max(forward, backward) > _CLEAR * parts.std(axis=0).max() / math.sqrt(len(force)):
+        return math.nan
+    return math.log(forward / max(backward, 1e-3 * forward))
 
 
 def _window_median(values: FloatArray) -> FloatArray:

@@ -44,35 +44,11 @@ class Sizes:
     film: float  #: N, cells and the housing's inertia
     acceleration: float  #: m/s^2
     static: float  #: N, mean of the cells
-    travel: dict[str, float]  #: by probe, m: from low to high over the run, whatever moves it
-    noise_free: bool = False
-    spare: tuple[str, ...] = ()  #: still probes that the run does not need
 
     @property
     def is_carried(self) -> bool:
         """Whether the cells carry the static load."""
         return self.static > 0.5 * self.run.point.static_load > 0
-
-
-def sizes(observation: Observation, mass: float) -> Sizes:
-    """Sizes of a run from what one pass over it found."""
-    length = [float(np.linalg.norm(observation.line(q))) if observation.shows(q) else math.nan for q in QUANTITIES]
-    motion, cells, acceleration = length
-    travel = {}
-    for place in observation.pick("displacement"):
-        travel[observation.channels[place].name] = float(observation.spread[2, place] - observation.spread[0, place])
-    alive = [c for c in observation.channels if travel.get(c.name, 0.0) >= _STILL_PROBE]
-    return Sizes(
-        observation.run,
-        motion,
-        cells,
-        float(np.linalg.norm(observation.film_force(mass))),
-        acceleration,
-        float(np.linalg.norm(observation.mean("force"))),
-        travel,
-        NO_NOISE in observation.report.keys,
-        tuple(c.name for c in observation.channels if c.name in travel and is_spare(c, alive)),
-    )
 
 
 def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:
@@ -81,20 +57,37 @@ def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:
     measured: list[tuple[Reporter, Sizes]] = []
     for observation in observations:
         _check_rate(observation.report, observation.run)
-        if observation.run.kind == "dynamic" and observation.run.excitation_kind == "sine":
-            measured.append((observation.report, sizes(observation, mass)))
+        is_sine = observation.run.kind == "dynamic" and observation.run.excitation_kind == "sine"
+        check_travel(observation, is_sine)
+        if is_sine:
+            length = [
+                float(np.linalg.norm(observation.line(q))) if observation.shows(q) else np.nan for q in QUANTITIES
+            ]
+            film, static = np.linalg.norm(observation.film_force(mass)), np.linalg.norm(observation.mean("force"))
+            sizes = Sizes(observation.run, length[0], length[1], float(film), length[2], float(static))
+            measured.append((observation.report, sizes))
     for report, run in measured:
         check_sizes(report, run)
         check_weight(report, [size for _, size in measured], mass, largest)
 
 
+def check_travel(observation: Observation, is_sine: bool) -> None:
+    """Probes that move too far, or, where a shaft that turns is shaken by a sine, not at all."""
+    low, _, high = observation.spread
+    travel = {observation.channels[k].name: float(high[k] - low[k]) for k in observation.pick("displacement")}
+    alive = [c for c in observation.channels if travel.get(c.name, 0.0) >= _STILL_PROBE]
+    is_shown = is_sine and observation.run.point.shaft_speed > 0 and NO_NOISE not in observation.report.keys
+    for channel in observation.of("displacement"):
+        name, size = channel.name, travel[channel.name]
+        observation.report.ask("travel", size, name)
+        if is_shown:
+            grave: Severity = "warning" if is_spare(channel, alive) else "error"
+            observation.report.ask("still", _STILL_PROBE / max(size, 1e-30), name, grave=grave, travel=size)
+
+
 def check_sizes(report: Reporter, run: Sizes) -> None:
-    """Probes that stand still, a shaft that moves too little or too far, cells too soft or too stiff for springs."""
+    """A shaft that moves too little or too far, cells too soft or too stiff for springs."""
     point, motion = run.run.point, run.motion
-    for name, travel in run.travel.items():
-        if point.shaft_speed > 0 and not run.noise_free:
-            grave: Severity = "warning" if name in run.spare else "error"
-            report.ask("still", _STILL_PROBE / max(travel, 1e-30), name, grave=grave, travel=travel)
     length = point.static_load * motion / run.film if run.film > 0 else math.nan
     little = _LITTLE_MOTION if length < _SHORTEST_FILM else _NO_MOTION
     if motion < little:

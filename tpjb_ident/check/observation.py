@@ -15,8 +15,15 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.lines import RecordLines, band_lines, excitation_line, other_line, shaft_line, steady_level
-from tpjb_ident.check.rotation import shaft_force
+from tpjb_ident.check.lines import (
+    RecordLines,
+    band_lines,
+    excitation_line,
+    other_line,
+    shaft_force,
+    shaft_line,
+    steady_level,
+)
 from tpjb_ident.check.signals import check_clock, check_signal, needed
 from tpjb_ident.check.wiring import plane_of
 from tpjb_ident.errors import TpjbError
@@ -55,7 +62,7 @@ class Observation:
     other_line: float = math.nan
     #: (m,): size of what turns with the shaft, SI; empty where nothing tells it
     shaft_line: FloatArray = field(default_factory=lambda: np.empty(0), repr=False)
-    shaft_force: float = math.nan  #: see `tpjb_ident.check.rotation`
+    shaft_force: float = math.nan  #: of the 1X force, see `tpjb_ident.check.lines`
 
     def pick(self, quantity: str) -> list[int]:
         """Places of the channels of `quantity` in `channels`."""

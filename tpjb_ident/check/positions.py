@@ -10,24 +10,23 @@ import numpy as np
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.questions import far
 
-#: Distance from the median of all runs over their median one, and the least: a smaller one is no jump [m], dry runs
-#: press the shaft against pads on all sides; runs that tell it.
-_FAR, _MIN_JUMP, _MIN_PLACES = 8.0, {("dynamic", "locus"): 100e-6, ("dry_pivot", "clearance"): 300e-6}, 5
-#: The same within an operating point: a probe that drifts by 1.5 % of a gap of 1 mm was touched, or its amplifier was.
+#: Distance from the median of all runs in ranges of the middle 80 % of them, and the least: a smaller one is no jump
+#: [m], dry runs press the shaft against pads on all sides; runs that tell it.
+_FAR, _MIN_JUMP, _MIN_PLACES = 3.0, {("dynamic", "locus"): 100e-6, ("dry_pivot", "clearance"): 300e-6}, 5
+#: Distance from the median of an operating point, over the runs' median one, and the least [m]: a probe that drifts by
+#: 1.5 % of a gap of 1 mm was touched, or its amplifier was.
 _STEP, _LEAST_STEP, _MIN_STEPS = 9.0, 15e-6, 4
 
 
 def check_positions(runs: Sequence[Observation]) -> None:
-    """Mean readings of the probes (gap voltage included) run against run, and their travel."""
-    for observation in runs:
-        for index in observation.pick("displacement"):
-            low, _, high = observation.spread[:, index]
-            observation.report.ask("travel", high - low, observation.channels[index].name)
+    """Mean readings of the probes (gap voltage included) run against run."""
     for kinds, least in _MIN_JUMP.items():
         alike = [run for run in runs if run.run.kind in kinds]
-        for name, observation, off in outlying(by_probe(alike, type, _middle), least, _FAR, _MIN_PLACES):
-            observation.report.ask("position", 1.0, name, off=1e6 * off)
-            observation.report.doubts.add("displacement")
+        for key, values in by_probe(alike, type, _middle).items():
+            low, high = np.quantile([value for _, value in values], [0.1, 0.9])
+            for name, observation, off in outlying({key: values}, max(_FAR * (high - low), least), 0.0, _MIN_PLACES):
+                observation.report.ask("position", 1.0, name, off=1e6 * off)
+                observation.report.doubts.add("displacement")
     dynamic = [run for run in runs if run.run.kind == "dynamic" and "displacement" not in run.report.doubts]
     points = by_probe(dynamic, attrgetter("run.point"), _middle)
     for name, observation, off in outlying(points, _LEAST_STEP, _STEP, _MIN_STEPS):

@@ -1,18 +1,17 @@
-"""Set points of a run against what its channels show: load, directions, speed, excitation."""
+"""Set points of a run against what its channels show: load, directions, speed and sense of rotation, excitation."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.operating_point import OperatingPoint
+from rigdata.operating_point import ROTATIONS, OperatingPoint
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.questions import far
-from tpjb_ident.check.wiring import angle_between, explanation, pointing, repairs
+from tpjb_ident.check.wiring import explanation, pointing, repairs
 
 #: Angle [deg] from a stated direction within which a wiring fault brings a force when it is mended.
 _MENDED = 8.0
@@ -24,6 +23,9 @@ _LOAD_OFF, _MANY = 0.04, 9.0
 _ALONG, _SEVERAL, _NEARLY_ALL = 10.0, 3, 0.8
 #: Angle [deg] within which the shaft moves as stated, whatever the force does.
 _MOVED_ALONG = 3.0
+#: Ratio of the parts that go round one way and the other from which a run tells the sense: a film far stiffer in one
+#: direction passes on both, forward more. Of the runs that tell it this share must agree, and so many there must be.
+_ONE_WAY, _AGREED, _LEAST_RUNS = 1.5, 0.9, 3
 
 
 def check_static_loads(observations: Sequence[Observation]) -> bool:
@@ -98,60 +100,68 @@ def check_speed(observation: Observation) -> None:
         observation.report.ask("speed", abs(abs(shown / set_point) - 1.0), shown=shown, stated=set_point)
 
 
+def check_rotation(runs: Sequence[Observation]) -> None:
+    """Warn where the 1X force clearly goes round against the stated sense of rotation."""
+    for stated, other, sense in ((*ROTATIONS, 1.0), (*ROTATIONS[::-1], -1.0)):
+        alike = [r for r in runs if r.run.point.rotation == stated and "force" not in r.report.doubts]
+        clear = [r for r in alike if abs(r.shaft_force) > math.log(_ONE_WAY)]
+        against = [r for r in clear if sense * r.shaft_force < 0.0]
+        if len(against) >= max(_LEAST_RUNS, _AGREED * len(clear)):
+            for observation in against:
+                observation.report.ask("rotation", other=other, stated=stated)
+
+
 def check_excitation(runs: Sequence[Observation], mass: float) -> None:
     """Excitation of dynamic runs: there at all, as strong as in the point's other runs, in the stated direction."""
-    measured = [run for run in runs if np.isfinite(run.film_force(mass)).all()]
-    shown = [float(np.linalg.norm(run.film_force(mass))) if run.shows("force") else 0.0 for run in measured]
-    alike: dict[OperatingPoint, list[float]] = {}
-    for run, size in zip(measured, shown):
-        alike.setdefault(run.run.point, []).extend([size] if size > 0 else [])
-    directed: list[_Directed] = []
-    for run, size in zip(measured, shown):
-        present = alike[run.run.point]
+    strengths: dict[OperatingPoint, list[float]] = {}
+    measured = []
+    for run in runs:
+        strength = float(np.linalg.norm(run.film_force(mass)))
+        if np.isfinite(strength):
+            shown = strength if run.shows("force") else 0.0
+            measured.append((run, shown))
+            strengths.setdefault(run.run.point, []).extend([shown] if shown > 0 else [])
+    directed: list[Observation] = []
+    for run, shown in measured:
+        present = strengths[run.run.point]
         least = 0.1 * float(np.median(present)) if len(present) > 3 else 0.0
-        if size <= 0 or size < least:
+        if shown <= 0 or shown < least:
             hint = f"; the strongest other line is near {run.other_line:.3g} Hz" if np.isfinite(run.other_line) else ""
             run.report.ask("no excitation", hint=hint, stated=run.run.point.excitation_hz)
             run.report.doubts.add("force")
         elif "force" not in run.report.doubts and run.run.excitation_direction is not None:
-            directed.append(_Directed(run, run.film_force(mass), math.degrees(run.run.excitation_direction)))
-    _check_directions(directed)
+            directed.append(run)
+    _check_directions(directed, mass)
 
 
-class _Directed(NamedTuple):
-    """A run whose force is excited along a stated direction [deg]."""
-
-    observation: Observation
-    force: ComplexArray
-    direction: float
-
-    def off(self, force: ComplexArray) -> float:
-        """Angle [deg] of the long axis of a force ellipse from what is stated; NaN where it is nearly a circle."""
-        sizes, axes = np.linalg.eigh(np.real(np.outer(force, force.conj())))
-        shown = math.degrees(math.atan2(axes[1, 1], axes[0, 1])) if sizes[0] < 0.25 * sizes[1] else math.nan
-        return (shown - self.direction + 90.0) % 180.0 - 90.0
+def _turn(run: Observation, vector: ComplexArray) -> float:
+    """Angle [deg] of the long axis of an ellipse from the stated excitation; NaN where it is nearly a circle."""
+    sizes, axes = np.linalg.eigh(np.real(np.outer(vector, vector.conj())))
+    shown = math.degrees(math.atan2(axes[1, 1], axes[0, 1])) if sizes[0] < 0.25 * sizes[1] else math.nan
+    return (shown - math.degrees(run.run.excitation_direction or 0.0) + 90.0) % 180.0 - 90.0
 
 
-def _check_directions(runs: Sequence[_Directed]) -> None:
+def _check_directions(runs: Sequence[Observation], mass: float) -> None:
     # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
-    moved = [abs(run.off(run.observation.line("displacement"))) <= _MOVED_ALONG for run in runs]
-    off = [run for run, is_moved in zip(runs, moved) if abs(run.off(run.force)) > _ALONG and not is_moved]
-    hint = ""
-    if len(off) >= _SEVERAL:
-        cells = runs[0].observation.names("force")
-        alike = [run for run in runs if run.observation.names("force") == cells]
-
-        def unexplained(repair: FloatArray) -> float:
-            explained = [abs(run.off(repair @ run.observation.line("force"))) <= _ALONG for run in alike]
-            return 1.0 - sum(explained) / len(runs)
-
-        faults = repairs(runs[0].observation.of("force"))
-        hint = explanation(faults, unexplained, 1.0 - _NEARLY_ALL + 1e-9, alike=4)
+    moved = [abs(_turn(run, run.line("displacement"))) <= _MOVED_ALONG for run in runs]
+    turns = [_turn(run, run.film_force(mass)) for run in runs]
+    turned = [(run, turn) for run, turn, is_moved in zip(runs, turns, moved) if abs(turn) > _ALONG and not is_moved]
+    hint = _miswired_cells(runs) if len(turned) >= _SEVERAL else ""
     for run in runs if hint else ():
-        run.observation.report.doubts.add("force")  # the cells are wired wrongly in the other runs too
-    for run in off:
-        turn = run.off(run.force)
-        size = angle_between(turn, 0.0, 180.0) if not hint else 90.0
-        shown, report = run.direction + turn, run.observation.report
-        if report.ask("excitation direction", size, hint=hint, shown=shown, stated=run.direction) == "error":
-            report.doubts.add("force")
+        run.report.doubts.add("force")  # the cells are wired wrongly in the other runs too
+    for run, turn in turned:
+        stated = math.degrees(run.run.excitation_direction or 0.0)
+        size = 90.0 if hint else abs(turn)
+        if run.report.ask("excitation direction", size, hint=hint, shown=stated + turn, stated=stated) == "error":
+            run.report.doubts.add("force")
+
+
+def _miswired_cells(runs: Sequence[Observation]) -> str:
+    """The fault of the first run's cells that turns nearly all runs' forces as stated when it is mended."""
+    alike = [run for run in runs if run.names("force") == runs[0].names("force")]
+
+    def unexplained(repair: FloatArray) -> float:
+        explained = [abs(_turn(run, repair @ run.line("force"))) <= _ALONG for run in alike]
+        return 1.0 - sum(explained) / len(runs)
+
+    return explanation(repairs(runs[0].of("force")), unexplained, 1.0 - _NEARLY_ALL + 1e-9, alike=4)

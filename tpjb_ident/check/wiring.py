@@ -48,17 +48,13 @@ def explanation(
     return f"; as if {close[0]}" if 0 < len(close) <= alike else ""
 
 
-def angle_between(first: float, second: float, period: float = 360.0) -> float:
-    """Smallest angle between two directions [deg]."""
-    return abs((first - second + period / 2) % period - period / 2)
-
-
 def pointing(vector: FloatArray, wanted: float, within: float) -> Callable[[FloatArray], float]:
     """Angle [deg] between a vector (2,) that is mended and a direction [deg]; all `within` of it count alike."""
 
     def misfit(repair: FloatArray) -> float:
         mended = repair @ vector
-        return max(within / 2, angle_between(float(np.degrees(np.arctan2(mended[1], mended[0]))), wanted))
+        off = float(np.degrees(np.arctan2(mended[1], mended[0]))) - wanted
+        return max(within / 2, abs((off + 180.0) % 360.0 - 180.0))
 
     return misfit
 

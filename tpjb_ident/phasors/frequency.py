@@ -107,42 +107,23 @@ def tuned(
     run: Run, result: RunPhasors, driven: tuple[float, ...], speed: float, settings: PhasorSettings
 ) -> Tuning | None:
     """Compare a first fit with what it assumed; None where it was good enough."""
-    exact, off_set_point = _excitations(result, driven, run.sample_rate)
-    slip = _line_slip(result, result.lines.place("1X"), run.sample_rate)
-    span = result.start[-1] - result.start[0] + result.length
-    follow = _drifting(result, run.sample_rate)
-    if not off_set_point and follow is None and abs(slip) * span <= 5 * MAX_SLIP:
+    rate, span = run.sample_rate, result.start[-1] - result.start[0] + result.length
+    slips = np.array([_line_slip(result, i, rate) for i in range(len(result.lines.excitation))])
+    slips[np.abs(slips) * span <= MAX_SLIP] = 0.0
+    exact = tuple(frequency + slip for frequency, slip in zip(result.lines.driven, slips.tolist()))
+    turning, follow = _line_slip(result, result.lines.place("1X"), rate), _drifting(result, rate)
+    if not slips.any() and follow is None and abs(turning) * span <= 5 * MAX_SLIP:
         return None
-    rate = run.sample_rate
-    lines = known_lines(exact, speed + slip, rate, settings.lines, result.lines.found, run.length / rate)
-    drift: tuple[Condition, ...] = ()
+    conditions = []
+    if slips.any():
+        shown, stated = ", ".join(f"{f:.5g}" for f in exact), ", ".join(f"{f:g}" for f in driven)
+        text = f"excitation found at {shown} Hz, set point {stated} Hz; the found one was used for the fit"
+        conditions.append(Condition("excitation off set point", text))
     if follow is not None:
-        drift = (
-            Condition(
-                DRIFT,
-                f"shaft speed between {follow.speed.min():.4g} and {follow.speed.max():.4g} Hz; followed by window",
-            ),
-        )
-    return Tuning(lines, follow, off_set_point + drift)
-
-
-def _excitations(
-    result: RunPhasors, driven: tuple[float, ...], rate: float
-) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
-    """Excitation frequencies as the phases show them."""
-    span = result.start[-1] - result.start[0] + result.length
-    slips = [_line_slip(result, i, rate) for i in range(len(result.lines.excitation))]
-    off = [s if abs(s) * span > MAX_SLIP else 0.0 for s in slips]
-    exact = tuple(line.frequency + s for line, s in zip(result.lines.excitation, off))
-    if not any(off):
-        return exact, ()
-    found, stated = ", ".join(f"{f:.5g}" for f in exact), ", ".join(f"{f:g}" for f in driven)
-    return exact, (
-        Condition(
-            "excitation off set point",
-            f"excitation found at {found} Hz, set point {stated} Hz; the found one was used for the fit",
-        ),
-    )
+        low, high = follow.speed.min(), follow.speed.max()
+        conditions.append(Condition(DRIFT, f"shaft speed between {low:.4g} and {high:.4g} Hz; followed by window"))
+    lines = known_lines(exact, speed + turning, rate, settings.lines, result.lines.found, run.length / rate)
+    return Tuning(lines, follow, tuple(conditions))
 
 
 def device_rates(result: RunPhasors, rate: float) -> dict[str, float]:
@@ -192,9 +173,7 @@ def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, flo
     line = result.lines.place("1X")
     if line is None:
         return None
-    noise = float(np.median(usual_scale(result.scale[:, result.pick("displacement")])))
-    z = result.displacement.phasors[:, line]
-    advance = phase_advance(z, result.start, noise / np.sqrt(result.length * rate))
+    advance = _line_advance(result, line, rate, result.pick("displacement"))
     if advance is None:
         return None
     speeds = np.full(len(result.start), np.nan)
