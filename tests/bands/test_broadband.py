@@ -44,9 +44,7 @@ def spectra(D, F, command=None, period=None) -> RunSpectra:
     none = np.zeros((windows, 4))
     z = np.concatenate([D, F], axis=2)
     point = OperatingPoint(5000.0, -np.pi / 2, 2 * np.pi * 22.0, 0.0)
-    phasors = RunPhasors(
-        "r", point, None, lines, np.zeros(windows), 10.0, CHANNELS, z, none, none, none, 0.0, np.zeros(windows)
-    )
+    phasors = RunPhasors("r", point, None, lines, np.zeros(windows), 10.0, CHANNELS, z, none, none, none, 0.0)
     run = RunSpectra(phasors, command, np.zeros(n, bool), (), period, {})
     place = np.arange(n)[:, None] % 7 - 3.0
     command = None if command is None else command * place

@@ -15,7 +15,7 @@ from tests.phasors.phasor_cases import place as at
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimators.estimate import instrumental_fit
 from tpjb_ident.estimators.r_matrix import phasor_table
-from tpjb_ident.phasors.shaft import FIRST_LOOK, MAX_DEPARTURE, shaft_speed, window_speeds
+from tpjb_ident.phasors.shaft import FIRST_LOOK, MAX_DEPARTURE, shaft_speed
 from tpjb_ident.runs.point_data import finite_mean, group, point_data
 
 NORMAL = 1.959963984540054  # of 95 %
@@ -78,14 +78,6 @@ def test_a_shaft_turns_as_its_tachometer_says_unless_that_cannot_be():
     # of a shaft at rest a twentieth of a hertz is as good as nothing
     assert shaft_speed(tachometer([0.04], 0.0)) == (pytest.approx(0.04), ())
     assert shaft_speed(tachometer([0.06], 0.0))[0] == 0.0
-
-
-def test_windows_have_their_own_mean_speed():
-    speed = 2 * math.pi * np.array([20.0, 20.2, 19.0, 19.2, 20.0, np.nan, 24.0, 24.0])
-    np.testing.assert_allclose(window_speeds(speed, 4, 20.0), [20.1, 19.1, np.nan, np.nan])
-    np.testing.assert_allclose(window_speeds(speed[:4], 1, 20.0), [19.6])
-    assert np.isnan(window_speeds(None, 3, 20.0)).tolist() == [True] * 3
-    np.testing.assert_allclose(window_speeds(2 * math.pi * np.array([0.04, 0.06]), 2, 0.0), [0.04, np.nan])
 
 
 def test_runs_are_grouped_by_their_set_points_in_order():

@@ -51,8 +51,8 @@ def run_phasors(name: str, direction: float, load: float, D, F, mean_force, chan
     z = np.where(probes, D @ along.T, F @ along.T)[:, None]
     mean = np.tile(along @ mean_force, (WINDOWS, 1))
     noise = np.full((WINDOWS, len(channels)), 1e-9)
-    start, speeds = 0.25 * np.arange(WINDOWS), np.full(WINDOWS, 22.0)
-    parts = (tuple(channels), z, mean, noise, np.zeros_like(noise), 30.0, speeds)
+    start = 0.25 * np.arange(WINDOWS)
+    parts = (tuple(channels), z, mean, noise, np.zeros_like(noise), 30.0)
     return RunPhasors(name, place(load), direction, known_lines((25.0,), 22.0, 1000.0), start, 0.25, *parts)
 
 

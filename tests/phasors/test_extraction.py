@@ -72,7 +72,7 @@ RUNOUT = 2e-6 * np.array([1.0, 1.0j])
 
 
 def held(seconds=4.0, stamps=None, turns=None, late=0.0, quantities=("displacement", "force")) -> Run:
-    """A run in memory: the excitation, runout of a shaft whose phase is given, a steady load; a tachometer."""
+    """A run in memory: the excitation, runout of a shaft whose phase is given, a steady load."""
     length = round(seconds * RATE)
     t = np.arange(length) / RATE if stamps is None else np.nan_to_num(stamps)
     shaft = np.exp(2j * math.pi * (22.0 * t if turns is None else turns))
@@ -83,8 +83,8 @@ def held(seconds=4.0, stamps=None, turns=None, late=0.0, quantities=("displaceme
         wave = np.outer(np.exp(2j * math.pi * DRIVEN * own), z).real
         wave += np.outer(shaft, RUNOUT).real * (quantity == "displacement")
         data[quantity] = wave + (1e-4 if quantity == "displacement" else 700.0)
-    reader = HeldReader(columns(data) | {"K1": np.full(length, 2 * math.pi * 22.1)}, RATE, stamps)
-    return replace(held_run.run_of(reader, channels(quantities, speed=True), POINT, "r"), excitation_direction=0.3)
+    reader = HeldReader(columns(data), RATE, stamps)
+    return replace(held_run.run_of(reader, channels(quantities), POINT, "r"), excitation_direction=0.3)
 
 
 FIXED = PhasorSettings(windows=WindowSettings(length=0.4))
@@ -109,21 +109,11 @@ def test_windows_are_the_same_in_chunks_of_any_length(monkeypatch, chunk):
     exact(found)
     exact(found, "force")
     np.testing.assert_allclose(found.start, 0.4 * np.arange(10))
-    np.testing.assert_allclose(found.speeds, 22.1)
     np.testing.assert_allclose(found.cell_force.mean, 700.0, rtol=1e-9)
     np.testing.assert_array_equal(found.lost, 0.0)
     assert (found.length, found.run, found.direction, found.acceleration) == (0.4, "r", 0.3, None)
     more = taken(held(quantities=("displacement", "force", "acceleration")))
     np.testing.assert_allclose(more.acceleration.phasors[:, 0], np.tile([0.02, 0.01j], (10, 1)), atol=1e-10)
-
-
-def test_a_run_on_file_without_a_clock_counts_its_samples():
-    without = {name: c for name, c in held().channels.items() if name != "K1"}
-    found = taken(replace(held(), channels=without))
-    exact(found)
-    exact(found, "force")
-    np.testing.assert_allclose(found.start, 0.4 * np.arange(10))
-    assert np.isnan(found.speeds).all()
 
 
 def test_a_channel_recorded_late_is_put_back():

@@ -178,5 +178,4 @@ def _phasors(run: Run, samples: Samples, z: ComplexArray, places: IntArray, mean
         none,
         none,
         0.0,
-        np.full(len(z), np.nan),
     )

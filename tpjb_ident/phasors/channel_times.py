@@ -21,7 +21,6 @@ class Samples:
 
     rows: FloatArray  #: (n_channels, n), SI; NaN where there is no value
     time: FloatArray | None  #: (n,), s; None where times are counted from the rate
-    speed: FloatArray | None  #: (n,), rad/s, by tachometer
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,6 @@ class DeviceReader:
     run: Run
     device: Device
     channels: tuple[Channel, ...]  #: of displacement, force, acceleration, command in this order
-    tachometer: Channel | None
     rate: float
     length: int
 
@@ -47,9 +45,8 @@ class DeviceReader:
 
     def read(self, start: int, stop: int) -> Samples:
         """Samples start..stop-1."""
-        tachometer = [] if self.tachometer is None else [self.tachometer.name]
-        time, rows = self.run.read_device(self.device, [c.name for c in self.channels] + tachometer, start, stop)
-        return Samples(rows[: len(self.channels)], time, rows[-1] if tachometer else None)
+        time, rows = self.run.read_device(self.device, [c.name for c in self.channels], start, stop)
+        return Samples(rows, time)
 
     @cached_property
     def stamps(self) -> FloatArray | None:
@@ -76,19 +73,17 @@ def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
     directed = {c.name: c for q in QUANTITIES for c in run.channels.values() if c.quantity == q and c.axis is not None}
     if command:
         directed |= {c.name: c for c in run.channels.values() if c.quantity == "command"}
-    tachometers = run.of("speed")[:1]
     devices = run.devices
     for name in directed.keys() - {name for device in devices for name in device.channels}:
         run.record(name, 0, 0)  # says that the file lacks it
     readers = []
     for device in devices:
         channels = tuple(c for name, c in directed.items() if name in device.channels)
-        matching = [c for c in tachometers if c.name in device.channels]
         rate = device.rate if np.isfinite(device.rate) else run.sample_rate
         # of a run that ends early all devices do
         length = min(device.length, int(np.ceil(run.length / run.sample_rate * rate)))
         if channels:
-            readers.append(DeviceReader(run, device, channels, matching[0] if matching else None, rate, length))
+            readers.append(DeviceReader(run, device, channels, rate, length))
     return tuple(readers)
 
 

@@ -14,7 +14,7 @@ from tpjb_ident.phasors.channel_times import DeviceReader, device_readers
 from tpjb_ident.phasors.line_fit import LineFitter, WindowFit
 from tpjb_ident.phasors.lines import LineSet
 from tpjb_ident.phasors.run_data import QUANTITIES, PhasorSettings, RunPhasors
-from tpjb_ident.phasors.shaft import ShaftCourse, window_speeds
+from tpjb_ident.phasors.shaft import ShaftCourse
 from tpjb_ident.phasors.windows import plan_windows
 
 #: Samples of one channel held at a time: few enough for two channels to stay in a core's cache.
@@ -40,21 +40,20 @@ def extract(
     middles = np.asarray((np.arange(count) + 0.5) * length / run.sample_rate, dtype=float)
     speeds = np.full(count, np.nan) if follow is None else follow.at(middles)
     fit = WindowFit.empty(count, len(lines.frequencies), len(channels))
-    firsts, start, tachometer = length * np.arange(count), np.empty(0), np.full(count, np.nan)
+    firsts, start = length * np.arange(count), np.empty(0)
     with run.opened():
         for k, reader in enumerate(readers):
             if k and (reader.rate, reader.length) != (readers[0].rate, readers[0].length):
                 firsts, length = reader.first_samples(start), int(seconds * reader.rate + 1e-6)
             fast = (clocks or {}).get(reader.device.name, 0.0)
             device = _DeviceFit(reader, length, firsts, lines.faster(fast), speeds)
-            device.fit_all(run.point.shaft_speed_hz)
+            device.fit_all()
             if fast:  # phases count by the lines' common frequencies
                 ahead = np.multiply.outer(device.start + 0.5 * seconds, fast * lines.frequencies)
                 device.windows.z[:] *= np.exp(2j * np.pi * ahead)[:, :, None]
             names = [c.name for c in reader.channels]
             fit.put(np.arange(count), device.windows, channels=[c.name in names for c, _ in channels])
             start = start if k else device.start
-            tachometer = np.where(np.isfinite(tachometer), tachometer, device.speed)
     return RunPhasors(
         run.id,
         run.point,
@@ -68,7 +67,6 @@ def extract(
         fit.scale,
         fit.lost,
         housing_mass,
-        tachometer,
         device=tuple(name for _, name in channels),
     )
 
@@ -85,9 +83,9 @@ class _DeviceFit:
             raise refuse(run.file, f"channels {names}", fault, "Sample them faster, or record longer", run.id)
         self.fitter = LineFitter(length, reader.rate, lines.frequencies[self.shown])
         self.windows = WindowFit.empty(len(firsts), len(self.shown), len(reader.channels))
-        self.start, self.speed = np.full((2, len(firsts)), np.nan)
+        self.start = np.full(len(firsts), np.nan)
 
-    def fit_all(self, nominal_speed: float) -> None:
+    def fit_all(self) -> None:
         """Fit all windows that the device recorded, chunk by chunk.
 
         Windows that are noisier than the run's usual one are fitted anew: a chunk alone may hold nothing to compare.
@@ -95,14 +93,14 @@ class _DeviceFit:
         step = max(1, CHUNK // self.length)
         recorded = int(np.count_nonzero(self.firsts + self.length <= self.reader.length))
         for first in range(0, recorded, step):
-            self._fit(first, min(first + step, recorded), nominal_speed)
+            self._fit(first, min(first + step, recorded))
         usual = usual_scale(self.windows.scale)
         with np.errstate(invalid="ignore"):  # a window without phasors has no scale and stays as it is
             loud = (self.windows.scale > SCALE_LIMIT * usual).any(axis=1)
         for k in np.flatnonzero(loud).tolist() if recorded > step else ():
-            self._fit(k, k + 1, nominal_speed, usual)
+            self._fit(k, k + 1, usual)
 
-    def _fit(self, first: int, stop: int, nominal_speed: float, usual: FloatArray | None = None) -> None:
+    def _fit(self, first: int, stop: int, usual: FloatArray | None = None) -> None:
         """Read and fit windows first..stop-1; `usual` (n_channels,) is the scale that windows of the run have."""
         begin = self.firsts[first]
         samples = self.reader.read(begin, self.firsts[stop - 1] + self.length)
@@ -123,8 +121,6 @@ class _DeviceFit:
                 fit.put(np.array([i]), fitter.fit(rows[:, i : i + 1, timed], origin, usual))
         self.windows.put(np.arange(first, stop), fit, lines=self.shown)
         self.start[first:stop] = start
-        if samples.speed is not None:
-            self.speed[first:stop] = window_speeds(samples.speed[at].ravel(), stop - first, nominal_speed)
 
     def _is_uneven(self, time: FloatArray) -> BoolArray:
         """Windows (n,) whose time stamps (n, length) stray from an even grid."""

@@ -153,14 +153,12 @@ def exact_frequencies(result: RunPhasors, places: list[int], rate: float) -> Flo
 def _drifting(result: RunPhasors, rate: float) -> ShaftCourse | None:
     """Course of the speed, where the shaft's phase runs away within a window.
 
-    The runout tells them ten times better than a tachometer, whose own noise looks like a drift.
+    Where no runout tells it there is nothing to follow; a tachometer's own noise looks like a drift.
     """
-    by_runout = speeds_from_runout(result, rate)
-    speeds, doubt = (result.speeds, 0.0) if by_runout is None else by_runout
-    finite_values = speeds[np.isfinite(speeds)]
-    if len(finite_values) < 2 or np.ptp(finite_values) / 2 <= max(MAX_WINDOW_SLIP / result.length, 4 * doubt):
-        return None
+    speeds, doubt = speeds_from_runout(result, rate) or (np.empty(0), 0.0)
     good = np.isfinite(speeds)
+    if good.sum() < 2 or np.ptp(speeds[good]) / 2 <= max(MAX_WINDOW_SLIP / result.length, 4 * doubt):
+        return None
     return ShaftCourse(result.start[good] + 0.5 * result.length, speeds[good])
 
 

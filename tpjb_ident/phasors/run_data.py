@@ -28,7 +28,6 @@ class PhasorSettings:
     windows: WindowSettings = field(default_factory=WindowSettings)
     delays: dict[str, float] = field(default_factory=dict)
     excitation_lines: tuple[float, ...] = ()
-    find_lines: bool = True
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,6 @@ class RunPhasors:
     scale: FloatArray  #: (n_windows, n_channels): robust standard deviation of the residual
     lost: FloatArray  #: (n_windows, n_channels): share of the samples left out
     housing_mass: float
-    speeds: FloatArray  #: (n_windows,)
     conditions: tuple[Condition, ...] = ()
     shaft_phase: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (n_lines,) complex
     span: tuple[float, float] | None = None  #: s: part of the record with one excitation; None: all of it

@@ -70,8 +70,7 @@ class _RunFit:
         speed, self.conditions = shaft_speed(run)
         self._fit(self._lines(self.driven, speed, ()), None)
         self.slower = filled_channels(run)
-        if settings.find_lines:
-            self._add_unexpected(speed)
+        self._add_unexpected(speed)
         better = tuned(run, self.result, self.driven, speed, settings)
         if better is not None:
             self.conditions += better.conditions
@@ -79,8 +78,7 @@ class _RunFit:
         self.clocks = device_rates(self.result, run.sample_rate)
         if self.clocks:
             self._fit(self.result.lines, self.follow)
-        if settings.find_lines:
-            self._add_near()
+        self._add_near()
         self.result = with_record(self.result, self.records)
 
     def extend(self, run: Run) -> None:

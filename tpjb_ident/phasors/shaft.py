@@ -51,16 +51,6 @@ def shaft_speed(run: Run) -> tuple[float, tuple[Condition, ...]]:
     )
 
 
-def window_speeds(speed: FloatArray | None, count: int, nominal: float) -> FloatArray:
-    """Mean speed in `count` equal windows [Hz]; NaN where the tachometer gives nothing usable; `speed` (n,)."""
-    if speed is None:
-        return np.full(count, np.nan)
-    # the mean of a window with a missing value is NaN, which is what it shall be
-    speeds = speed.reshape(count, -1).mean(axis=1) / (2 * np.pi)
-    believable = np.abs(np.nan_to_num(speeds) - nominal) <= MAX_DEPARTURE * max(nominal, 1.0)
-    return np.where(believable, speeds, np.nan)
-
-
 def shaft_order(frequency: float, speed: float) -> int:
     """Harmonic of the shaft that an excitation stands on; 0 where it stands on none."""
     n = round(frequency / speed) if speed > 0 else 0
