@@ -7,7 +7,7 @@ probes tell one vector, a housing on springs moves against the cells' force, one
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,18 +39,11 @@ _DEAD = 1e-3
 _CLEAR = 30.0
 
 
-@dataclass(frozen=True)
-class RigFit:
-    """What the terms make of a campaign's dynamic runs."""
+def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True) -> Solution | None:
+    """Fit the terms to all lines of dynamic runs, and name the runs whose accelerometers differ from the others.
 
-    observations: tuple[Observation, ...] = field(repr=False)  #: of every block
-    rig: Rig
-    blocks: Blocks = field(repr=False)
-    solution: Solution = field(repr=False)
-
-
-def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True) -> RigFit | None:
-    """Fit the terms to all lines of dynamic runs; None where they are too few; `static`: cells show the static load."""
+    None where the lines are too few; `static`: cells show the static load.
+    """
     clear = [run for run in runs if "force" not in run.report.doubts and run.shows("force")]
     observations = tuple(run for run in clear for _ in run.lines.omega)
     if len(observations) < _MIN_BLOCKS:
@@ -73,7 +66,8 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
     learnt = learnt_rig(rig, solution)
     if learnt is not rig:
         solution = solver(learnt).begun(solution).run()
-    return RigFit(observations, learnt, blocks, solution)
+    _check_accelerometers(observations, learnt.of("acceleration"), blocks, solution)
+    return solution
 
 
 def _blocks(sensors: Sequence[Sensor], runs: Sequence[Observation]) -> Blocks:
@@ -98,21 +92,22 @@ def _blocks(sensors: Sequence[Sensor], runs: Sequence[Observation]) -> Blocks:
     return replace(blocks, present=blocks.present & alive(sensors, np.abs(blocks.z).max(axis=0), _DEAD))
 
 
-def check_accelerometers(fit: RigFit) -> None:
+def _check_accelerometers(
+    observations: Sequence[Observation], rows: Sequence[int], blocks: Blocks, solution: Solution
+) -> None:
     """Name the runs whose acceleration is not what springs, or the floating housing, make of it in the others."""
-    rows = fit.rig.of("acceleration")
-    housing = next((term for term in fit.solution.terms if isinstance(term, Housing)), None)
-    if len(rows) != 2 or housing is None or housing.is_on_foundation(fit.solution.fitted[housing.name]):
+    housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
+    if len(rows) != 2 or housing is None or housing.is_on_foundation(solution.fitted[housing.name]):
         return
-    moved = housing.acceleration(fit.blocks, fit.solution.fitted[housing.name])
-    inverse = np.linalg.pinv(fit.blocks.along[:, rows])
-    shown = np.einsum("naj,nj->na", inverse, fit.blocks.z[:, rows])
-    size = np.linalg.norm(fit.blocks.z[:, rows], axis=1)
-    noise = np.sqrt(np.einsum("njj->n", fit.blocks.noise[:, rows][:, :, rows]).real)
+    moved = housing.acceleration(blocks, solution.fitted[housing.name])
+    inverse = np.linalg.pinv(blocks.along[:, rows])
+    shown = np.einsum("naj,nj->na", inverse, blocks.z[:, rows])
+    size = np.linalg.norm(blocks.z[:, rows], axis=1)
+    noise = np.sqrt(np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real)
     judged = np.flatnonzero(np.isfinite(moved).all(axis=1) & (size > _CLEAR * noise))
     off = _off(shown, moved)[judged]
     for b in judged[far(off, _OFF, _MANY, _MIN_BLOCKS)]:
-        _report(fit.observations[b], shown[b], moved[b])
+        _report(observations[b], shown[b], moved[b])
 
 
 def _report(observation: Observation, shown: ComplexArray, expected: ComplexArray) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -32,16 +31,6 @@ class DeviceReader:
     channels: tuple[Channel, ...]  #: of displacement, force, acceleration, command in this order
     rate: float
     length: int
-
-    @property
-    def groups(self) -> list[slice]:
-        """Channels of one quantity: so few stay in a core's cache while they are fitted."""
-        groups, first = [], 0
-        for _, members in itertools.groupby(c.quantity for c in self.channels):
-            count = len(list(members))
-            groups.append(slice(first, first + count))
-            first += count
-        return groups
 
     def read(self, start: int, stop: int) -> Samples:
         """Samples start..stop-1."""
