@@ -171,7 +171,9 @@ def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, flo
     line = result.lines.place("1X")
     if line is None:
         return None
-    advance = _line_advance(result, line, rate, result.pick("displacement"))
+    noise = float(np.median(usual_scale(result.scale[:, result.pick("displacement")])))
+    z = result.displacement.phasors[:, line]
+    advance = phase_advance(z, result.start, noise / np.sqrt(result.length * rate))
     if advance is None:
         return None
     speeds = np.full(len(result.start), np.nan)
