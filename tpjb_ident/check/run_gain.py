@@ -1,4 +1,4 @@
-"""The one run of an operating point that answers otherwise than its fellows, and the channel whose gain explains it.
+"""Runs that differ from their fellows: in their answer, with the channel whose gain explains it; in mean positions.
 
 Two probes and two cells serve all runs of a point. If one of them reads g times the truth in one run, the part
 1 - 1/g of its own reading is too much there: at the excitation line, in what turns with the shaft, and in the mean load
@@ -13,7 +13,7 @@ moved by anything.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -22,7 +22,6 @@ from scipy.special import fdtri, stdtr
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.positions import by_probe, outlying
 from tpjb_ident.check.questions import far
 from tpjb_ident.check.response import PointRuns
 from tpjb_ident.check.wiring import explanation, repairs
@@ -56,6 +55,12 @@ _ANYWHERE, _FREE = 1.0, 2.0
 #: Logarithm by which what turns with the shaft differs in one run, at one load and at others, over the median one, and
 #: runs that tell it.
 _SAME_LINE, _LIKE_LINE, _MANY_LINES, _MIN_LINES = 0.06, 0.5, 6.0, 5
+#: Distance from the median of all runs in ranges of the middle 80 % of them, and the least: a smaller one is no jump
+#: [m], dry runs press the shaft against pads on all sides; runs that tell it.
+_FAR, _MIN_JUMP, _MIN_PLACES = 3.0, {("dynamic", "locus"): 100e-6, ("dry_pivot", "clearance"): 300e-6}, 5
+#: Distance from the median of an operating point, over the runs' median one, and the least [m]: a probe that drifts by
+#: 1.5 % of a gap of 1 mm was touched, or its amplifier was.
+_STEP, _LEAST_STEP, _MIN_STEPS = 9.0, 15e-6, 4
 
 
 class WrongGain(NamedTuple):
@@ -298,6 +303,49 @@ def _stacked(vector: ComplexArray) -> FloatArray:
     return np.concatenate([vector.real, vector.imag])
 
 
+def check_positions(runs: Sequence[Observation]) -> None:
+    """Mean readings of the probes (gap voltage included) run against run."""
+    for kinds, least in _MIN_JUMP.items():
+        alike = [run for run in runs if run.run.kind in kinds]
+        for key, values in _by_probe(alike, type, _middle).items():
+            low, high = np.quantile([value for _, value in values], [0.1, 0.9])
+            for name, observation, off in _outlying({key: values}, max(_FAR * (high - low), least), 0.0, _MIN_PLACES):
+                observation.report.ask("position", 1.0, name, off=1e6 * off)
+                observation.report.doubts.add("displacement")
+    dynamic = [run for run in runs if run.run.kind == "dynamic" and "displacement" not in run.report.doubts]
+    points = _by_probe(dynamic, attrgetter("run.point"), _middle)
+    for name, observation, off in _outlying(points, _LEAST_STEP, _STEP, _MIN_STEPS):
+        observation.report.ask("step", 1.0, name, off=1e6 * off)
+
+
+def _middle(observation: Observation, place: int) -> float:
+    return float(observation.spread[1, place])
+
+
+def _by_probe(
+    runs: Sequence[Observation], key: Callable[[Observation], object], value: Callable[[Observation, int], float]
+) -> dict[tuple[str, object], list[tuple[Observation, float]]]:
+    """Every probe's values by its name and by what is alike of their runs."""
+    groups: dict[tuple[str, object], list[tuple[Observation, float]]] = {}
+    for observation in runs:
+        for index in observation.pick("displacement"):
+            shown = value(observation, index)
+            if np.isfinite(shown):
+                groups.setdefault((observation.channels[index].name, key(observation)), []).append((observation, shown))
+    return groups
+
+
+def _outlying(
+    groups: dict[tuple[str, object], list[tuple[Observation, float]]], least: float, many: float, count: int
+) -> Iterator[tuple[str, Observation, float]]:
+    """Probe, run and distance from its group's median of values that lie `far` off."""
+    for (name, _), values in groups.items():
+        off = np.array([value for _, value in values])
+        off -= np.median(off)
+        for k in np.flatnonzero(far(np.abs(off), least, many, count)):
+            yield name, values[k][0], float(off[k])
+
+
 def check_shaft_lines(runs: Sequence[Observation]) -> None:
     """What turns with the shaft, run against run: nearly the same at all loads, the same whatever the excitation.
 
@@ -305,8 +353,8 @@ def check_shaft_lines(runs: Sequence[Observation]) -> None:
     """
     shown = [observation for observation in runs if len(observation.shaft_line)]
     for alike, least in (("run.point.static_key", _SAME_LINE), ("run.point.spin", _LIKE_LINE)):
-        sizes = by_probe(shown, attrgetter(alike), _log_size)
-        for name, observation, off in outlying(sizes, least, _MANY_LINES, _MIN_LINES):
+        sizes = _by_probe(shown, attrgetter(alike), _log_size)
+        for name, observation, off in _outlying(sizes, least, _MANY_LINES, _MIN_LINES):
             if f"shaft line {name}" not in observation.report.keys:
                 observation.report.ask("shaft line", math.exp(off), name)
 

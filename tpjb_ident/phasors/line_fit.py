@@ -169,7 +169,7 @@ class LineFitter:
                 return None
             rows = self.design[left_out]
             try:
-                change = np.linalg.solve(self._gram - rows.T @ rows, residual[left_out] @ rows)
+                change = np.asarray(np.linalg.solve(self._gram - rows.T @ rows, residual[left_out] @ rows), dtype=float)
             except np.linalg.LinAlgError:  # what is left does not tell its lines apart
                 return None
             size = np.where(gaps, 0.0, np.abs(residual + self.design @ change))
