@@ -1,18 +1,60 @@
-"""Findings of the check, those that many runs share told once."""
+"""Findings of the check: from which answer on a question is told and in which words; what many runs share told once.
+
+A question is one row of `questions.csv`: it compares one number with its limits; which number it is, the other files of
+this folder say. An empty limit is never reached.
+"""
 
 from __future__ import annotations
 
+import csv
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Problem, Severity
 from rigdata.run import Run
-from tpjb_ident.check.questions import QUESTIONS
 from tpjb_ident.rounding import listed
 
 #: How the key of a finding begins that one channel reads too much or too little in one run.
 RUN_GAIN = "gain "
+
+
+class Question(NamedTuple):
+    """Limits beyond which an answer is a note, a warning, an error; `{names}` are the channels that are asked."""
+
+    limits: tuple[float, ...]
+    place: str
+    text: str
+    cure: str
+    of_channels: bool  #: whether it is the channels' nature, in whatever run they serve
+
+
+def _questions() -> dict[str, Question]:
+    table = {}
+    text = Path(__file__).with_name("questions.csv").read_text(encoding="utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        limits = tuple(float(row[level] or math.inf) for level in ("note", "warning", "error"))
+        table[row["name"]] = Question(limits, row["place"], row["text"], row["cure"], bool(row["of_channels"]))
+    return table
+
+
+#: Every question by its name.
+QUESTIONS = _questions()
+
+
+def far(distances: FloatArray, least: float, many: float, count: int = 4) -> BoolArray:
+    """Which of some values lie further off than the others: by `many` times their median distance, `least` at least.
+
+    None where they are fewer than `count`.
+    """
+    if len(distances) < count:
+        return np.zeros(len(distances), dtype=bool)
+    return np.asarray(distances > max(least, many * float(np.median(distances))))
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,8 @@ _PAIRED = 24
 _NO_ANSWER = 0.08
 #: Least over largest eigenvalue of a film's stiffness and damping, and of one whose probes were mended.
 _DEFINITE, _MENDED = 0.05, 0.15
+#: H of runs that do not tell it.
+_UNKNOWN = np.full((2, 2), np.nan + 0j)
 
 
 @dataclass(frozen=True)
@@ -55,18 +57,18 @@ class PointRuns:
         """Of the film, X, Y of every run, (n, 2) [N]."""
         return np.asarray(self.phasors[:, 2:] @ self.cell_plane.T + self.inertia)
 
-    def stiffness(self, runs: Sequence[int]) -> ComplexArray | None:
+    def stiffness(self, runs: Sequence[int]) -> ComplexArray:
         """H (2, 2) of F = H D over some runs, each weighted by one over its displacement.
 
-        None where they move along one line.
+        NaN where they move along one line.
         """
         D, F = self.displacement[list(runs)], self.force[list(runs)]
         sizes = np.linalg.norm(D, axis=1)
         if len(sizes) < 2 or not np.all(sizes > 0):
-            return None
+            return _UNKNOWN
         unit = D / sizes[:, None]
         solution, _, _, singular = np.linalg.lstsq(unit, F / sizes[:, None], rcond=None)
-        return np.asarray(solution.T) if singular[-1] >= _ONE_LINE * singular[0] else None
+        return np.asarray(solution.T) if singular[-1] >= _ONE_LINE * singular[0] else _UNKNOWN
 
     def misfits(self, stiffness: ComplexArray) -> FloatArray:
         """Share of every run's force that H does not explain, (n,)."""
@@ -74,17 +76,20 @@ class PointRuns:
         return np.asarray(np.linalg.norm(residual, axis=1) / np.linalg.norm(self.force, axis=1))
 
     @cached_property
-    def robust_stiffness(self) -> ComplexArray | None:
-        """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it."""
+    def robust_stiffness(self) -> ComplexArray:
+        """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it.
+
+        NaN where all move along one line.
+        """
         tried = (self.stiffness(pair) for pair in combinations(range(min(len(self), _PAIRED)), 2))
-        pairs = [h for h in tried if h is not None]
+        pairs = [h for h in tried if np.isfinite(h).all()]
         if not pairs:
-            return None
+            return _UNKNOWN
         medians = [float(np.median(self.misfits(h))) for h in pairs]
         least = int(np.argmin(medians))
         close = np.flatnonzero(self.misfits(pairs[least]) <= max(3 * medians[least], 1e-9))
         refined = self.stiffness(close.tolist())
-        return pairs[least] if refined is None else refined
+        return refined if np.isfinite(refined).all() else pairs[least]
 
     def without(self, outliers: Collection[int]) -> list[int]:
         """Runs that are none of some outliers."""
@@ -131,7 +136,7 @@ def _film_like(stiffness: ComplexArray) -> float:
 def check_film(runs: PointRuns) -> None:
     """Positive stiffness and damping, alike along both probes; most of the runs must agree on them."""
     stiffness = runs.robust_stiffness
-    if stiffness is None or np.median(runs.misfits(stiffness)) > _NO_ANSWER:
+    if not np.median(runs.misfits(stiffness)) <= _NO_ANSWER:
         return
     probes = runs.channels[:2]
     names = [probe.name for probe in probes]

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from rigdata.campaign import Campaign
+from tpjb_ident.check.findings import far
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.questions import far
 from tpjb_ident.check.wiring import explanation, repairs
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.scatter import Scatter
@@ -93,7 +93,7 @@ def _blocks(sensors: Sequence[Sensor], runs: Sequence[Observation]) -> Blocks:
 
 
 def _check_accelerometers(
-    observations: Sequence[Observation], rows: Sequence[int], blocks: Blocks, solution: Solution
+    observations: Sequence[Observation], rows: IntArray, blocks: Blocks, solution: Solution
 ) -> None:
     """Name the runs whose acceleration is not what springs, or the floating housing, make of it in the others."""
     housing = next((term for term in solution.terms if isinstance(term, Housing)), None)

@@ -21,8 +21,8 @@ import numpy as np
 from scipy.special import fdtri, stdtr
 
 from rigdata.arrays import ComplexArray, FloatArray
+from tpjb_ident.check.findings import far
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.questions import far
 from tpjb_ident.check.response import PointRuns
 from tpjb_ident.check.wiring import explanation, repairs
 
@@ -121,11 +121,9 @@ class Difference(NamedTuple):
 def check_agreement(runs: PointRuns) -> None:
     """Name runs that answer otherwise than their fellows, with the wiring fault or the gain that explains it."""
     gains = deviating_runs(runs)
-    stiffness = runs.stiffness(runs.without(gains)) if gains else None
-    if stiffness is None:
+    stiffness = runs.stiffness(runs.without(gains)) if gains else runs.robust_stiffness
+    if not np.isfinite(stiffness).all():
         stiffness = runs.robust_stiffness
-    if stiffness is None:
-        return
     misfits = runs.misfits(stiffness)
     for run, gain in gains.items():
         report, hint = runs.observations[run].report, _miswired(runs, run, stiffness)
@@ -136,9 +134,8 @@ def check_agreement(runs: PointRuns) -> None:
         else:
             name, *alike = (runs.channels[k].name for k in gain.channels)
             hint = f" (or {' or '.join(alike)} another gain)" if alike else ""
-            direction = "much" if gain.gain > 1 else "little"
-            words = {"share": abs(gain.gain - 1), "direction": direction, "error": gain.error}
-            report.ask("gain", misfits[run], name, hint=hint, **words)
+            direction, share = "much" if gain.gain > 1 else "little", abs(gain.gain - 1)
+            report.ask("gain", misfits[run], name, hint=hint, share=share, direction=direction, error=gain.error)
 
 
 def _miswired(runs: PointRuns, run: int, stiffness: ComplexArray) -> str:
@@ -161,8 +158,6 @@ def deviating_runs(runs: PointRuns) -> dict[int, WrongGain | None]:
 
     Those that clearly do, then the oddest until none is odd or too many are.
     """
-    if runs.robust_stiffness is None:
-        return {}
     misfits = runs.misfits(runs.robust_stiffness)
     clear = far(misfits, _OUTLIER, 6.0) & (np.median(misfits) <= _AGREED)
     deviating = set(np.flatnonzero(clear).tolist())
@@ -182,8 +177,8 @@ def _oddness(runs: PointRuns, run: int, fellows: list[int]) -> float:
     The residual's square over its variance, by the fellows' scatter, follows an F distribution.
     """
     stiffness = runs.stiffness(fellows)
-    dynamic = None if stiffness is None else dynamic_difference(runs, run, fellows, stiffness)
-    if stiffness is None or dynamic is None:
+    dynamic = dynamic_difference(runs, run, fellows, stiffness)
+    if dynamic is None:
         return 0.0
     gain = gain_of_run(runs, run, fellows)
     # each run is tried with two cells and two probes
@@ -199,9 +194,9 @@ def gain_of_run(runs: PointRuns, run: int, fellows: Sequence[int]) -> WrongGain 
 
     Where the best is too small to be a fault, no worse one is named in its place.
     """
-    stiffness = runs.stiffness(fellows) if len(runs.channels) == 4 else None
-    dynamic = None if stiffness is None else dynamic_difference(runs, run, fellows, stiffness)
-    if stiffness is None or dynamic is None:
+    stiffness = runs.stiffness(fellows)
+    dynamic = dynamic_difference(runs, run, fellows, stiffness)
+    if dynamic is None or len(runs.channels) != 4:
         return None
     static, turning = static_difference(runs, run, fellows, stiffness), turning_difference(runs, run, fellows)
     forces = np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]  # of every channel
@@ -236,12 +231,12 @@ def _is_consistent(evidence: Sequence[Evidence]) -> bool:
 def dynamic_difference(runs: PointRuns, run: int, fellows: Sequence[int], stiffness: ComplexArray) -> Difference | None:
     """Force of `run` minus H (2, 2) [N/m] of the others times its displacement: Re X, Re Y, Im X, Im Y [N].
 
-    None where they leave no scatter.
+    None where they leave no scatter, or do not tell H.
     """
     spare = 2 * (2 * len(fellows) - 4)
     D, residual = runs.displacement, runs.force - runs.displacement @ stiffness.T
     sizes = np.linalg.norm(D, axis=1)
-    if spare < 4 or not sizes[run] > 0:
+    if spare < 4 or not sizes[run] > 0 or not np.isfinite(stiffness).all():
         return None
     rows = list(fellows)
     unit, direction = D[rows] / sizes[rows, None], D[run] / sizes[run]

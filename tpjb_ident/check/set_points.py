@@ -9,8 +9,8 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import ROTATIONS, OperatingPoint
+from tpjb_ident.check.findings import far
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.questions import far
 from tpjb_ident.check.wiring import explanation, pointing, repairs
 
 #: Angle [deg] from a stated direction within which a wiring fault brings a force when it is mended.
