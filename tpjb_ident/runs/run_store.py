@@ -2,11 +2,11 @@
 
 How a stale result is kept out: a kept run counts only if its fingerprint is found again. The fingerprint is the
 SHA-256 of everything that the run's phasors depend on: every stored byte of its record, its entry in the manifest
-with the calibration of all channels, the housing's mass, the settings, the versions of the numerical packages and
-the sources of the code that reads and fits. It is computed anew, from the files, for every run of a rerun (which is
-several times quicker than reading and fitting it); nothing is concluded from names, sizes or dates. A record that
-changes while it is read is not kept. Files are written whole or not at all, and one that cannot be read is no
-result. No pickles: a folder of results may come from anybody.
+with the calibration of all channels, the housing's mass, the settings, the limits of the checks, the versions of the
+numerical packages and the sources of the code that reads and fits. It is computed anew, from the files, for every run
+of a rerun (which is several times quicker than reading and fitting it); nothing is concluded from names, sizes or
+dates. A record that changes while it is read is not kept. Files are written whole or not at all, and one that cannot be
+read is no result. No pickles: a folder of results may come from anybody.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
 from rigdata.run import Run
-from tpjb_ident.check.findings import Finding, Reporter
+from tpjb_ident.check.findings import QUESTIONS, Finding, Reporter
 from tpjb_ident.check.lines import RecordLines
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
@@ -77,7 +77,7 @@ def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
         return ""
     entry = (run.id, run.kind, run.point, run.excitation_direction, dict(run.channels), reader)
     described = (dict(reader.channels), housing_mass, settings)
-    text = "\n".join([record, repr(entry), repr(described), source_stamp()])
+    text = "\n".join([record, repr(entry), repr(described), repr(QUESTIONS), source_stamp()])
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -36,7 +36,7 @@ def sha256(path: Path) -> str:
 
 @functools.cache
 def source_stamp(packages: tuple[str, ...] = ("rigdata", "tpjb_ident")) -> str:
-    """SHA-256 of the versions of all packages and of the sources and tables of some.
+    """SHA-256 of the versions of all packages and of the sources of some.
 
     Kept results of other code count for nothing.
     """
@@ -46,7 +46,7 @@ def source_stamp(packages: tuple[str, ...] = ("rigdata", "tpjb_ident")) -> str:
     for package in packages:
         spec = importlib.util.find_spec(package)
         for folder in sorted(spec.submodule_search_locations or ()) if spec else ():
-            for source in sorted([*Path(folder).rglob("*.py"), *Path(folder).rglob("*.csv")]):
+            for source in sorted(Path(folder).rglob("*.py")):
                 digest.update(source.relative_to(folder).as_posix().encode() + b"\0" + source.read_bytes())
     return digest.hexdigest()
 
