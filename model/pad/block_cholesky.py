@@ -1,66 +1,81 @@
-"""Cholesky factors of a symmetric matrix of dense blocks in a narrow band: slabs of a solid, one after another.
+"""Cholesky factors of matrices on slabs of nodes along an arc, one element of the arc after another.
 
-Rows of blocks come and go one at a time, so that a consumer who needs only products of L^-1 B never holds the whole
-factor. Everything is dense matrix algebra on blocks, at the speed of BLAS 3; a general sparse solver needs several
-times as long for the hundreds of right-hand sides that a compliance has.
+A consumer who needs only products of L^-1 B never holds the whole factor. Everything is dense matrix algebra at the
+speed of BLAS 3; a general sparse solver needs several times as long for the hundreds of right-hand sides that a
+compliance has.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky
-from scipy.linalg.blas import dgemm, dsyrk, dtrsm
+from scipy.linalg.blas import dsyrk, dtrsm
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 
-BlockRow = dict[int, FloatArray]  # block row i of a lower triangle: column j <= i -> block (i, j); absent ones are zero
-
-
-def factor_rows(rows: Iterable[BlockRow]) -> Iterator[BlockRow]:
-    """Factor a positive definite matrix K = L L^T, row by row of blocks."""
-    previous: dict[int, BlockRow] = {}
-    for i, row in enumerate(rows):
-        first = min(row)
-        previous = {j: previous[j] for j in range(first, i)}  # the band: nothing before `first` is needed again
-        row = {j: np.asfortranarray(block) for j, block in row.items()}
-        for j in range(first, i):
-            for k in range(first, j):
-                if k in row and k in previous[j]:
-                    sum_so_far = row[j] if j in row else np.zeros_like(row[k])
-                    row[j] = dgemm(-1.0, row[k], previous[j][k], 1.0, sum_so_far, trans_b=1, overwrite_c=1)
-            if j in row:
-                row[j] = dtrsm(1.0, previous[j][j], row[j], side=1, lower=1, trans_a=1, overwrite_b=1)
-        for k in range(first, i):
-            if k in row:
-                row[i] = dsyrk(-1.0, row[k], 1.0, row[i], lower=1, overwrite_c=1)
-        row[i] = cholesky(row[i], lower=True, overwrite_a=True, check_finite=False)
-        previous[i] = row
-        yield row
+#: Of an element: its own block of L, and that beside it on the last slab of the element before.
+ElementFactor = tuple[FloatArray, FloatArray]
 
 
-def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """Solve L Y = B, row by row of blocks: `rhs` (m, n_columns)."""
-    previous: dict[int, FloatArray] = {}
-    for i, (row, rhs_block) in enumerate(zip(factor, rhs)):
-        previous = {j: previous[j] for j in range(min(row), i)}
-        block = np.array(rhs_block, dtype=float, order="F")
-        for j, solution in previous.items():
-            if j in row:
-                width = solution.shape[1]
-                block[:, :width] = dgemm(-1.0, row[j], solution, 1.0, block[:, :width], overwrite_c=1)
-        previous[i] = dtrsm(1.0, row[i], block, lower=1, overwrite_b=1)
-        yield previous[i]
+@dataclass(frozen=True, eq=False)
+class SlabMatrix:
+    """Sum of Kronecker products arcs[k] x sections[k]; of what is held, rows and columns of the unit matrix."""
+
+    arcs: FloatArray  #: (terms, n, n): Along the arc, of elements of `degree`.
+    sections: FloatArray  #: (terms, m, m): Within a slab.
+    held: BoolArray  #: (n, m)
+    degree: int
+
+    @property
+    def elements(self) -> list[slice]:
+        """Slabs of every element but those of the one before; the first slab stands alone."""
+        return [slice(max(0, end - self.degree), end) for end in range(1, len(self.held) + 1, self.degree)]
+
+    def block(self, rows: slice, columns: slice) -> FloatArray:
+        """What stands between some slabs and others."""
+        block = np.tensordot(self.arcs[:, rows, columns], self.sections, (0, 0)).swapaxes(1, 2)
+        block[self.held[rows]] = 0.0
+        block[:, :, self.held[columns]] = 0.0
+        return block.reshape(self.held[rows].size, -1)
 
 
-def solve_rows(rows: Iterable[BlockRow], rhs: FloatArray) -> FloatArray:
-    """Solve K X = B: `rhs` (n_blocks, m, n_columns); here the whole factor is held."""
-    factor = list(factor_rows(rows))
-    out = np.stack(list(forward_rows(factor, rhs)))
-    for i, row in reversed(list(enumerate(factor))):
-        out[i] = dtrsm(1.0, row[i], out[i], lower=1, trans_a=1)
-        for j in row:
-            if j < i:
-                out[j] -= row[j].T @ out[i]
-    return out
+def factor(matrix: SlabMatrix) -> Iterator[ElementFactor]:
+    """Factor a positive definite matrix K = L L^T."""
+    width, corner = matrix.held.shape[1], np.zeros((0, 0))
+    for slabs in matrix.elements:
+        block = matrix.block(slabs, slabs).T
+        block[np.diag_indices_from(block)] += matrix.held[slabs].ravel()
+        across = np.zeros((len(block), 0))
+        if slabs.start:
+            coupling = matrix.block(slabs, slice(slabs.start - 1, slabs.start))
+            across = dtrsm(1.0, corner, coupling, side=1, lower=1, trans_a=1)
+            block = dsyrk(-1.0, across, 1.0, block, lower=1, overwrite_c=1)
+        lower = cholesky(block, lower=True, overwrite_a=True, check_finite=False)
+        corner = lower[-width:, -width:]
+        yield lower, across
+
+
+def forward(factors: Iterable[ElementFactor], rhs: Iterable[FloatArray]) -> Iterator[FloatArray]:
+    """Solve L Y = B, element by element; later blocks of B may be wider."""
+    solution = np.zeros((0, 0))
+    for (lower, across), columns in zip(factors, rhs, strict=True):
+        block = np.array(columns, dtype=float, order="F")
+        block[:, : solution.shape[1]] -= across @ solution[len(solution) - across.shape[1] :]
+        solution = dtrsm(1.0, lower, block, lower=1, overwrite_b=1)
+        yield solution
+
+
+def solve(matrix: SlabMatrix, rhs: FloatArray) -> FloatArray:
+    """Solve K X = B: `rhs` (n, m, n_columns); here the whole factor is held."""
+    factors = list(factor(matrix))
+    width, n_columns = rhs.shape[1:]
+    blocks = list(forward(factors, (rhs[slabs].reshape(-1, n_columns) for slabs in matrix.elements)))
+    for i in reversed(range(len(factors))):
+        lower, across = factors[i]
+        blocks[i] = dtrsm(1.0, lower, blocks[i], lower=1, trans_a=1)
+        if i:
+            blocks[i - 1][-width:] -= across.T @ blocks[i]
+    return np.concatenate(blocks).reshape(rhs.shape)

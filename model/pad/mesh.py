@@ -119,9 +119,9 @@ class SectorMesh:
     z: Line
     layers: tuple[Material, ...]  #: Materials of the elements across the thickness.
 
-    def per_gauss_point(self, values: list[float]) -> FloatArray:
-        """Spread one value per radial element over the Gauss points of `r`; shape of ``r.gauss[0]``."""
-        return np.repeat(np.asarray(values, dtype=float), self.r.degree + 2)
+    def at_gauss_points(self, name: str) -> FloatArray:
+        """A number of the layers' materials at the Gauss points of `r`; shape of ``r.gauss[0]``."""
+        return np.repeat([getattr(material, name) for material in self.layers], self.r.degree + 2)
 
     @property
     def n_surface(self) -> int:

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
-from model.pad.block_cholesky import BlockRow, factor_rows, forward_rows, solve_rows
+from model.pad.block_cholesky import SlabMatrix, factor, forward, solve
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, SectorMesh, sector_mesh
 from model.pad.store import load_arrays, save_arrays, storage_key
@@ -22,8 +23,7 @@ _DENSITY = MeshDensity()
 LARGEST = 1e4
 
 
-@dataclass(frozen=True)
-class _Term:
+class _Term(NamedTuple):
     """sign * r^-inverse_r * d^r/dr d^theta/dtheta d^z/dz of one displacement component."""
 
     component: int
@@ -34,6 +34,7 @@ class _Term:
     sign: float = 1.0
 
 
+_Strain = tuple[_Term, ...]
 _U, _V, _W = range(3)
 _NORMAL = (
     (_Term(_U, r=1),),
@@ -62,8 +63,7 @@ class ElasticSector:
 
     Every term is a product of a function of r, one of theta and one of z. So is, with material layers in r only,
     every contribution to the stiffness matrix: K = sum over (a, b) of Theta_ab x M_ab, where Theta_ab (one of four)
-    integrates values or derivatives along the arc and M_ab is a matrix of the cross-section. The slabs along the
-    arc make K a narrow band of dense blocks.
+    integrates values or derivatives along the arc and M_ab is a matrix of the cross-section.
     """
 
     mesh: SectorMesh
@@ -77,82 +77,58 @@ class ElasticSector:
             fixed[:, component, :, 0] = True
         return cls(mesh, fixed)
 
-    def stiffness_rows(self) -> Iterator[BlockRow]:
-        """Block rows of the lower triangle of K, slab by slab, for `model.pad.block_cholesky.factor_rows`.
-
-        Fixed rows and columns are replaced by those of the unit matrix.
-        """
-        theta = self.mesh.theta
-        sections = self._sections()
-        section = np.stack(list(sections.values()))
-        arcs = np.stack([theta.matrix(*key) for key in sections])
-        free = ~self.fixed.reshape(theta.n_nodes, -1)
-        for i in range(theta.n_nodes):
-            row = {}
-            for j in range(max(0, i - theta.degree), i + 1):
-                weights = arcs[:, i, j]
-                if weights.any():
-                    block = np.tensordot(weights, section, 1)
-                    block[~free[i]] = 0.0
-                    block[:, ~free[j]] = 0.0
-                    row[j] = block
-            row[i][np.diag_indices_from(row[i])] += ~free[i]
-            yield row
-
-    def _sections(self) -> dict[tuple[int, int], FloatArray]:
-        """M_ab: for derivative orders a, b along the arc, the cross-section's matrix, shape (m, m)."""
-        mesh = self.mesh
-        n_r, n_z = mesh.r.n_nodes, mesh.z.n_nodes
+    def stiffness(self) -> SlabMatrix:
+        """K: of derivative orders (a, b) along the arc the matrices Theta_ab and M_ab."""
+        mesh, radius = self.mesh, self.mesh.r.gauss[0]
+        size = mesh.r.n_nodes * mesh.z.n_nodes
+        sections = np.zeros((2, 2, 3, size, 3, size))
         lame, shear = self._lame()
-        out = {orders: np.zeros((3, n_r * n_z, 3, n_r * n_z)) for orders in product((0, 1), (0, 1))}
-        pairs = []
-        for strain_i, strain_j in product(_NORMAL, _NORMAL):
-            modulus = lame + 2.0 * shear if strain_i is strain_j else lame
-            pairs += [(a, b, modulus) for a, b in product(strain_i, strain_j)]
-        for strain in _SHEAR:
-            pairs += [(a, b, shear) for a, b in product(strain, strain)]
-        radius = mesh.r.gauss[0]
-        for a, b, modulus in pairs:
-            weight = a.sign * b.sign * modulus * radius ** (1 - a.inverse_r - b.inverse_r)
-            across = mesh.r.matrix(a.r, b.r, weight)
-            out[a.theta, b.theta][a.component, :, b.component, :] += np.kron(across, mesh.z.matrix(a.z, b.z))
-        size = 3 * n_r * n_z
-        return {key: value.reshape(size, size) for key, value in out.items()}
+        pairs: list[tuple[_Strain, _Strain, FloatArray]] = [(strain, strain, shear) for strain in _SHEAR]
+        for first, second in product(_NORMAL, _NORMAL):
+            pairs.append((first, second, lame + 2.0 * shear if first is second else lame))
+        for first, second, modulus in pairs:
+            for a, b in product(first, second):
+                weight = a.sign * b.sign * modulus * radius ** (1 - a.inverse_r - b.inverse_r)
+                across = np.kron(mesh.r.matrix(a.r, b.r, weight), mesh.z.matrix(a.z, b.z))
+                sections[a.theta, b.theta, a.component, :, b.component] += across
+        arcs = np.array([mesh.theta.matrix(*orders) for orders in product((0, 1), (0, 1))])
+        fixed = self.fixed.reshape(len(self.fixed), -1)
+        return SlabMatrix(arcs, sections.reshape(4, 3 * size, -1), fixed, mesh.theta.degree)
 
     def _lame(self) -> tuple[FloatArray, FloatArray]:
         """Lame's lambda and mu at the Gauss points across the thickness [Pa]."""
-        layers = self.mesh.layers
-        shear = [m.youngs_modulus / (2.0 * (1.0 + m.poissons_ratio)) for m in layers]
-        lame = [2.0 * g * m.poissons_ratio / (1.0 - 2.0 * m.poissons_ratio) for g, m in zip(shear, layers)]
-        return self.mesh.per_gauss_point(lame), self.mesh.per_gauss_point(shear)
+        modulus, ratio = (self.mesh.at_gauss_points(name) for name in ("youngs_modulus", "poissons_ratio"))
+        shear = modulus / (2.0 * (1.0 + ratio))
+        return 2.0 * shear * ratio / (1.0 - 2.0 * ratio), shear
 
-    def thermal_loads(self, temperature: FloatArray) -> Iterator[FloatArray]:
-        """Forces of hindered thermal expansion, the right-hand side of Eq. (7) in weak form, slab by slab.
+    def thermal_loads(self, temperature: FloatArray, elements: Iterable[slice]) -> Iterator[FloatArray]:
+        """Forces of hindered thermal expansion, the right-hand side of Eq. (7) in weak form, element by element.
 
         `temperature` (n_theta, n_r, n_z, n_columns) [K].
         """
         mesh = self.mesh
-        n_theta, n_r, n_z, n_columns = temperature.shape
         lame, shear = self._lame()
-        stress = (3.0 * lame + 2.0 * shear) * mesh.per_gauss_point([m.thermal_expansion for m in mesh.layers])
+        stress = (3.0 * lame + 2.0 * shear) * mesh.at_gauss_points("thermal_expansion")
         terms = [t for strain in _NORMAL for t in strain]
-        along = [mesh.theta.matrix(t.theta, 0) for t in terms]
-        across = [mesh.r.matrix(t.r, 0, stress * mesh.r.gauss[0] ** (1 - t.inverse_r)) for t in terms]
-        for i in range(n_theta):
-            near = slice(max(0, i - mesh.theta.degree), i + mesh.theta.degree + 1)
-            out = np.zeros((3, n_r, n_z, n_columns))
-            for term, by_theta, by_r in zip(terms, along, across, strict=True):
-                load = np.tensordot(by_theta[i, near], temperature[near], 1)  # (r, z, columns)
-                load = np.tensordot(by_r, load, 1)
-                out[term.component] += np.tensordot(load, mesh.z.matrix(term.z, 0), (1, 1)).transpose(0, 2, 1)
-            out[self.fixed[i]] = 0.0
-            yield out.reshape(3 * n_r * n_z, n_columns)
+        axes = []
+        for t in terms:
+            across = mesh.r.matrix(t.r, 0, stress * mesh.r.gauss[0] ** (1 - t.inverse_r))
+            axes.append((mesh.theta.matrix(t.theta, 0), across, mesh.z.matrix(t.z, 0)))
+        for slabs in elements:
+            near = slice(max(0, slabs.start - 1), slabs.stop + mesh.theta.degree)
+            out = np.zeros((*self.fixed[slabs].shape, temperature.shape[-1]))
+            for term, (along, across, end) in zip(terms, axes, strict=True):
+                load = np.tensordot(along[slabs, near], temperature[near], 1)
+                out[:, term.component] += np.einsum("ar,bz,trzc->tabc", across, end, load, optimize=True)
+            out[self.fixed[slabs]] = 0.0
+            yield out.reshape(self.fixed[slabs].size, -1)
 
     def surface_response(self, temperature: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Radial displacement of the film face under nodal forces and temperatures.
 
         With K = L L^T, E the unit radial forces on the film face and F the thermal loads, both results are products
-        of L^-1 E and L^-1 F, summed slab by slab: the compliance is symmetric and positive semidefinite by build.
+        of L^-1 E and L^-1 F, summed element by element: the compliance is symmetric and positive semidefinite by
+        build.
 
         `temperature` (n_theta, n_r, n_z, n_columns) [K]; gives compliance (n_surface, n_surface) [m/N], expansion
         (n_surface, n_columns) [m].
@@ -160,24 +136,24 @@ class ElasticSector:
         n_fields, n_surface = temperature.shape[3], self.mesh.n_surface
         compliance = np.zeros((n_surface, n_surface))
         expansion = np.zeros((n_surface, n_fields))
-        rhs = self._surface_loads(self.thermal_loads(temperature), n_fields)
-        for block in forward_rows(factor_rows(self.stiffness_rows()), rhs):
+        stiffness = self.stiffness()
+        thermal = self.thermal_loads(temperature, stiffness.elements)
+        for block in forward(factor(stiffness), self._surface_loads(thermal, stiffness.elements)):
             unit = block[:, n_fields:]
             width = unit.shape[1]
             compliance[:width, :width] += unit.T @ unit
             expansion[:width] += unit.T @ block[:, :n_fields]
         return compliance, expansion
 
-    def _surface_loads(self, thermal: Iterable[FloatArray], n_fields: int) -> Iterator[FloatArray]:
-        """Thermal loads, then unit forces on the film nodes of this slab and of those before it."""
-        n_r, n_z = self.mesh.r.n_nodes, self.mesh.z.n_nodes
-        for i, load in enumerate(thermal):
-            rhs = np.zeros((3, n_r, n_z, n_fields + (i + 1) * n_z))
-            rhs[_U, 0, :, -n_z:] = np.eye(n_z)
-            rhs[self.fixed[i]] = 0.0
-            flat = rhs.reshape(3 * n_r * n_z, -1)
-            flat[:, :n_fields] = load
-            yield flat
+    def _surface_loads(self, thermal: Iterable[FloatArray], elements: Iterable[slice]) -> Iterator[FloatArray]:
+        """Thermal loads, then unit forces on the film nodes of this element and of those before it."""
+        n_z = self.mesh.z.n_nodes
+        for slabs, load in zip(elements, thermal, strict=True):
+            unit = np.zeros((*self.fixed[slabs].shape, slabs.stop, n_z))
+            for at, slab in enumerate(range(slabs.start, slabs.stop)):
+                unit[at, _U, 0, :, slab] = np.eye(n_z)
+            unit[self.fixed[slabs]] = 0.0
+            yield np.hstack([load, unit.reshape(len(load), -1)])
 
 
 def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = True) -> tuple[FloatArray, FloatArray]:
@@ -190,45 +166,26 @@ def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = 
     `face` (n_surface, n_columns) [K]; gives the temperature rise at the nodes (n_theta, n_r, n_z, n_columns) [K], and
     the heat that enters at the nodes of the film face, weighted by their basis functions, (n_surface, n_columns) [W].
     """
-    theta, n_r, n_z = mesh.theta, mesh.r.n_nodes, mesh.z.n_nodes
-    at_face = np.arange(n_r * n_z) < n_z
-    prescribed = face.reshape(theta.n_nodes, n_z, -1).copy()
+    conduction = _conduction(mesh, convection, even)
+    n_theta, n_z = mesh.theta.n_nodes, mesh.z.n_nodes
+    prescribed = face.reshape(n_theta, n_z, -1).copy()
     if not even:
-        at_face[::n_z] = True
         prescribed[:, 0] = 0.0
-    face_field = np.zeros((theta.n_nodes, n_r * n_z, prescribed.shape[2]))
-    face_field[:, :n_z] = prescribed
-    load = np.zeros_like(face_field)  # K times the prescribed temperatures
-    to_film: list[BlockRow] = []  # rows of K at the film face
-    rows: list[BlockRow] = []
-    for i, row in enumerate(_conduction_rows(mesh, convection)):
-        to_film.append({j: block[:n_z].copy() for j, block in row.items()})
-        for j, block in row.items():
-            load[i] += block[:, :n_z] @ prescribed[j]
-            if j != i:  # blocks are symmetric: (j, i) is (i, j)
-                load[j] += block[:, :n_z] @ prescribed[i]
-            block[at_face] = block[:, at_face] = 0.0
-        row[i][at_face, at_face] = 1.0
-        rows.append(row)
-    rhs = -load
-    rhs[:, at_face] = 0.0
-    field = solve_rows(rows, rhs) + face_field
-    heat = np.zeros_like(prescribed)
-    for i, row in enumerate(to_film):
-        for j, block in row.items():
-            heat[i] += block @ field[j]
-            if j != i:
-                heat[j] += block @ field[i]
+    arcs, sections = conduction.arcs, conduction.sections
+    load = np.einsum("kij,kab,jbc->iac", arcs, sections[:, :, :n_z], prescribed, optimize=True)
+    load[conduction.held] = 0.0
+    field = solve(conduction, -load)
+    field[:, :n_z] = prescribed
+    heat = np.einsum("kij,kab,jbc->iac", arcs, sections[:, :n_z], field, optimize=True)
     if not even:
         heat[:, 0] = 0.0
-    return field.reshape(theta.n_nodes, n_r, n_z, -1), heat.reshape(mesh.n_surface, -1)
+    return field.reshape(n_theta, mesh.r.n_nodes, n_z, -1), heat.reshape(mesh.n_surface, -1)
 
 
-def _conduction_rows(mesh: SectorMesh, convection: float) -> Iterator[BlockRow]:
-    """Block rows of the lower triangle of conduction plus convection [W/K], slab by slab."""
+def _conduction(mesh: SectorMesh, convection: float, even: bool) -> SlabMatrix:
+    """Conduction and convection [W/K], the film face held, and of odd fields the mid-plane."""
     r, theta, z = mesh.r, mesh.theta, mesh.z
-    radius = r.gauss[0]
-    conductivity = mesh.per_gauss_point([m.conductivity for m in mesh.layers])
+    radius, conductivity = r.gauss[0], mesh.at_gauss_points("conductivity")
     back = np.zeros((r.n_nodes, r.n_nodes))
     back[-1, -1] = convection * r.breaks[-1]
     end = np.zeros((z.n_nodes, z.n_nodes))
@@ -238,16 +195,13 @@ def _conduction_rows(mesh: SectorMesh, convection: float) -> Iterator[BlockRow]:
     section += np.kron(r.matrix(0, 0, radius), end)
     along = np.kron(r.matrix(0, 0, conductivity / radius), z.matrix(0, 0))
     edge = convection * np.kron(r.matrix(0, 0), z.matrix(0, 0))
-    values, slopes = theta.matrix(0, 0), theta.matrix(1, 1)
-    for i in range(theta.n_nodes):
-        row = {
-            j: values[i, j] * section + slopes[i, j] * along
-            for j in range(max(0, i - theta.degree), i + 1)
-            if values[i, j] or slopes[i, j]
-        }
-        if i in (0, theta.n_nodes - 1):
-            row[i] += edge
-        yield row
+    edges = np.zeros((theta.n_nodes, theta.n_nodes))
+    edges[[0, -1], [0, -1]] = 1.0
+    held = np.zeros((theta.n_nodes, r.n_nodes, z.n_nodes), dtype=bool)
+    held[:, 0] = True
+    held[:, :, 0] |= not even
+    arcs = np.array([theta.matrix(0, 0), theta.matrix(1, 1), edges])
+    return SlabMatrix(arcs, np.array([section, along, edge]), held.reshape(theta.n_nodes, -1), theta.degree)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 from model.bearing import BABBITT, STEEL, Bearing, Material
 from model.bearing_file import load_bearing
-from model.pad.block_cholesky import solve_rows
+from model.pad.block_cholesky import solve
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PivotFace, SectorMesh
 from model.pad.operators import ElasticSector
@@ -52,8 +52,9 @@ def pressure_response(body: ElasticSector, pressure: float) -> np.ndarray:
 def thermal_field(body: ElasticSector, rise: float) -> np.ndarray:
     """Displacement of all nodes, (n_theta, 3, n_r, n_z), under a uniform temperature rise."""
     shape = body.fixed.shape
-    load = np.stack(list(body.thermal_loads(np.full((shape[0], shape[2], shape[3], 1), rise))))
-    return solve_rows(body.stiffness_rows(), load).reshape(shape)
+    stiffness, rises = body.stiffness(), np.full((shape[0], shape[2], shape[3], 1), rise)
+    load = np.concatenate(list(body.thermal_loads(rises, stiffness.elements)))
+    return solve(stiffness, load.reshape(*stiffness.held.shape, 1)).reshape(shape)
 
 
 class TestCurvedCantilever:

@@ -11,7 +11,7 @@ import pytest
 from model.bearing import STEEL, Bearing, Material, Oil, Pad, Pivot
 from model.pad import operators as operators_module
 from model.pad import store as pad_store
-from model.pad.block_cholesky import factor_rows, forward_rows, solve_rows
+from model.pad.block_cholesky import SlabMatrix, factor, forward, solve
 from model.pad.line import Line, graded
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, pivot_face, sector_mesh
 from model.pad.operators import conduct, pad_operators
@@ -82,38 +82,41 @@ class TestLine:
 
 class TestBlockCholesky:
     @staticmethod
-    def blocks(n: int = 6, m: int = 4, band: int = 2) -> tuple[np.ndarray, list[dict[int, np.ndarray]]]:
+    def slabs(degree: int = 2) -> tuple[np.ndarray, SlabMatrix]:
+        """A sum of two Kronecker products on three elements, some of it held, and the same written out."""
         rng = np.random.default_rng(20)
-        dense = np.zeros((n * m, n * m))
-        for i in range(n):
-            for j in range(max(0, i - band), i):
-                if i % 2 == 0 or i - j == 1:  # as for quadratic elements: mid slabs reach only their neighbours
-                    dense[i * m : (i + 1) * m, j * m : (j + 1) * m] = rng.normal(size=(m, m))
-        dense += dense.T + 30.0 * np.eye(n * m)
-        cut = [slice(i * m, (i + 1) * m) for i in range(n)]
-        rows = [
-            {j: dense[cut[i], cut[j]].copy() for j in range(i + 1) if np.any(dense[cut[i], cut[j]])} for i in range(n)
-        ]
-        return dense, rows
+        n, m = 3 * degree + 1, 4
+        arcs, sections = np.zeros((2, n, n)), rng.normal(size=(2, m, m))
+        for start in range(0, n - 1, degree):
+            arcs[:, start : start + degree + 1, start : start + degree + 1] += rng.normal(size=(2, degree + 1, 1))
+        arcs, sections = arcs + arcs.swapaxes(1, 2), sections + sections.swapaxes(1, 2)
+        arcs[1] += 30.0 * np.eye(n)
+        sections[1] += 10.0 * np.eye(m)
+        held = rng.random((n, m)) < 0.2
+        free = ~held.ravel()
+        dense = np.kron(arcs[0], sections[0]) + np.kron(arcs[1], sections[1])
+        return np.where(np.outer(free, free), dense, np.diag(~free)), SlabMatrix(arcs, sections, held, degree)
 
-    def test_solves_as_dense_algebra_does(self) -> None:
-        dense, rows = self.blocks()
-        rhs = np.random.default_rng(1).normal(size=(6, 4, 3))
-        got = solve_rows(rows, rhs)
-        np.testing.assert_allclose(got.reshape(24, 3), np.linalg.solve(dense, rhs.reshape(24, 3)), rtol=1e-12)
+    @pytest.mark.parametrize("degree", [1, 2, 3])
+    def test_solves_as_dense_algebra_does(self, degree: int) -> None:
+        dense, matrix = self.slabs(degree)
+        rhs = np.random.default_rng(1).normal(size=(len(matrix.held), 4, 3))
+        expected = np.linalg.solve(dense, rhs.reshape(-1, 3))
+        np.testing.assert_allclose(solve(matrix, rhs).reshape(-1, 3), expected, rtol=1e-10)
 
     def test_growing_right_hand_sides(self) -> None:
-        dense, rows = self.blocks()
-        rhs = (np.eye(4)[:, :1] * np.ones((4, i + 1)) * (np.arange(i + 1) == i) for i in range(6))
-        y = np.zeros((6, 4, 6))
-        for i, block in enumerate(forward_rows(factor_rows(rows), rhs)):
-            y[i, :, : i + 1] = block
-        gram = np.einsum("imk,iml->kl", y, y)
-        np.testing.assert_allclose(gram, np.linalg.inv(dense)[::4, ::4], rtol=1e-10)
+        dense, matrix = self.slabs()
+        unit = np.eye(len(dense))[:, ::4]
+        rhs = [unit[4 * at.start : 4 * at.stop, : at.stop] for at in matrix.elements]
+        y = np.zeros(unit.shape)
+        for at, block in zip(matrix.elements, forward(factor(matrix), rhs), strict=True):
+            y[4 * at.start : 4 * at.stop, : at.stop] = block
+        np.testing.assert_allclose(y.T @ y, np.linalg.inv(dense)[::4, ::4], rtol=1e-9, atol=1e-12)
 
     def test_says_when_not_positive_definite(self) -> None:
+        matrix = SlabMatrix(np.ones((1, 1, 1)), -np.eye(2)[None], np.zeros((1, 2), dtype=bool), 1)
         with pytest.raises(np.linalg.LinAlgError):
-            solve_rows([{0: -np.eye(2)}], np.ones((1, 2, 1)))
+            solve(matrix, np.ones((1, 2, 1)))
 
 
 class TestCompliance:
