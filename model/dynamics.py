@@ -9,9 +9,8 @@ those of `docs/theory.md`: the force on the housing, dF = +h d.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -66,16 +65,21 @@ def flexing_impedance(
     """
     weights = force_weights(film.grid)
     conductance = conductances(film.grid, film.work, (film.pad.pad_clearance, *film.approach(position)))
-    bend = _Bend(film, conductance, factor)
+
+    def slopes(shapes: Any) -> tuple[Any, Any]:
+        still = shape_slopes(film.grid, film.work, conductance, shapes)
+        return still, squeeze_slopes(film.grid, film.work, shapes)
+
     still, moving = film.work.slopes[:, :2], film.work.slopes[:, 2:4]
     if axial is not None:
-        more = bend.slopes(axial.shape[:, :, None])
-        still = np.hstack([still, more[0]])
-        moving = np.hstack([moving, more[1]])
+        more = slopes(axial.shape[:, :, None])
+        still, moving = np.hstack([still, more[0]]), np.hstack([moving, more[1]])
+    softest = slopes(film.deformation.shapes) if factor and film.deformation is not None else None
     out = np.empty((len(omega), 2, 2), dtype=np.complex128)
     for k, w in enumerate(omega.tolist()):
-        rigid = still + 1j * w * moving
-        pressure = bend.pressure(rigid, w) if factor else rigid
+        pressure = rigid = still + 1j * w * moving
+        if softest is not None:
+            pressure = _bent_pressure(film, factor, slopes, softest, rigid, w)
         out[k] = weights @ (pressure - rigid)[:, :2]
         if axial is not None:
             moment = axial.weights @ pressure
@@ -84,51 +88,26 @@ def flexing_impedance(
     return out
 
 
-@dataclass
-class _Bend:
-    """The film's pressure with a pad that bends, from that with a rigid one."""
-
-    film: PadFilm
-    conductance: FloatArray
-    factor: float
-
-    def slopes(self, shapes: Any) -> tuple[Any, Any]:
-        """The pressure by shapes of the film and by their rates."""
-        film = self.film
-        still = shape_slopes(film.grid, film.work, self.conductance, shapes)
-        return still, squeeze_slopes(film.grid, film.work, shapes)
-
-    @cached_property
-    def _softest(self) -> tuple[FloatArray, FloatArray]:
-        assert self.film.deformation is not None
-        return self.slopes(self.film.deformation.shapes)
-
-    def pressure(self, rigid: ComplexArray, omega: float) -> ComplexArray:
-        """Pressure (unknowns, m) from that of a rigid pad; NaN where it finds no rest."""
-        body, factor = self.film.deformation, self.factor
-        assert body is not None
-        still, moving = self._softest
-        closed = np.eye(len(body.response)) - factor * (body.response @ (still + 1j * omega * moving))
-        pressure = rigid
-        bent = np.zeros((*self.film.work.pressure.shape, rigid.shape[1]), dtype=np.complex128)
-        for _ in range(_MOST_TURNS):
-            wanted = factor * (body.compliance @ _everywhere(self.film, pressure))
-            missing = wanted - bent.reshape(wanted.shape)
-            if not np.abs(missing).max() > _SETTLED * np.abs(wanted).max():
-                return pressure
-            asked = body.amplitudes @ missing
-            bent += missing.reshape(bent.shape) + body.shapes @ (np.linalg.solve(closed, asked) - asked)
-            still, moving = self.slopes(bent)
-            pressure = rigid + still + 1j * omega * moving
-        return np.full_like(rigid, np.nan)
-
-
-def _everywhere(film: PadFilm, pressure: ComplexArray) -> ComplexArray:
-    """Pressure at all nodes, (n, m), from that at the unknown ones."""
-    field = np.zeros((*film.work.pressure.shape, pressure.shape[1]), dtype=np.complex128)
-    inner = field[1:-1, film.grid.first : -1]
-    inner[:] = pressure.reshape(inner.shape)
-    return field.reshape(-1, pressure.shape[1])
+def _bent_pressure(
+    film: PadFilm, factor: float, slopes: Callable[[Any], Any], softest: Any, rigid: ComplexArray, omega: float
+) -> ComplexArray:
+    """Pressure (unknowns, m) with a pad that bends, from that with a rigid one; NaN where it finds no rest."""
+    body, grid = film.deformation, film.grid
+    assert body is not None
+    closed = np.eye(len(body.response)) - factor * (body.response @ (softest[0] + 1j * omega * softest[1]))
+    pressure = rigid
+    bent = np.zeros((*film.work.pressure.shape, rigid.shape[1]), dtype=np.complex128)
+    for _ in range(_MOST_TURNS):
+        field = np.pad(pressure.reshape(len(bent) - 2, -1, rigid.shape[1]), ((1, 1), (grid.first, 1), (0, 0)))
+        wanted = factor * (body.compliance @ field.reshape(-1, rigid.shape[1]))
+        missing = wanted - bent.reshape(wanted.shape)
+        if not np.abs(missing).max() > _SETTLED * np.abs(wanted).max():
+            return pressure
+        asked = body.amplitudes @ missing
+        bent += missing.reshape(bent.shape) + body.shapes @ (np.linalg.solve(closed, asked) - asked)
+        still, moving = slopes(bent)
+        pressure = rigid + still + 1j * omega * moving
+    return np.full_like(rigid, np.nan)
 
 
 def describing(amplitude: FloatArray, stick: Any, slip: Any) -> ComplexArray:

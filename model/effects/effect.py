@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -44,7 +45,7 @@ class Effect:
         object.__setattr__(self, "parameters", MappingProxyType(kind.check(parameters)))
 
     def __reduce__(self) -> Any:
-        return _rebuild, (self.name, dict(self.parameters))
+        return partial(Effect, self.name, **self.parameters), ()
 
     def __repr__(self) -> str:
         inside = ", ".join(f"{k}={v:g}" for k, v in self.parameters.items())
@@ -52,10 +53,6 @@ class Effect:
 
     def __hash__(self) -> int:
         return hash((self.name, tuple(sorted(self.parameters.items()))))
-
-
-def _rebuild(name: str, parameters: dict[str, float]) -> Effect:
-    return Effect(name, **parameters)
 
 
 def apply_effects(setup: Setup, effects: Iterable[Effect]) -> Setup:

@@ -34,13 +34,13 @@ class _Term(NamedTuple):
     sign: float = 1.0
 
 
-_Strain = tuple[_Term, ...]
 _U, _V, _W = range(3)
-_NORMAL = (
+_NORMAL: tuple[tuple[_Term, ...], ...] = (
     (_Term(_U, r=1),),
     (_Term(_U, inverse_r=1), _Term(_V, inverse_r=1, theta=1)),
     (_Term(_W, z=1),),
 )
+_VOLUME = _NORMAL[0] + _NORMAL[1] + _NORMAL[2]
 _SHEAR = (
     (_Term(_U, inverse_r=1, theta=1), _Term(_V, r=1), _Term(_V, inverse_r=1, sign=-1.0)),
     (_Term(_V, z=1), _Term(_W, inverse_r=1, theta=1)),
@@ -83,11 +83,9 @@ class ElasticSector:
         size = mesh.r.n_nodes * mesh.z.n_nodes
         sections = np.zeros((2, 2, 3, size, 3, size))
         lame, shear = self._lame()
-        pairs: list[tuple[_Strain, _Strain, FloatArray]] = [(strain, strain, shear) for strain in _SHEAR]
-        for first, second in product(_NORMAL, _NORMAL):
-            pairs.append((first, second, lame + 2.0 * shear if first is second else lame))
-        for first, second, modulus in pairs:
-            for a, b in product(first, second):
+        strains = (_VOLUME, *_NORMAL, *_SHEAR)
+        for strain, modulus in zip(strains, (lame, *[2.0 * shear] * 3, *[shear] * 3), strict=True):
+            for a, b in product(strain, strain):
                 weight = a.sign * b.sign * modulus * radius ** (1 - a.inverse_r - b.inverse_r)
                 across = np.kron(mesh.r.matrix(a.r, b.r, weight), mesh.z.matrix(a.z, b.z))
                 sections[a.theta, b.theta, a.component, :, b.component] += across
@@ -109,15 +107,14 @@ class ElasticSector:
         mesh = self.mesh
         lame, shear = self._lame()
         stress = (3.0 * lame + 2.0 * shear) * mesh.at_gauss_points("thermal_expansion")
-        terms = [t for strain in _NORMAL for t in strain]
         axes = []
-        for t in terms:
+        for t in _VOLUME:
             across = mesh.r.matrix(t.r, 0, stress * mesh.r.gauss[0] ** (1 - t.inverse_r))
             axes.append((mesh.theta.matrix(t.theta, 0), across, mesh.z.matrix(t.z, 0)))
         for slabs in elements:
             near = slice(max(0, slabs.start - 1), slabs.stop + mesh.theta.degree)
             out = np.zeros((*self.fixed[slabs].shape, temperature.shape[-1]))
-            for term, (along, across, end) in zip(terms, axes, strict=True):
+            for term, (along, across, end) in zip(_VOLUME, axes, strict=True):
                 load = np.tensordot(along[slabs, near], temperature[near], 1)
                 out[:, term.component] += np.einsum("ar,bz,trzc->tabc", across, end, load, optimize=True)
             out[self.fixed[slabs]] = 0.0
@@ -228,10 +225,8 @@ def pad_operators(
 
     `cooled`: interpolated between a few convections, so that the first time costs more and every other nothing.
     """
-    convections: tuple[float, ...] = (geometry.back_convection,)
-    weights = np.ones(1)
-    if cooled and geometry.back_convection <= LARGEST:
-        convections, weights = _between(geometry)
+    between = cooled and geometry.back_convection <= LARGEST
+    convections, weights = _between(geometry) if between else ((geometry.back_convection,), np.ones(1))
     at = operators_at(replace(geometry, back_convection=0.0), density, even, convections)
     return replace(at, expansion=np.tensordot(weights, at.expansion, 1), flux=np.tensordot(weights, at.flux, 1))
 
@@ -279,25 +274,13 @@ def _solve(
     """Solve conduction, then thermoelasticity; see `PadOperators` for the results."""
     theta, z = mesh.theta, mesh.z
     spread = np.asarray(np.kron(Line(theta.breaks, 1).tabulate(theta.nodes), Line(z.breaks, 1).tabulate(z.nodes)))
-    n_temperatures = spread.shape[1]
-    shape = (theta.n_nodes, mesh.r.n_nodes, z.n_nodes, len(convections), n_temperatures)
-    field = np.empty(shape)
-    flux = np.empty((len(convections), mesh.n_surface, n_temperatures))
+    area = geometry.inner_radius * np.kron(theta.matrix(0, 0), z.matrix(0, 0))
+    shape = (theta.n_nodes, mesh.r.n_nodes, z.n_nodes, len(convections), spread.shape[1])
+    field, flux = np.empty(shape), np.empty((len(convections), *spread.shape))
     for k, convection in enumerate(convections):
         field[:, :, :, k], heat = conduct(mesh, convection, spread, even)
-        flux[k] = _flux(mesh, heat) / geometry.inner_radius
+        flux[k] = np.linalg.solve(area, heat)
     body = ElasticSector.held_at(mesh, mesh.held(geometry.face), even)
     compliance, expansion = body.surface_response(field.reshape(*shape[:3], -1))
-    return {
-        "compliance": compliance,
-        "expansion": np.stack(np.split(expansion, len(convections), axis=1)),
-        "flux": flux,
-    }
-
-
-def _flux(mesh: SectorMesh, heat: FloatArray) -> FloatArray:
-    """Heat flux density at the nodes of the film face, per radian of the arc, of heat that enters there."""
-    theta, z = mesh.theta, mesh.z
-    by_arc = heat.reshape(theta.n_nodes, z.n_nodes, -1)
-    flux = np.linalg.solve(theta.matrix(0, 0), by_arc.reshape(theta.n_nodes, -1)).reshape(by_arc.shape)
-    return np.asarray(np.linalg.solve(z.matrix(0, 0), flux).reshape(mesh.n_surface, -1))
+    by_convection = np.stack(np.split(expansion, len(convections), axis=1))
+    return {"compliance": compliance, "expansion": by_convection, "flux": flux}
