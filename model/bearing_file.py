@@ -191,15 +191,11 @@ def _check_pads(bearing: Bearing, name: str) -> None:
 
 
 def _check_pivot(kind: str, pivot: dict[str, Any], name: str) -> None:
-    need = {
-        "rocker": {"contact_length", "housing_diameter", "pivot_diameter"},
-        "spherical": {"sphere_diameter"},
-        "rigid": set(),
-    }
+    need = KEYS["pivot_sizes"]
     if kind not in need:
         raise BearingError(f"{name}, [pivot] kind: {kind!r} is not known. {hint(kind, need, 'Use one of')}")
-    missing = sorted(need[kind] - set(pivot))
-    if missing:
-        raise BearingError(f"{name}, [pivot] {missing[0]}: missing; a {kind} pivot needs it.")
+    for size in need[kind]:
+        if size not in pivot:
+            raise BearingError(f"{name}, [pivot] {size}: missing; a {kind} pivot needs it.")
     if kind == "rocker" and not pivot["pivot_diameter"] < pivot["housing_diameter"]:
         raise BearingError(f"{name}, [pivot]: pivot_diameter must be smaller than housing_diameter.")

@@ -32,6 +32,9 @@ from rigdata.problem import Condition
 _MOST_TURNS, _SETTLED = 40, 1e-7
 #: Halvings of the amplitude with which a pivot with friction vibrates.
 _HALVINGS = 60
+#: Conditions of pads whose pivots rub.
+_HELD = "pivot friction holds pads {pads}"
+_LOOSE = "vibration of {number:g} um breaks the pivots of pads {pads} loose"
 
 
 class AxialTilt(NamedTuple):
@@ -328,15 +331,8 @@ def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) 
     if not pads:
         return ()
     z, tilting = _impedances(pads, omega)
-    impedance = np.abs(_broken_loose(pads, z, tilting, setup.vibration))
-    held: list[int] = []
-    loose: list[int] = []
-    for pad, sizes in zip(pads, impedance, strict=True):
-        (loose if (sizes < pad.friction[0]).any() else held).append(pad.number)
-    names = []
-    if held:
-        names.append(named("pivot friction holds pads {pads}", held))
-    if loose:
-        kind = "vibration of {number:g} um breaks the pivots of pads {pads} loose"
-        names.append(named(kind, loose, 1e6 * setup.vibration))
-    return tuple(names)
+    least = np.abs(_broken_loose(pads, z, tilting, setup.vibration)).min(axis=(1, 2))
+    regimes: dict[str, list[int]] = {}
+    for pad, impedance in zip(pads, least, strict=True):
+        regimes.setdefault(_LOOSE if impedance < pad.friction[0] else _HELD, []).append(pad.number)
+    return tuple(named(kind, regimes[kind], 1e6 * setup.vibration) for kind in (_HELD, _LOOSE) if kind in regimes)

@@ -70,10 +70,9 @@ class Instruments:
         F_cell = F_oil / (1 - m omega^2 / K).
         """
 
-        def one(omega: float) -> ComplexArray:
+        def one(omega: float) -> FloatArray:
             share = 1.0 / (1.0 - self.housing_mass * omega**2 / np.array(self.cell_stiffness))
-            part = (np.asarray(gain) - np.eye(2)) * share[None, :]
-            return np.asarray(np.eye(2) + part, dtype=np.complex128)
+            return np.eye(2) + (gain - np.eye(2)) * share
 
         return replace(self, force=(*self.force, one))
 
@@ -84,16 +83,15 @@ class Instruments:
         a = -omega^2 F_cell / K.
         """
 
-        def one(omega: float) -> ComplexArray:
-            stiffness = np.array(self.cell_stiffness)
-            share = 1.0 / (stiffness - (self.housing_mass + mass_error) * omega**2)
-            return np.diag(1.0 + mass_error * omega**2 * share).astype(complex)
+        def one(omega: float) -> FloatArray:
+            share = 1.0 / (np.array(self.cell_stiffness) - (self.housing_mass + mass_error) * omega**2)
+            return np.diag(1.0 + mass_error * omega**2 * share)
 
         return replace(self, force=(*self.force, one))
 
 
 def _product(maps: tuple[SensorMap, ...], omega: float) -> ComplexArray:
-    total: ComplexArray = np.eye(2, dtype=np.complex128)
-    for one in maps:
-        total = np.asarray(np.asarray(one(omega)) @ total, dtype=np.complex128)
-    return total
+    product = np.eye(2, dtype=np.complex128)
+    for reading in maps:
+        product = reading(omega) @ product
+    return product

@@ -314,9 +314,7 @@ class Prediction:
         )  # fmt: skip
         if not (coarse.converged and self.converged):
             return math.nan
-        worst = 0.0
-        for part in ("real", "imag"):
-            fine, rough = (np.diagonal(getattr(p.bearing_h, part), axis1=-2, axis2=-1) for p in (self, coarse))
-            scale = np.maximum(np.abs(fine), 0.05 * np.abs(np.diagonal(self.bearing_h, axis1=-2, axis2=-1)))
-            worst = max(worst, float(np.max(np.abs(fine - rough) / scale)) / 3.0)
-        return worst
+        fine, rough = (np.diagonal(p.bearing_h, axis1=-2, axis2=-1) for p in (self, coarse))
+        change = np.abs([(fine - rough).real, (fine - rough).imag])
+        scale = np.maximum(np.abs([fine.real, fine.imag]), 0.05 * np.abs(fine))
+        return float(np.max(change / scale)) / 3.0

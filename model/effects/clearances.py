@@ -62,9 +62,9 @@ def uneven_pads(setup: Setup, **offsets: float) -> Setup:
     clearances = np.array([offsets[f"offset_{k}"] for k in range(1, len(pads) + 1)])
     normals = np.array([[math.cos(p.pivot_angle), math.sin(p.pivot_angle)] for p in pads])
     without_shift = clearances - normals @ np.linalg.lstsq(normals, clearances, rcond=None)[0]
-    return setup.change_pads(
-        lambda number, pad: replace(pad, assembled_clearance=pad.assembled_clearance + float(without_shift[number - 1]))
-    )
+    for number, change in enumerate(without_shift.tolist(), start=1):
+        setup = _moved(setup, "assembled_clearance", change, number)
+    return setup
 
 
 @effect_on(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+
+import numpy as np
 
 from model.effects.kind import DIRECTION, Parameter, effect_on
 from model.measured_pivot import MeasuredPivot
@@ -25,11 +26,12 @@ def _add_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
     for law, pad in zip(setup.pivots, setup.bearing.pads, strict=True):
         x, y = math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)
         pivots.append(_alone(law, xx * x * x + 2.0 * xy * x * y + yy * y * y))
-    return setup.change(series_compliance=_sum(setup.series_compliance, xx, xy, yy), pivots=tuple(pivots))
+    return _added(setup.change(pivots=tuple(pivots)), "series_compliance", xx, xy, yy)
 
 
-def _sum(before: tuple[float, ...], *more: float) -> Any:
-    return tuple(a + b for a, b in zip(before, more, strict=True))
+def _added(setup: Setup, name: str, *more: float) -> Setup:
+    """Add to the entries of a matrix."""
+    return setup.change(**{name: tuple(np.add(getattr(setup, name), more).tolist())})
 
 
 def _alone(law: PivotLaw, compliance: float) -> PivotLaw:
@@ -103,7 +105,7 @@ def series_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
 )
 def parallel_stiffness(setup: Setup, xx: float, xy: float, yx: float, yy: float) -> Setup:
     """A constant stiffness that adds to what the records show, in dynamic tests only."""
-    return setup.change(parallel_stiffness=_sum(setup.parallel_stiffness, xx, xy, yx, yy))
+    return _added(setup, "parallel_stiffness", xx, xy, yx, yy)
 
 
 @effect_on(
@@ -120,4 +122,4 @@ def parallel_stiffness(setup: Setup, xx: float, xy: float, yx: float, yy: float)
 )
 def parallel_damping(setup: Setup, xx: float, xy: float, yx: float, yy: float) -> Setup:
     """A constant damping that adds to what the records show, in dynamic tests only."""
-    return setup.change(parallel_damping=_sum(setup.parallel_damping, xx, xy, yx, yy))
+    return _added(setup, "parallel_damping", xx, xy, yx, yy)

@@ -29,14 +29,9 @@ class Line:
         object.__setattr__(self, "breaks", breaks)
 
     @property
-    def n_elements(self) -> int:
-        """Number of elements."""
-        return self.breaks.size - 1
-
-    @property
     def n_nodes(self) -> int:
         """Number of nodes."""
-        return self.n_elements * self.degree + 1
+        return (self.breaks.size - 1) * self.degree + 1
 
     @cached_property
     def nodes(self) -> FloatArray:
@@ -47,7 +42,7 @@ class Line:
     def tabulate(self, x: ArrayLike, derivative: int = 0) -> FloatArray:
         """Basis functions at points."""
         points = np.asarray(x, dtype=float)
-        element = np.clip(np.searchsorted(self.breaks, points, side="right") - 1, 0, self.n_elements - 1)
+        element = np.clip(np.searchsorted(self.breaks, points, side="right") - 1, 0, self.breaks.size - 2)
         size = np.diff(self.breaks)[element]
         local = (points - self.breaks[element]) / size
         powers = np.arange(self.degree + 1)
