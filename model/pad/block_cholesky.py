@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky
-from scipy.linalg.blas import dsyrk, dtrsm
+from scipy.linalg.blas import dgemm, dsyrk, dtrsm
 
 from rigdata.arrays import BoolArray, FloatArray
 
@@ -59,11 +59,13 @@ def factor(matrix: SlabMatrix) -> Iterator[ElementFactor]:
 
 
 def forward(factors: Iterable[ElementFactor], rhs: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """Solve L Y = B, element by element; later blocks of B may be wider."""
+    """Solve L Y = B, element by element; later blocks of B, in columns and taken over, may be wider."""
     solution = np.zeros((0, 0))
-    for (lower, across), columns in zip(factors, rhs, strict=True):
-        block = np.array(columns, dtype=float, order="F")
-        block[:, : solution.shape[1]] -= across @ solution[len(solution) - across.shape[1] :]
+    for (lower, across), block in zip(factors, rhs, strict=True):
+        width = solution.shape[1]
+        if width:
+            last = solution[-across.shape[1] :]
+            block[:, :width] = dgemm(-1.0, across, last, 1.0, block[:, :width], overwrite_c=1)
         solution = dtrsm(1.0, lower, block, lower=1, overwrite_b=1)
         yield solution
 
@@ -72,7 +74,8 @@ def solve(matrix: SlabMatrix, rhs: FloatArray) -> FloatArray:
     """Solve K X = B: `rhs` (n, m, n_columns); here the whole factor is held."""
     factors = list(factor(matrix))
     width, n_columns = rhs.shape[1:]
-    blocks = list(forward(factors, (rhs[slabs].reshape(-1, n_columns) for slabs in matrix.elements)))
+    columns = (np.array(rhs[slabs].reshape(-1, n_columns), order="F") for slabs in matrix.elements)
+    blocks = list(forward(factors, columns))
     for i in reversed(range(len(factors))):
         lower, across = factors[i]
         blocks[i] = dtrsm(1.0, lower, blocks[i], lower=1, trans_a=1)

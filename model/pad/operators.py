@@ -146,11 +146,11 @@ class ElasticSector:
         """Thermal loads, then unit forces on the film nodes of this element and of those before it."""
         n_z = self.mesh.z.n_nodes
         for slabs, load in zip(elements, thermal, strict=True):
-            unit = np.zeros((*self.fixed[slabs].shape, slabs.stop, n_z))
-            for at, slab in enumerate(range(slabs.start, slabs.stop)):
-                unit[at, _U, 0, :, slab] = np.eye(n_z)
-            unit[self.fixed[slabs]] = 0.0
-            yield np.hstack([load, unit.reshape(len(load), -1)])
+            loads = np.zeros((len(load), load.shape[1] + slabs.stop * n_z), order="F")
+            loads[:, : load.shape[1]] = load
+            nodes = np.arange(len(load)).reshape(self.fixed[slabs].shape)[:, _U, 0].ravel()
+            loads[nodes, np.arange(-len(nodes), 0)] = ~self.fixed[slabs][:, _U, 0].ravel()
+            yield loads
 
 
 def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = True) -> tuple[FloatArray, FloatArray]:

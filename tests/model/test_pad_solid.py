@@ -107,7 +107,7 @@ class TestBlockCholesky:
     def test_growing_right_hand_sides(self) -> None:
         dense, matrix = self.slabs()
         unit = np.eye(len(dense))[:, ::4]
-        rhs = [unit[4 * at.start : 4 * at.stop, : at.stop] for at in matrix.elements]
+        rhs = [np.array(unit[4 * at.start : 4 * at.stop, : at.stop], order="F") for at in matrix.elements]
         y = np.zeros(unit.shape)
         for at, block in zip(matrix.elements, forward(factor(matrix), rhs), strict=True):
             y[4 * at.start : 4 * at.stop, : at.stop] = block
