@@ -183,8 +183,10 @@ class _Search:
             return plain
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
             return proposal.estimate > total + math.log(1.0 - self.settings.included)
-        rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
-        return proposal.estimate > total - near - rise
+        # scores beside fits of as many faults as the leader are from past what lets it rise
+        rises = len(proposal.faults) <= len(leader.faults)
+        rise = float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken)) if rises else 0.0
+        return proposal.estimate > total - near - (mistaken if plain else rise)
 
     def _renewed(self, fit: Fit, whole: bool = True) -> Fit:
         """A fit with derivatives of its own, where these do not make it worse."""
@@ -197,7 +199,10 @@ class _Search:
         if fit is None or not fit.faults:
             return fit
         right = min(f.posterior.scale for f in (leader or fit, fit)) <= self.settings.right
-        nats = self.settings.mistaken if start.coarse else self.settings.worth_derivatives if right else 0.0
+        # where a fit keeps what its start foretold, derivatives of its own would say the same
+        surprise = abs(self._log_probability(fit) - start.estimate)
+        worth = min(self.settings.worth_derivatives, self.settings.foretold * surprise)
+        nats = self.settings.mistaken if start.coarse else worth if right else 0.0
         tenable_first = right and leader is None  # whether it is tenable tells none that has not arrived
         if not (tenable_first or self._near(fit, fit.posterior.promised, nats)):
             return fit
@@ -205,8 +210,9 @@ class _Search:
             fit = self._renewed(fit, whole=False)  # where all that is fitted is wrong, most promises are
             if not self._near(fit, fit.posterior.total, 0.0):
                 return fit
-        fit = self._renewed(fit)
-        return self._renewed(fit) if start.coarse else fit  # those from before a jump led here
+        again = self._renewed(fit)
+        rose = again.posterior.total > fit.posterior.total + Deciding.better
+        return self._renewed(again) if start.coarse and rose else again  # those from before a jump led here
 
     def _fit(self, proposal: Start) -> None:
         """Fit a proposal; one that leads and is surely wrong, or stopped at a jump, once more with a coarse start."""
