@@ -17,6 +17,9 @@ from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap, noise_floor
 
+#: Gaps that differ by less are the same: so far apart are two predictions of points that an effect does not move.
+_ALIKE = 0.005
+
 
 @dataclass(frozen=True)
 class Touched:
@@ -70,7 +73,7 @@ class HeldOut:
     def is_shrunk(self, settings: Deciding) -> bool:
         """Whether every fault halves the gap along what it moves, and the gap over everything does not grow."""
         halved = all(one.remaining <= settings.halved**2 for one in self.touched)
-        return bool(self.touched) and halved and self.as_stated <= self.before
+        return bool(self.touched) and halved and self.as_stated < self.before + _ALIKE
 
 
 def _share(after: float, before: float, floor: float) -> float:
@@ -83,34 +86,43 @@ def held_out_gap(run: Map, fit: Fit) -> HeldOut:
     theta = np.clip(_from_others(fit), fit.unknowns.low, fit.unknowns.high)
     faults = [fault for fault in fit.faults if not fault.is_term]
     without = [[other for other in faults if other is not fault] for fault in faults]
-    whole, *partial = run(prediction, [_alone(fit, theta, chosen) for chosen in (faults, *without)])
-    if whole is None:
+    places = [(faults, False), *((chosen, True) for chosen in (faults, *without) if faults)]
+    stated, *solved = run(prediction, [_at(fit, theta, *place) for place in places])
+    if stated is None:
         return HeldOut(fit, None)
-    moved = [] if any(part is None for part in partial) else zip(faults, partial, strict=True)
-    touched = sorted((_touched(fit, *pair, whole) for pair in moved), key=lambda one: -one.remaining)
-    return HeldOut(fit, whole * fit.problem.sigma, tuple(touched))
+    moved = [] if any(one is None for one in solved) else zip(faults, solved[1:], strict=False)
+    touched = [_touched(fit, theta, fault, (part, solved[0])) for fault, part in moved]
+    return HeldOut(fit, stated * fit.problem.sigma, tuple(sorted(touched, key=lambda one: -one.remaining)))
 
 
-def _alone(fit: Fit, theta: FloatArray, faults: Sequence[Fault]) -> tuple[tuple[Fault, ...], FloatArray]:
-    """Some faults of a fit at the amplitudes in `theta`, every tolerance as stated."""
+def _at(fit: Fit, theta: FloatArray, faults: Sequence[Fault], free: bool) -> tuple[tuple[Fault, ...], FloatArray]:
+    """Some faults of a fit at the amplitudes in `theta`; tolerances where it has them, or not `free`: as stated."""
     unknowns = Unknowns(fit.problem, faults)
-    alone = np.zeros(len(unknowns.width))
+    there = np.zeros(len(unknowns.width))
+    if free:
+        there[unknowns.amplitudes + fit.unknowns.tolerances - fit.unknowns.amplitudes] = theta[fit.unknowns.tolerances]
     for fault, at in zip(fit.faults, fit.unknowns.slices, strict=True):
         if fault in faults:
-            alone[unknowns.slices[unknowns.faults.index(fault)]] = theta[at]
-    return unknowns.faults, alone
+            there[unknowns.slices[unknowns.faults.index(fault)]] = theta[at]
+    return unknowns.faults, there
 
 
-def _touched(fit: Fit, fault: Fault, without: FloatArray, whole: FloatArray) -> Touched:
-    """Project the gap on what a fault moves, seen through noise, model error and all tolerances that are stated."""
-    held, stated = fit.problem.held, fit.linear.jacobian[:, fit.unknowns.tolerances]
+def _touched(fit: Fit, theta: FloatArray, fault: Fault, ends: tuple[FloatArray, FloatArray]) -> Touched:
+    """Project the gap on what a fault moves, seen through noise, model error and all tolerances that are stated.
+
+    `ends`: predictions without it and with it, where the other points put the tolerances. Their derivatives count from
+    there back to what is stated: a gap at stated ones would hold their curvature, which no covariance has.
+    """
+    (without, whole), free = ends, fit.unknowns.tolerances
+    held, stated = fit.problem.held, fit.linear.jacobian[:, free]
+    gap_there = fit.problem.measured - whole + stated @ theta[free]
     for rows in (held, np.ones_like(held)):
         moved = (whole - without)[rows]
         weights = np.linalg.solve(_covariance(fit, rows, stated[rows]), moved)
         size = math.sqrt(max(float(weights @ moved), 1e-300))
         if size >= Deciding.visible:
             break
-    after = float(weights @ (fit.problem.measured - whole)[rows]) / size
+    after = float(weights @ gap_there[rows]) / size
     return Touched(fault.label, abs(after + size), abs(after), rows is held and not held.all())
 
 
