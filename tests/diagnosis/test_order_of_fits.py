@@ -180,3 +180,65 @@ def test_what_tolerances_say_together_is_their_derivatives_beside_a_fit(campaign
         column = sum(share * problem.scaled(problem.columns)[:, i] for i, share in members.items())
         moved = problem.scaled(forward.fresh()([fault.candidate.effect(fault.candidate.neutral + step)])) - base
         assert np.linalg.norm(moved / step - column) < 0.05 * np.linalg.norm(column)
+
+
+def stub_search(total, estimate, labels=frozenset("a")):
+    """A search led by a right fit, some nats above its score."""
+    tried = object.__new__(search._Search)
+    tried.settings, tried.estimates, tried.fits = DiagnoseSettings(), {labels: estimate}, {}
+    leader = stub_fit(total, labels)
+    tried._leader = lambda: leader
+    tried._log_prior = lambda faults: 0.0
+    return tried
+
+
+def stub_fit(total, labels=frozenset("b")):
+    state = SimpleNamespace(total=total, promised=total, scale=0.1)
+    faults = tuple(SimpleNamespace(name=label, is_term=False) for label in sorted(labels))
+    return SimpleNamespace(labels=labels, faults=faults, posterior=state, has_terms=False)
+
+
+@pytest.mark.parametrize(
+    ("total", "estimate", "renewed"),
+    [
+        (-5.0, -5.1, False),  # a rival that keeps its score: so it would with derivatives of its own
+        (-5.0, -3.0, True),  # the same fit, off its score by more than that can be trusted
+        (-12.0, -10.0, False),  # too far behind for what it is off by
+        (0.1, 0.0, True),  # it leads: intervals rest on them
+    ],
+)
+def test_a_fit_gets_derivatives_of_its_own_where_it_leads_or_is_off_its_score(monkeypatch, total, estimate, renewed):
+    asked = []
+    tried = stub_search(total=0.0, estimate=0.0)
+    monkeypatch.setattr(search, "fitted", lambda run, problem, start: stub_fit(total))
+    monkeypatch.setattr(search, "refined", lambda run, fit, whole: asked.append(fit) or fit)
+    tried.run = tried.problem = None
+    tried._reached(SimpleNamespace(estimate=estimate, coarse=False))
+    assert bool(asked) == renewed
+
+
+@pytest.mark.parametrize(("rise", "times"), [(0.5, 1), (5.0, 2)])
+def test_after_a_coarse_start_derivatives_are_asked_again_where_they_pay(monkeypatch, rise, times):
+    asked = []
+
+    def refined(run, fit, whole):
+        asked.append(fit)
+        return stub_fit(fit.posterior.total + rise)
+
+    tried = stub_search(total=0.0, estimate=0.0)
+    monkeypatch.setattr(search, "fitted", lambda run, problem, start: stub_fit(-20.0))
+    monkeypatch.setattr(search, "refined", refined)
+    tried.run = tried.problem = None
+    tried._reached(SimpleNamespace(estimate=-100.0, coarse=True))
+    assert len(asked) == times
+
+
+@pytest.mark.parametrize(
+    ("labels", "estimate", "fitted"),
+    [("b", -25.0, True), ("bc", -25.0, False), ("bc", -9.0, True), ("b", -31.0, False)],
+)
+def test_what_a_leader_rose_by_is_allowed_to_rivals_of_as_many_faults(labels, estimate, fitted):
+    tried = stub_search(total=0.0, estimate=-20.0)
+    rival = stub_fit(0.0, frozenset(labels))
+    proposal = SimpleNamespace(labels=rival.labels, faults=rival.faults, estimate=estimate, coarse=False)
+    assert tried._promising(proposal, tried._leader()) == fitted
