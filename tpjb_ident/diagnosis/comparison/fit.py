@@ -212,10 +212,7 @@ def _better(reached: Linear, start: Start, errors: ErrorModel) -> Linear:
 
 
 def refined(run: Map, fit: Fit, whole: bool = True) -> Fit:
-    """The same with derivatives of its own, and moved on by them.
-
-    Not `whole`: by numbers whose next step shows.
-    """
+    """The same with derivatives of its own, moved on by them; not `whole`: by numbers whose next step shows."""
     errors, unknowns, linear = fit.problem.errors, fit.unknowns, fit.linear
     step = np.clip(fit.posterior.mean, unknowns.low, unknowns.high) - linear.theta
     shown = np.linalg.norm(errors.white(linear.jacobian * step, fit.posterior.leading), axis=0) > 1.0
@@ -224,9 +221,8 @@ def refined(run: Map, fit: Fit, whole: bool = True) -> Fit:
 
 
 def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:
-    errors = unknowns.problem.errors
-    moved = _stepped(run, unknowns, linear, errors)
-    return Fit(unknowns, moved, posterior(errors, moved))
+    moved = _stepped(run, unknowns, linear, unknowns.problem.errors)
+    return Fit(unknowns, moved, posterior(unknowns.problem.errors, moved))
 
 
 def _renewed(run: Map, unknowns: Unknowns, linear: Linear, asked: Sequence[int], exact: bool = False) -> Linear:

@@ -48,10 +48,7 @@ class Strain:
 
 
 def separations(white: FloatArray) -> FloatArray:
-    """Standard deviations between every effect, of a size that is seen, and all that another can imitate of it, (k, k).
-
-    Of whitened signatures (n, k).
-    """
+    """Standard deviations between every effect, of a size that is seen, and what another can imitate of it, (k, k)."""
     with np.errstate(invalid="ignore", divide="ignore"):  # a signature of nothing has no direction: NaN
         unit = white / np.linalg.norm(white, axis=0)
     return Deciding.seen * np.sqrt(np.maximum(1.0 - (unit.T @ unit) ** 2, 0.0))

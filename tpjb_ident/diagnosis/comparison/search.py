@@ -90,8 +90,7 @@ class _Search:
 
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
-        stated = self._stated
-        self._fit(Start((), stated.theta, stated.jacobian))
+        self._fit(Start((), self._stated.theta, self._stated.jacobian))
         self.report("every effect of the library", 0.1)
         self._propose_singles()
         baseline, best = self.fits[frozenset()], max((p.estimate for p in self.proposals.values()), default=-math.inf)
@@ -109,12 +108,10 @@ class _Search:
             return None
         if not (self.whole or self._passed or any(map(self._comes_first, self.proposals.values()))):
             self._ask_whole_paths()
-        order = sorted(self.proposals.values(), key=lambda p: (not self._comes_first(p), -p.estimate))
         leader = self._leader()
-        if leader is not None:
-            order = [proposal for proposal in order if self._promising(proposal, leader)]
-        if order:
-            return self.proposals.pop(order[0].labels)
+        promising = [p for p in self.proposals.values() if leader is None or self._promising(p, leader)]
+        if promising:
+            return self.proposals.pop(max(promising, key=lambda p: (self._comes_first(p), p.estimate)).labels)
         if leader is None or leader.posterior.scale > self.settings.right:
             return None
         return self._look_alike(leader) or self._passed_over(leader)
@@ -183,10 +180,10 @@ class _Search:
             return plain
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
             return proposal.estimate > total + math.log(1.0 - self.settings.included)
-        # scores beside fits of as many faults as the leader are from past what lets it rise
-        rises = len(proposal.faults) <= len(leader.faults)
-        rise = float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken)) if rises else 0.0
-        return proposal.estimate > total - near - (mistaken if plain else rise)
+        rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
+        if len(proposal.faults) > len(leader.faults) and not plain:  # scored beside a fit that has risen already
+            rise = 0.0
+        return proposal.estimate > total - near - rise
 
     def _renewed(self, fit: Fit, whole: bool = True) -> Fit:
         """A fit with derivatives of its own, where these do not make it worse."""
@@ -200,8 +197,7 @@ class _Search:
             return fit
         right = min(f.posterior.scale for f in (leader or fit, fit)) <= self.settings.right
         # where a fit keeps what its start foretold, derivatives of its own would say the same
-        surprise = abs(self._log_probability(fit) - start.estimate)
-        worth = min(self.settings.worth_derivatives, self.settings.foretold * surprise)
+        worth = min(Deciding.worth_derivatives, Deciding.foretold * abs(self._log_probability(fit) - start.estimate))
         nats = self.settings.mistaken if start.coarse else worth if right else 0.0
         tenable_first = right and leader is None  # whether it is tenable tells none that has not arrived
         if not (tenable_first or self._near(fit, fit.posterior.promised, nats)):
@@ -253,9 +249,8 @@ class _Search:
     def _log_prior(self, faults: Sequence[Fault]) -> float:
         """Log prior of an explanation: by its number of faults, spread over names, then over a name's places."""
         sets = max(1, math.comb(len(self.places), len(faults)))
-        spread = sets * math.prod(self.places[fault.name] for fault in faults)
-        terms = sum(fault.is_term for fault in faults)
-        return math.log(self.settings.prior[len(faults)] / spread) + terms * math.log(self.settings.term)
+        spread = sets * math.prod(self.places[fault.name] for fault in faults) / self.settings.prior[len(faults)]
+        return sum(fault.is_term for fault in faults) * math.log(self.settings.term) - math.log(spread)
 
     def _propose_singles(self) -> None:
         """Every fault by itself, from the baseline as stated; the paths of those that lead are asked for further on."""

@@ -72,8 +72,7 @@ class Deciding:
     mistaken = 25.0
     #: Nats by which a fit is better than another of the same explanation.
     better = 1.0
-    #: Nats behind the leader within which a fit gets derivatives of its own, at the most and per nat by which it is
-    #: off its score: those from its start foretell the rest as well as they have foretold the way there.
+    #: Nats behind the leader within which a fit gets derivatives of its own, at the most and per nat off its score.
     worth_derivatives, foretold = 15.0, 5.0
     #: Scale of the likeliest single fault above which it is taken for wrong, and faults that begin with a coarse start.
     suspect, coarse = 0.4, 5

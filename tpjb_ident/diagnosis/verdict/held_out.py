@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, FloatArray
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Fault
-from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, prediction
+from tpjb_ident.diagnosis.comparison.unknowns import prediction
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap, noise_floor
@@ -83,46 +82,44 @@ def _share(after: float, before: float, floor: float) -> float:
 
 def held_out_gap(run: Map, fit: Fit) -> HeldOut:
     """Solve a model with amplitudes from all other points, without its generic terms, every tolerance as stated."""
-    theta = np.clip(_from_others(fit), fit.unknowns.low, fit.unknowns.high)
-    faults = [fault for fault in fit.faults if not fault.is_term]
-    without = [[other for other in faults if other is not fault] for fault in faults]
-    places = [(faults, False), *((chosen, True) for chosen in (faults, *without) if faults)]
-    stated, *solved = run(prediction, [_at(fit, theta, *place) for place in places])
+    unknowns = fit.unknowns
+    theta = np.clip(_from_others(fit), unknowns.low, unknowns.high)
+    parts = list(zip(fit.faults, unknowns.slices, strict=True))
+    known = [(fault, at) for fault, at in parts if not fault.is_term]
+    there = _neutral(theta, *(at for fault, at in parts if fault.is_term))
+    places = [_neutral(there, unknowns.tolerances), there, *(_neutral(there, at) for _, at in known)]
+    stated, whole, *partial = run(prediction, [(fit.faults, place) for place in places])
     if stated is None:
         return HeldOut(fit, None)
-    moved = [] if any(one is None for one in solved) else zip(faults, solved[1:], strict=False)
-    touched = [_touched(fit, theta, fault, (part, solved[0])) for fault, part in moved]
+    moved = [] if any(one is None for one in (whole, *partial)) else zip(known, partial, strict=True)
+    touched = [_touched(fit, theta, fault, (part, whole)) for (fault, _), part in moved]
     return HeldOut(fit, stated * fit.problem.sigma, tuple(sorted(touched, key=lambda one: -one.remaining)))
 
 
-def _at(fit: Fit, theta: FloatArray, faults: Sequence[Fault], free: bool) -> tuple[tuple[Fault, ...], FloatArray]:
-    """Some faults of a fit at the amplitudes in `theta`; tolerances where it has them, or not `free`: as stated."""
-    unknowns = Unknowns(fit.problem, faults)
-    there = np.zeros(len(unknowns.width))
-    if free:
-        there[unknowns.amplitudes + fit.unknowns.tolerances - fit.unknowns.amplitudes] = theta[fit.unknowns.tolerances]
-    for fault, at in zip(fit.faults, fit.unknowns.slices, strict=True):
-        if fault in faults:
-            there[unknowns.slices[unknowns.faults.index(fault)]] = theta[at]
-    return unknowns.faults, there
+def _neutral(theta: FloatArray, *parts: slice | IntArray) -> FloatArray:
+    """Free numbers with some of them where nothing happens, (k,)."""
+    out = theta.copy()
+    for part in parts:
+        out[part] = 0.0
+    return out
 
 
 def _touched(fit: Fit, theta: FloatArray, fault: Fault, ends: tuple[FloatArray, FloatArray]) -> Touched:
     """Project the gap on what a fault moves, seen through noise, model error and all tolerances that are stated.
 
-    `ends`: predictions without it and with it, where the other points put the tolerances. Their derivatives count from
-    there back to what is stated: a gap at stated ones would hold their curvature, which no covariance has.
+    `ends`: predictions without it and with it, where the other points put the tolerances, which derivatives count back
+    to what is stated: no covariance has how they bend.
     """
-    (without, whole), free = ends, fit.unknowns.tolerances
-    held, stated = fit.problem.held, fit.linear.jacobian[:, free]
-    gap_there = fit.problem.measured - whole + stated @ theta[free]
+    (without, whole), free, held = ends, fit.unknowns.tolerances, fit.problem.held
+    stated = fit.linear.jacobian[:, free]
+    rest = fit.problem.measured - whole + stated @ theta[free]
     for rows in (held, np.ones_like(held)):
         moved = (whole - without)[rows]
         weights = np.linalg.solve(_covariance(fit, rows, stated[rows]), moved)
         size = math.sqrt(max(float(weights @ moved), 1e-300))
         if size >= Deciding.visible:
             break
-    after = float(weights @ gap_there[rows]) / size
+    after = float(weights @ rest[rows]) / size
     return Touched(fault.label, abs(after + size), abs(after), rows is held and not held.all())
 
 
