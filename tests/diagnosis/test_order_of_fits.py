@@ -217,8 +217,8 @@ def test_a_fit_gets_derivatives_of_its_own_where_it_leads_or_is_off_its_score(mo
     assert bool(asked) == renewed
 
 
-@pytest.mark.parametrize(("rise", "times"), [(0.5, 1), (5.0, 2)])
-def test_after_a_coarse_start_derivatives_are_asked_again_where_they_pay(monkeypatch, rise, times):
+@pytest.mark.parametrize(("rise", "times"), [(-5.0, 1), (-0.5, 2), (5.0, 2)])
+def test_after_a_coarse_start_derivatives_are_asked_again_unless_they_were_refused(monkeypatch, rise, times):
     asked = []
 
     def refined(run, fit, whole):

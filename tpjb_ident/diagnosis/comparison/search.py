@@ -207,8 +207,8 @@ class _Search:
             if not self._near(fit, fit.posterior.total, 0.0):
                 return fit
         again = self._renewed(fit)
-        rose = again.posterior.total > fit.posterior.total + Deciding.better
-        return self._renewed(again) if start.coarse and rose else again  # those from before a jump led here
+        # those from before a jump led here; refused once, they would be refused again
+        return self._renewed(again) if start.coarse and again is not fit else again
 
     def _fit(self, proposal: Start) -> None:
         """Fit a proposal; one that leads and is surely wrong, or stopped at a jump, once more with a coarse start."""
