@@ -28,7 +28,7 @@ from model.tilt_hold import friction_limits, tilt_hold
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
 
-#: Turns of pressure and deformation, and the share of the deformation at which they end.
+#: Turns of pressure and deformation at most, and the share of a deformation, or of a temperature, at which turns end.
 _MOST_TURNS, _SETTLED = 40, 1e-7
 #: Halvings of the amplitude with which a pivot with friction vibrates.
 _HALVINGS = 60
@@ -309,7 +309,7 @@ def _following_heat(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega
     """What a temperature that follows the motion adds to a pad's film, (n, 2, 2)."""
     wedge = (film.pad.pad_clearance, *film.approach(equilibrium.position))
     running = film.running(equilibrium.surface_speed, setup.bearing.oil)
-    return np.array([heat_impedance(film.grid, film.work, wedge, running, float(w)) for w in omega])
+    return np.array([heat_impedance(film.grid, film.work, wedge, running, float(w), _SETTLED) for w in omega])
 
 
 def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:

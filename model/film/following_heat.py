@@ -26,8 +26,8 @@ from model.film.slopes import flow_changes, force_of, keep_ruptured
 from model.interpolation import largest
 from rigdata.arrays import ComplexArray, FloatArray
 
-#: Turns of pressure and heat, and the change of temperature at which they end, as a share of the temperature.
-_MOST_TURNS, _SETTLED = 60, 1e-7
+#: Turns of pressure and heat at most.
+_MOST_TURNS = 60
 
 
 class _Film(NamedTuple):
@@ -41,8 +41,10 @@ class _Film(NamedTuple):
 
 
 @compiled
-def heat_impedance(grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Running, omega: float) -> ComplexArray:
-    """What the temperature that follows adds to a film's impedance."""
+def heat_impedance(
+    grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Running, omega: float, settled: float
+) -> ComplexArray:
+    """What the temperature that follows adds to a film's impedance; it ends when it changes by a share `settled`."""
     shape, unknowns = work.pressure.shape, len(work.unknown)
     film = _Film(grid, work, running, conductances(grid, work, wedge), np.empty(shape))
     out, loss = np.zeros((2, 2), dtype=np.complex128), np.empty(shape, dtype=np.complex128)
@@ -60,7 +62,7 @@ def heat_impedance(grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Runnin
         for i in range(shape[0]):
             thicker[i] = -grid.cos[i] if axis == 0 else -grid.sin[i]
         warmer, pressure, answer = nothing, nothing.copy(), np.zeros(unknowns, dtype=np.complex128)
-        settled = False
+        ended = False
         for _ in range(_MOST_TURNS):
             for k in range(unknowns):
                 frozen = work.slopes[k, axis] + 1j * omega * work.slopes[k, 2 + axis]
@@ -70,11 +72,11 @@ def heat_impedance(grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Runnin
             asked, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
             warmer = fields[0]
             _pressure(film, 0.0 * thicker, warmer, nothing, omega, answer)
-            if asked < _SETTLED * size:
-                settled = True
+            if asked < settled * size:
+                ended = True
                 break
         out[:, axis] = force_of(grid, grid.area, answer.reshape((-1, 1)))[:, 0]
-        if not settled:
+        if not ended:
             out[:, axis] = np.nan
     return out
 

@@ -58,6 +58,8 @@ _FAILURES = {FILM_LOST: "film lost", BOUNDLESS_HEAT: "heat without bounds", SING
 _SWINGING = 0.3
 #: Share of the clearance that tells a place from a fold.
 _EVEN = 1e-6
+#: Share to which a film whose heat follows is known, where only the sign of a determinant is asked for.
+_TOLD = 1e-4
 #: Rows of a pad's loaded attitudes at most.
 _ROWS = 400
 
@@ -324,7 +326,7 @@ class Search:
         film = self.films[m]
         wedge = (float(self.pads.clearance[m]), *self.state.wedge[m].tolist())
         running = film.running(self.surface_speed, self.setup.bearing.oil)
-        return np.asarray(heat_impedance(film.grid, film.work, wedge, running, 0.0).real)
+        return np.asarray(heat_impedance(film.grid, film.work, wedge, running, 0.0, _TOLD).real)
 
     def _heat_across(self, relaxation: float) -> float:
         """Temperatures across the films for their pressures; returns the largest change asked for [K]."""
