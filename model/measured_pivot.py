@@ -67,6 +67,8 @@ class MeasuredPivot(_Law):
     deflection_points: FloatArray
     name: str = "measured"
     includes_housing: bool = True
+    #: Largest load of its dry test [N].
+    valid_to: float = math.inf
     #: (5, n): Loads, and from each on the cubic's coefficients, highest power first.
     curve: FloatArray = field(init=False, repr=False, compare=False)
 

@@ -281,7 +281,7 @@ def _read_pad(table: Any, name: str, housing: bool) -> tuple[int, MeasuredPivot]
             raise ValueError(f"valid from {low:g} to {high:g} N")
         force = np.array([_number(value, "force_N") for value in table["force_N"]])
         points = np.array([_number(value, "deflection_m") for value in table["deflection_m"]])
-        law = MeasuredPivot(force, points, str(table.get("law", "measured")), housing)
+        law = MeasuredPivot(force, points, str(table.get("law", "measured")), housing, high)
     except (KeyError, TypeError, ValueError, OverflowError) as error:  # whole numbers of 400 digits overflow
         raise BearingError(f"{place}: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
     return number, law

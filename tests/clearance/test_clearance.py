@@ -20,6 +20,7 @@ from rigdata.virtual_rig import (
 )
 from tests.clearance.cases import ANGLES, CLEARANCE, OtherRun, bearing_centre, rig, sphere
 from tpjb_ident.clearance.measure import (
+    _inseparable,
     coldest_first,
     measure_clearance,
     measure_run,
@@ -169,6 +170,32 @@ def test_a_polygon_says_how_far_the_probes_gains_are_known(whole):
     found = measure_run(OtherRun(run, channels=channels), ANGLES).relative_calibration
     assert found[0] == pytest.approx(0.01 / np.sqrt(2))  # between two probes
     assert np.all((found >= found[0] - 1e-12) & (found < 0.01))
+
+
+def test_unequal_probes_are_made_alike_and_their_difference_is_in_the_interval(opened):
+    source = opened(rig(clearance=(80e-6,) * 5, faults=(Fault("scaled", channel="X1A", value=1.03),)))
+    found = measure_clearance(source, ANGLES)
+    (words,) = [s.detail for s in found.status if s == "probe-gains-differ"]
+    assert "X1A read" in words
+    assert "more than X1B" in words
+    # uncorrected, the sides stand up to 1.6 um from one another: no pad is worn
+    assert "irregular" not in found.status
+    assert np.ptp(found.clearance) < 0.6e-6
+    assert found.fitted_angle == pytest.approx(ANGLES, abs=2e-3)
+    errors = 1.96 * np.hypot(found.clearance_se, found.relative_calibration * found.clearance)
+    assert np.all(np.abs(found.clearance - 80e-6) < errors)
+
+
+def test_a_sweep_of_three_or_four_pads_says_what_it_leaves_open(whole):
+    found = measure_run(whole[0].of_kind("clearance")[0], ANGLES)
+    sides = SimpleNamespace(pads=np.arange(3), distance=found.clearance[:3], covariance=np.eye(3) * 1e-16)
+    assert "only their mean" in _inseparable(sides, found)
+    square = replace(found, angles=np.radians([-90.0, 0.0, 90.0, 180.0]), clearance=found.clearance[:4])
+    square = replace(square, relative_calibration=np.zeros(4))
+    sides = SimpleNamespace(pads=np.arange(4), distance=np.array([80, 80, 88, 80]) * 1e-6, covariance=np.eye(4) * 1e-16)
+    assert "nothing tells which: pad #1 +8.0 µm, pad #2 -8.0 µm, pad #3 +8.0 µm" in _inseparable(sides, square)
+    sides.distance = np.full(4, 80e-6)
+    assert _inseparable(sides, square) == ""
 
 
 def test_a_clean_sweep_is_measured_to_a_tenth_of_a_micrometre(opened):

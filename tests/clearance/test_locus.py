@@ -122,6 +122,24 @@ def test_intervals_hold_how_well_the_shaft_comes_back_where_repeats_tell_it(camp
     assert 0.93 < np.mean(inside) < 0.98
 
 
+@pytest.mark.parametrize("way", ["jump", "drift"])
+def test_a_shaft_that_moves_within_a_record_is_known_no_better_than_it_moves(campaign, way):
+    steady, source = (Repeated(campaign, [], np.zeros((6, 2))) for _ in range(2))
+    run = source.runs[2]
+
+    def moved(time):
+        since = (time - time[0]) / (time[-1] - time[0])
+        return np.outer(since > 0.5 if way == "jump" else since, [7e-6, -4e-6])
+
+    source.runs[2] = OtherRun(run, moved, id="l-2")
+    found = measure_locus(source)
+    (words,) = [s.detail for s in found.status if s == "misfit"]
+    assert "l-2 " in words
+    still, moving = ({p.run: p for p in measure_locus(s).points}["l-2"] for s in (steady, source))
+    assert np.all(np.abs(moving.position - still.position) < 1.96 * np.sqrt(np.diag(moving.covariance)))
+    assert "misfit" not in measure_locus(steady).status
+
+
 def test_loads_off_their_set_point_are_named(opened):
     heavier = Fault("wrong_load", run="l-*-02", value=1.2)
     source = opened(locus_points(4), faults=(heavier,), clearance=())

@@ -11,6 +11,7 @@ import pytest
 
 from model.bearing_file import load_bearing
 from model.effects import Effect
+from model.pivots import measured_pivots
 from model.predict import predict
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.predictions import (
@@ -115,7 +116,8 @@ def test_thermal_growth_is_not_seen_by_the_cold_clearance(bearing):
 
 @pytest.mark.parametrize(("loads", "beyond"), [((4e3, 4e3), False), ((4e3, 12e3), True)])
 def test_a_prediction_says_where_a_pivot_is_pressed_harder_than_in_its_dry_test(loads, beyond):
-    laws = (SimpleNamespace(valid_to=5000.0), SimpleNamespace(valid_to=4800.0))
+    table = {"force_N": [500.0, 6000.0], "deflection_m": [1e-6, 9e-6]}
+    laws = measured_pivots([table | {"pad": k, "valid_to_N": top} for k, top in ((1, 5000.0), (2, 4800.0))], "dry")
     assert pressed_beyond(laws, loads) == beyond
 
 

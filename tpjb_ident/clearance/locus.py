@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_nois
 from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples, usable_runs
 from tpjb_ident.phasors.windows import line_design
 from tpjb_ident.presentation import Presented
+from tpjb_ident.rounding import listed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,6 +36,8 @@ _NOISE_RUNS = 8  # that noise is learnt from, spread over the test
 _SAME_DIRECTION = math.radians(1.0)
 _LOAD_MISS = 0.05  # relative, between set point and measured load
 _DIRECTION_MISS = math.radians(5.0)
+_STEADY = 3.0  # standard deviations of what a shaft that stands changes within a record, and at least
+_LEAST_MOVE = 0.5e-6  # [m]: a smaller change is of no consequence
 
 
 @dataclass(frozen=True)
@@ -162,17 +165,23 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     noise = _noise(records)
     centre = np.zeros(2) if polygon is None else np.asarray(polygon.centre)
     repeats = _repeats(records, orders, noise, centre)
+    moved = [_moved(record, noise) for record in records]
     # with the bearing's centre from the same probes their zero falls out
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
     centre_covariance = zero if polygon is None else polygon.centre_covariance
     points = []
-    for (run, record), order in zip(usable, orders, strict=True):
+    for (run, record), order, size in zip(usable, orders, moved, strict=True):
         position = record.position - np.nan_to_num(repeats.drift) * order - centre
         variance = noise.mean_variance(record.span) + repeats.scatter + order**2 * repeats.drift_variance
+        # of a steady way the ends are as far from the mean as the halves from each other
+        variance += size**2 / 4.0
         covariance = variance * np.eye(2) + centre_covariance
         points.append(LocusPoint(run.id, record.point, record.load, record.direction, position, covariance))
     points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
-    status = (*_status(points, polygon, repeats.count), *refused_runs(problems))
+    on_its_way = [
+        f"halves of {run.id} stand {1e6 * size:.2g} µm apart" for (run, _), size in zip(usable, moved) if size
+    ]
+    status = (*_status(points, polygon, repeats.count, listed(on_its_way, 4)), *refused_runs(problems))
     return Locus(tuple(points), centre, repeats.drift, status)
 
 
@@ -247,6 +256,19 @@ def _noise(records: Sequence[_Record]) -> NoiseModel:
     return estimate_noise(series, _DRIFT_RATE)
 
 
+def _moved(record: _Record, noise: NoiseModel) -> float:
+    """How far apart the means of both halves of a record are [m]; zero where the shaft stands."""
+    time = record.blocks[0].time
+    late = time > 0.5 * (time[0] + time[-1])
+    if late.all() or not late.any():
+        return 0.0
+    contrast = late / late.sum() - ~late / (~late).sum()
+    steady = replace(noise, drift=0.0).covariance(time, record.blocks[0].duration)
+    size = math.hypot(*(float(contrast @ series.values) for series in record.blocks))
+    ordinary = _STEADY * math.sqrt(2.0 * float(contrast @ steady @ contrast))
+    return size if size > max(ordinary, _LEAST_MOVE) else 0.0
+
+
 def _repeats(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, centre: FloatArray) -> _Repeats:
     """Drift and scatter by least squares, with a place of its own for every set point.
 
@@ -283,8 +305,10 @@ def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
     return same and turn < _SAME_DIRECTION
 
 
-def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, repeats: int) -> tuple[Condition, ...]:
-    """Named conditions of a locus."""
+def _status(
+    points: list[LocusPoint], polygon: ClearancePolygon | None, repeats: int, moved: str
+) -> tuple[Condition, ...]:
+    """Named conditions of a locus; `moved`: runs whose shaft does not stand."""
     missed, behind = [], []
     for p in points:
         load_miss = abs(p.load - p.point.static_load) / max(p.point.static_load, 1.0)
@@ -301,4 +325,5 @@ def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, repeats:
         (repeats == 1, "scatter-unknown", f"one load direction was repeated; {not_held}"),
         (missed, "load-off-set-point", ", ".join(missed)),
         (behind, "outside-polygon", ", ".join(behind)),
+        (moved, "misfit", moved),
     )

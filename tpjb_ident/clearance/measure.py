@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import FloatArray, IntArray
 from rigdata.problem import refuse
 from rigdata.vector import directions
-from tpjb_ident.clearance.polygon import SideFit, corners, find_centre, fit_sides, gain_ratio
+from tpjb_ident.clearance.polygon import SideFit, alike, corners, find_centre, fit_sides, gain_ratio
 from tpjb_ident.clearance.sweep import ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
@@ -199,9 +199,16 @@ def measure_run(
     fit = fit_sides(contact, angles, pads, curves)
     polygon = _polygon(run, contact, angles, fit)
     probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
-    status = (*_status(fit, polygon), *_gains_differ(probes, polygon), *_extrapolated(contact.push, curves))
-    calibration = np.array([relative_calibration(probes, float(angle)) for angle in angles])
-    return replace(polygon, status=status, relative_calibration=calibration)
+    ratio, differ = _gains_differ(probes, polygon)
+    if differ:
+        axes = float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)
+        fit = alike(fit, angles, axes, ratio)
+        polygon = _polygon(run, contact, angles, fit)
+    # which of two unequal probes is right is as unknown as how far they are apart
+    calibration = [np.hypot(relative_calibration(probes, float(angle)), 0.5 * ratio) for angle in angles]
+    polygon = replace(polygon, relative_calibration=np.array(calibration))
+    status = (*_status(fit, polygon), *differ, *_extrapolated(contact.push, curves))
+    return replace(polygon, status=status)
 
 
 def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideFit) -> ClearancePolygon:
@@ -210,9 +217,10 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
     centre = find_centre(angles[fit.pads], fit.distance, covariance)
     # clearance = (I - n G) distance on the reached pads: the centre's error is the same sides' error
     map_ = np.eye(len(n)) - n @ centre.gain[:2]
+    unknown = np.einsum("ki,ij,kj->k", n, centre.covariance, n)
     # a centre that makes clearances equal hides their differences: none is better known than the common clearance
     common = np.sqrt(centre.gain[2] @ covariance @ centre.gain[2])
-    se = np.maximum(np.sqrt(np.diag(map_ @ covariance @ map_.T)), common)
+    se = np.hypot(np.maximum(np.sqrt(np.diag(map_ @ covariance @ map_.T)), common), np.sqrt(unknown))
     columns = np.full((6, len(angles)), np.nan)
     columns[:, fit.pads] = np.array([fit.distance - n @ centre.position, se, fit.deflection, fit.deflection_se,
                                      angles[fit.pads] + fit.tilt, fit.tilt_se])  # fmt: skip
@@ -224,7 +232,7 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
         point=run.point,
         angles=angles,
         centre=centre.position,
-        centre_covariance=centre.gain[:2] @ covariance @ centre.gain[:2].T + drift,
+        centre_covariance=centre.gain[:2] @ covariance @ centre.gain[:2].T + drift + centre.covariance,
         clearance=clearance,
         clearance_se=clearance_se,
         clearance_pushed=clearance + deflection,
@@ -240,17 +248,19 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
     )
 
 
-def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple[Condition, ...]:
-    """One probe reads more than the other: sizes do not tell, the angles between the sides do."""
+def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple[float, tuple[Condition, ...]]:
+    """One probe reads more than the other, by which share: sizes do not tell, the angles between the sides do."""
     if len(probes) != 2:
-        return ()
+        return 0.0, ()
     first, second = probes
     axes = (float(first.axis or 0.0), float(second.axis or 0.0))
     ratio, se = gain_ratio(polygon.angles, polygon.fitted_angle - polygon.angles, polygon.fitted_angle_se, axes)
+    if not abs(ratio) > max(_UNEQUAL, _GAIN_ERRORS * se):
+        return 0.0, ()
     share = f"{100 * abs(ratio):.1f} % (se {100 * se:.1f} %)"
     more = "more" if ratio > 0 else "less"
-    detail = f"the sides stand as if {first.name} read {share} {more} than {second.name}"
-    return holding((abs(ratio) > max(_UNEQUAL, _GAIN_ERRORS * se), "probe-gains-differ", detail))
+    detail = f"the sides stand as if {first.name} read {share} {more} than {second.name}; half of it is taken off each"
+    return ratio, (Condition("probe-gains-differ", detail),)
 
 
 def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Condition, ...]:
@@ -284,19 +294,38 @@ def _status(fit: SideFit, polygon: ClearancePolygon) -> tuple[Condition, ...]:
     disagrees = abs(fit.scale - 1.0) > max(_IRREGULAR * fit.scale_se, _DISAGREES)
     give = f"they deflect {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say"
     offsets = polygon.clearance - np.nanmedian(polygon.clearance)
+    errors = np.hypot(polygon.clearance_se, polygon.relative_calibration * polygon.clearance)
     # below half a micrometre a difference between pads is of no consequence, however well it is measured
-    deviating = np.flatnonzero(np.abs(offsets) > np.maximum(_IRREGULAR * polygon.clearance_se, 0.5e-6))
-    listed = ", ".join(f"pad #{k + 1} {1e6 * offsets[k]:+.1f} µm" for k in deviating)
+    deviating = np.flatnonzero(np.abs(offsets) > np.maximum(_IRREGULAR * errors, 0.5e-6))
+    listed = _offsets(deviating, offsets[deviating])
     turn = float(np.mean(fit.tilt))
     is_turned = abs(turn) > max(_IRREGULAR * np.sqrt(np.mean(fit.tilt_se**2) / len(fit.pads)), 5e-3)
     return holding(
         (missing, "pads-not-reached", missing),
+        (inseparable := _inseparable(fit, polygon), "pads-not-separable", inseparable),
         (np.isnan(fit.scale), "give-from-sweep", "no pivot curves, zero load extrapolated from the sweep alone"),
         (disagrees, "pivots-disagree", give),
         (listed, "irregular", f"{listed} from the median of all: worn, damaged or wrongly assembled"),
         (is_turned, "frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"),
         (fit.misfit > 4.0, "misfit", "the scatter exceeds the noise"),
     )
+
+
+def _offsets(pads: IntArray, offsets: FloatArray) -> str:
+    """How far pads (k,) from 0 stand off, (k,) [m], in words."""
+    return ", ".join(f"pad #{pad + 1} {1e6 * offset:+.1f} µm" for pad, offset in zip(pads, offsets, strict=True))
+
+
+def _inseparable(fit: SideFit, polygon: ClearancePolygon) -> str:
+    """What the sides of three or four pads leave open; empty where they are alike or there are more of them."""
+    if len(fit.pads) == 3:
+        return "three pads fit every centre: equal clearances are assumed, only their mean is measured"
+    suspects = find_centre(polygon.angles[fit.pads], fit.distance, fit.covariance).suspects
+    gains = (polygon.relative_calibration * polygon.clearance)[fit.pads]
+    error = np.sqrt(np.trace(fit.covariance) + np.sum(gains**2))
+    if np.abs(suspects).max() < max(_IRREGULAR * error, 0.5e-6):
+        return ""
+    return f"one of four is off, and nothing tells which: {_offsets(fit.pads, suspects)}"
 
 
 def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> pd.DataFrame:

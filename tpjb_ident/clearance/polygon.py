@@ -17,12 +17,15 @@ from their common value. A single pad that stands off is then found exactly, and
 which is what `physics.md` means by ``pad_offset``. Differences within the measurement error are averaged. (By least
 squares a single pad off by D would show as 0.6 D on that pad, 0.32 D on the two opposite and -0.12 D on the two beside
 it, of five.)
+
+Of four pads any one may be the one that stands off, and nothing tells which: the centre is that of least squares, and
+its error reaches to every such explanation. Three pads fit any centre: their differences are lost.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,6 +44,7 @@ _TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files ar
 _SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
 _SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
 _CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the deflection, where no curve says it
+_AS_DEVIATION = 1 / 1.6  # an explanation is one of few: as a standard deviation it is this part of its distance
 _CLIP = 5.0  # robust standard deviations
 _SLIDING = 0.03  # of the deflection: while the shaft slides, its next pad may already carry a little
 
@@ -52,6 +56,8 @@ class Centre:
     position: FloatArray  #: (2,) [m]
     clearance: float  #: common to all sides [m]
     gain: FloatArray  #: (3, n) of position and clearance with respect to the distances
+    covariance: FloatArray  #: (2, 2) of the position, by explanations that nothing tells apart [m^2]
+    suspects: FloatArray  #: (n,) by how much each pad stands off if it alone does; zero where the pads tell [m]
 
 
 def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArray) -> Centre:
@@ -60,10 +66,24 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
         raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
     error = _EQUAL_WITHIN * np.sqrt(np.maximum(np.diag(covariance), 1e-20))
-    # Huber's weights with the bend at the measurement error: absolute beyond it, square within
-    solution, weights, _, _ = reweighted(design, distances, lambda u: huber_weight(u, 1.0), error, 1e-12, 400)
-    gain = np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights)
-    return Centre(solution[:2], float(solution[2]), np.asarray(gain, dtype=float))
+    weights = np.ones(len(angles))
+    if len(angles) > 4:  # Huber's, with the bend at the measurement error: absolute beyond it, square within
+        weights = reweighted(design, distances, lambda u: huber_weight(u, 1.0), error, 1e-12, 400)[1]
+    gain = np.asarray(np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights), dtype=float)
+    solution = gain @ distances
+    return Centre(solution[:2], float(solution[2]), gain, *_explanations(design, distances, solution))
+
+
+def _explanations(design: FloatArray, distances: FloatArray, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Covariance (2, 2) [m^2] and offsets (n,) [m] of the centres that leave one of four pads off, each another one."""
+    suspects, shifts = np.zeros(len(design)), np.zeros((len(design), 3))
+    for pad in range(len(design)) if len(design) == 4 else ():
+        others = np.delete(np.arange(4), pad)
+        shifts[pad] = np.linalg.solve(design[others], distances[others]) - solution
+        suspects[pad] = distances[pad] - design[pad] @ (solution + shifts[pad])
+    # two of the four lie along each axis
+    covariance = 0.5 * _AS_DEVIATION**2 * shifts[:, :2].T @ shifts[:, :2]
+    return covariance, suspects
 
 
 def corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:
@@ -90,13 +110,10 @@ def gain_ratio(
     which no common turn of the frame imitates. A gain that both probes share leaves all directions as they are.
     """
     usable = np.isfinite(tilt) & np.isfinite(tilt_se) & (tilt_se > 0)
-    rows = directions(np.array(axes))
-    if usable.sum() < 4 or abs(np.linalg.det(rows)) < 0.05:
+    if usable.sum() < 4 or abs(np.linalg.det(directions(axes))) < 0.05:
         return np.nan, np.nan
-    n = directions(angles)[usable]
-    probe, dual = rows[0], np.linalg.inv(rows)[:, 0]
-    shear = -(n @ dual) * (n[:, 0] * probe[1] - n[:, 1] * probe[0])
-    design = np.column_stack([np.ones(len(n)), shear]) / tilt_se[usable, None]
+    shear = _stretch(angles[usable], axes)[1]
+    design = np.column_stack([np.ones(len(shear)), shear]) / tilt_se[usable, None]
     target = tilt[usable] / tilt_se[usable]
     covariance = np.linalg.inv(design.T @ design)
     solution = covariance @ design.T @ target
@@ -104,11 +121,33 @@ def gain_ratio(
     return float(solution[1]), float(np.sqrt(covariance[1, 1] * max(chi_square, 1.0)))
 
 
+def _stretch(angles: FloatArray, axes: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Part (n,) of a gain of the first probe that sides show along their normals, and by which they turn [rad]."""
+    n, rows = directions(angles), directions(axes)
+    probe, dual = rows[0], np.linalg.inv(rows)[:, 0]
+    return (n @ dual) * (n @ probe), -(n @ dual) * (n[:, 0] * probe[1] - n[:, 1] * probe[0])
+
+
+def alike(fit: SideFit, angles: FloatArray, axes: tuple[float, float], ratio: float) -> SideFit:
+    """The sides as two probes would show them that read alike; nothing tells which is wrong: each has half of it."""
+    along, turn = _stretch(angles[fit.pads], axes)
+    # what one probe reads less the other reads more: along a side the parts of both are one together
+    scale = 1.0 - ratio * (along - 0.5)
+    foot = directions(angles[fit.pads]) @ fit.foot
+    return replace(
+        fit,
+        distance=foot + scale * (fit.distance - foot),
+        tilt=fit.tilt - ratio * turn,
+        deflection=scale * fit.deflection,
+    )
+
+
 @dataclass(frozen=True)
 class SideFit:
     """The r sides of the pads that a sweep reached, from the probes' zero."""
 
     pads: IntArray  #: (r,) from 0
+    foot: FloatArray  #: (2,) about which the sides were turned [m]
     distance: FloatArray  #: (r,) [m]
     covariance: FloatArray  #: (r, r) of the distances [m^2]
     tilt: FloatArray  #: (r,) [rad]
@@ -134,7 +173,7 @@ def fit_sides(
     contact: ContactIntervals, angles: FloatArray, pads: IntArray, curves: Sequence[PivotCurve] | None
 ) -> SideFit:
     """Fit the sides of the pads (r,) that a sweep reached: angles (n,) [rad] of all pads."""
-    place = _place_along_side(contact, angles, pads)
+    place, foot = _place_along_side(contact, angles, pads)
     usable = np.isin(contact.pad, pads) & _consistent(contact, place)
     used, place = contact.take(usable), place[usable]
     noise = _noise(used, place)
@@ -158,7 +197,7 @@ def fit_sides(
         share = np.divide(mean_carried, full, out=np.zeros(r), where=full > 0)
         distances = distances + np.diag((share * deflection_se) ** 2)
     return SideFit(
-        pads, distance, distances, tilt, tilt_se, deflection, deflection_se, scale, scale_se, noise, misfit
+        pads, foot, distance, distances, tilt, tilt_se, deflection, deflection_se, scale, scale_se, noise, misfit
     )  # fmt: skip
 
 
@@ -187,12 +226,12 @@ def _pivot_terms(
     return columns, np.array([_SHAPE_SPREAD, _SCALE_SPREAD]) ** -2, np.array([0.0, 1.0])
 
 
-def _place_along_side(contact: ContactIntervals, angles: FloatArray, pads: IntArray) -> FloatArray:
-    """Place (m,) on each side, from the foot of the polygon's centre."""
+def _place_along_side(contact: ContactIntervals, angles: FloatArray, pads: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Place (m,) on each side, from the foot of the polygon's centre, and that centre (2,) [m]."""
     far = np.array([np.quantile(contact.along[contact.pad == k], 0.9) for k in pads])
     design = np.column_stack([directions(angles[pads]), np.ones(len(pads))])
     centre = np.linalg.lstsq(design, far, rcond=None)[0][:2]
-    return np.asarray(contact.across - (directions(angles + 0.5 * np.pi) @ centre)[contact.pad])
+    return np.asarray(contact.across - (directions(angles + 0.5 * np.pi) @ centre)[contact.pad]), centre
 
 
 def _smooth_side(contact: ContactIntervals, place: FloatArray) -> FloatArray:
