@@ -38,6 +38,9 @@ _LOAD_MISS = 0.05  # relative, between set point and measured load
 _DIRECTION_MISS = math.radians(5.0)
 _STEADY = 3.0  # standard deviations of what a shaft that stands changes within a record, and at least
 _LEAST_MOVE = 0.5e-6  # [m]: a smaller change is of no consequence
+_UNLIKE = 0.5  # share by which a bearing may answer a turned or larger load otherwise than a round one does
+_OFF_CENTRE = 5.0e-6  # [m] beyond what the pads' clearances differ by: one soft pivot moves the middle by some 2 um
+_AROUND = math.radians(100.0)  # largest gap between directions of a locus that goes around
 
 
 @dataclass(frozen=True)
@@ -177,10 +180,15 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
         variance += size**2 / 4.0
         covariance = variance * np.eye(2) + centre_covariance
         points.append(LocusPoint(run.id, record.point, record.load, record.direction, position, covariance))
+    off = np.zeros(2) if polygon is None else _off_centre(points, polygon)
+    # nothing tells whether the zero moved before the sweep, after it or within: the interval holds the way
+    points = [replace(p, covariance=p.covariance + np.outer(off, off)) for p in points]
     points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
     on_its_way = [
         f"halves of {run.id} stand {1e6 * size:.2g} µm apart" for (run, _), size in zip(usable, moved) if size
     ]
+    if off.any():
+        on_its_way.append(f"positions go around a place {1e6 * math.hypot(*off):.2g} µm from the polygon's centre")
     status = (*_status(points, polygon, repeats.count, listed(on_its_way, 4)), *refused_runs(problems))
     return Locus(tuple(points), centre, repeats.drift, status)
 
@@ -269,24 +277,48 @@ def _moved(record: _Record, noise: NoiseModel) -> float:
     return size if size > max(ordinary, _LEAST_MOVE) else 0.0
 
 
+def _off_centre(points: Sequence[LocusPoint], polygon: ClearancePolygon) -> FloatArray:
+    """Middle (2,) [m] of the positions under one load that goes around; zero where it may be the polygon's.
+
+    Equal pads all around leave it at the centre, whatever film and pivots do; unequal ones move it by less than they
+    differ.
+    """
+    groups: dict[object, list[LocusPoint]] = {}
+    for point in points:
+        groups.setdefault((point.point.static_load, point.point.spin), []).append(point)
+    largest = max(groups.values(), key=len)
+    turn = np.exp(1j * np.array([p.load_direction for p in largest]))
+    angles = np.sort(np.angle(turn))
+    if np.diff(angles, append=angles[0] + 2.0 * np.pi).max() > _AROUND:
+        return np.zeros(2)
+    place = np.array([p.position for p in largest]) @ [1.0, 1j]
+    middle = np.linalg.lstsq(np.column_stack([np.ones(len(turn)), turn]), place, rcond=None)[0][0]
+    error = math.sqrt(float(np.median([np.trace(p.covariance) for p in largest])))
+    limit = _OFF_CENTRE + float(np.ptp(polygon.clearance[np.isfinite(polygon.clearance)])) + _STEADY * error
+    return np.array([middle.real, middle.imag]) if abs(middle) > limit else np.zeros(2)
+
+
 def _repeats(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, centre: FloatArray) -> _Repeats:
     """Drift and scatter by least squares, with a place of its own for every set point.
 
     Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number. A
-    repeat meets its set point otherwise than the first time: by as much, times its distance from the centre, the shaft
-    may stand elsewhere without any drift. What two repeats or more leave beyond that and the noise is scatter; with
-    few of them it is as much larger as Student's interval is wider than the normal one.
+    repeat meets its set point otherwise than the first time: the shaft follows the load around the centre, and by half
+    of its change away from it, give or take a half of either. What two repeats or more leave beyond that and the noise
+    is scatter; with few of them it is as much larger as Student's interval is wider than the normal one.
     """
     same = np.array([[_same_set_point(a.point, b.point) for b in records] for a in records])
     firsts = same.argmax(axis=0)
     count = len(records) - len(np.unique(firsts))
     if count == 0:
         return _Repeats(0, np.full(2, np.nan))
-    places, loads = np.array([r.position for r in records]), np.array([r.load for r in records])
-    pull = loads * np.exp([1j * r.direction for r in records])
+    pull = np.array([r.load * np.exp(1j * r.direction) for r in records])
     met = pull / np.where(pull[firsts] == 0, 1e-300, pull[firsts])
-    miss = np.hypot(np.abs(met) - 1, np.angle(met))
-    elsewhere = miss * np.hypot(*(places[firsts] - centre).T)
+    more, turn = np.abs(met) - 1, np.angle(met)
+    place = np.array([r.position for r in records]) @ [1.0, 1j]
+    along = place[firsts] - centre @ [1.0, 1j]
+    elsewhere = _UNLIKE * np.hypot(more, turn) * np.abs(along)
+    place = place - (0.5 * more + 1j * turn) * along
+    places = np.stack([place.real, place.imag], axis=1)
     variance = np.array([noise.mean_variance(r.span) for r in records]) + elsewhere**2
     member = (firsts[:, None] == np.unique(firsts)).astype(float)
     within = np.eye(len(member)) - member @ (member / member.sum(axis=0)).T
@@ -308,7 +340,7 @@ def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
 def _status(
     points: list[LocusPoint], polygon: ClearancePolygon | None, repeats: int, moved: str
 ) -> tuple[Condition, ...]:
-    """Named conditions of a locus; `moved`: runs whose shaft does not stand."""
+    """Named conditions of a locus; `moved`: of shafts that do not stand, and a zero that did not."""
     missed, behind = [], []
     for p in points:
         load_miss = abs(p.load - p.point.static_load) / max(p.point.static_load, 1.0)
