@@ -80,6 +80,10 @@ def test_sentences_name_the_largest_change_and_points_without_a_partner():
     first, *more = difference_sentences(apart)
     assert first == "a and b have no operating point in common."
     assert more[-1].startswith("Without a partner: a: 5 kN at -90°, shaft at 22 Hz (1320 rpm), 25 Hz; b: 6 kN")
+    other = side("b", TRUE)
+    mirrored = replace(other, coefficients=other.coefficients.assign(rotation="clockwise"))
+    *_, last = difference_sentences(difference_of(side("a", TRUE), mirrored))
+    assert "b: 5 kN at -90°, shaft at 22 Hz (1320 rpm) clockwise, 25 Hz" in last
 
 
 @pytest.mark.slow

@@ -21,7 +21,8 @@ from tpjb_ident.compare.predictions import (
     printed_formula,
 )
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
-from tpjb_ident.compare.summary import _extrapolation_sentence
+from tpjb_ident.compare.summary import _clearance_sentence, _extrapolation_sentence
+from tpjb_ident.conditions import Condition
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 HZ = 2 * math.pi
@@ -119,6 +120,21 @@ def test_a_prediction_says_where_a_pivot_is_pressed_harder_than_in_its_dry_test(
     table = {"force_N": [500.0, 6000.0], "deflection_m": [1e-6, 9e-6]}
     laws = measured_pivots([table | {"pad": k, "valid_to_N": top} for k, top in ((1, 5000.0), (2, 4800.0))], "dry")
     assert pressed_beyond(laws, loads) == beyond
+
+
+def test_the_summary_claims_no_more_of_a_clearance_than_the_sweep_tells(bearing):
+    def sentences(*status, clearance=(80e-6,) * 5):
+        clearance = SimpleNamespace(clearance=np.array(clearance), status=status)
+        return _clearance_sentence(SimpleNamespace(clearance=clearance, bearing=bearing))
+
+    assert sentences() == ["The measured clearance is that of the drawing, within 0 µm at every pad."]
+    (three,) = sentences(Condition("pads-not-separable", "three pads fit every centre"))
+    assert "on the mean; three pads fit every centre" in three
+    assert "every pad" not in three
+    gains = Condition("probe-gains-differ", "the sides stand as if X1A read 3 % more")
+    words = sentences(gains, clearance=(81e-6, 81e-6, 83e-6, 81e-6, 81e-6))
+    assert any("X1A read 3 % more" in sentence for sentence in words)
+    assert any("at pad #3" in sentence for sentence in words)
 
 
 def test_the_summary_says_where_pivots_are_pressed_harder_than_in_their_dry_tests():

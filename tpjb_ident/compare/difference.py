@@ -136,11 +136,14 @@ def _same_instrument(name: str, a: Side, b: Side) -> bool:
 
 def _alone(side: Side, used: IntArray) -> list[str]:
     rest = side.coefficients.drop(index=side.coefficients.index[used])
-    return [
-        f"{side.name}: {amount(row['static_load_N'], 'load')} at {row['static_load_direction_deg']:g}°, "
-        f"shaft at {spinning(row['shaft_speed_Hz'])}, {row['excitation_Hz']:g} Hz"
-        for row in rest.to_dict("records")
-    ]
+    points = []
+    for row in rest.to_dict("records"):
+        sense = " clockwise" if row.get("rotation") == ROTATIONS[1] else ""
+        points.append(
+            f"{side.name}: {amount(row['static_load_N'], 'load')} at {row['static_load_direction_deg']:g}°, "
+            f"shaft at {spinning(row['shaft_speed_Hz'])}{sense}, {row['excitation_Hz']:g} Hz"
+        )
+    return points
 
 
 def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.DataFrame:

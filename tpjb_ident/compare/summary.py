@@ -175,14 +175,23 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
     if not np.isfinite(off).any():
         return []
     pad = int(np.nanargmax(np.abs(off)))
+    digits, unit = 1 if size("length") < 1e-5 else 3, symbol("length")
+    mean, median, worst = (
+        signed(per("length") * float(v), digits) for v in (np.nanmean(off), np.nanmedian(off), off[pad])
+    )
+    status = comparison.clearance.status
+    remarks = [f"The clearance sweep: {c.detail}." for c in status if c == "probe-gains-differ"]
+    inseparable = [c.detail for c in status if c == "pads-not-separable"]
+    if inseparable:
+        first = f"The measured clearances differ from the drawing by {mean} {unit} on the mean; {inseparable[0]}."
+        return [first, *remarks]
     if abs(off[pad]) < _AS_DRAWN:
         within = amount(abs(off[pad]), "length", ".1g")
-        return [f"The measured clearance is that of the drawing, within {within} at every pad."]
-    digits, unit = 1 if size("length") < 1e-5 else 3, symbol("length")
-    median, worst = (signed(per("length") * float(v), digits) for v in (np.nanmedian(off), off[pad]))
+        return [f"The measured clearance is that of the drawing, within {within} at every pad.", *remarks]
     return [
+        *remarks,
         f"The measured clearance differs from the drawing by {worst} {unit} at pad #{pad + 1}, where it differs most "
-        f"(median of all pads {median} {unit})."
+        f"(median of all pads {median} {unit}).",
     ]
 
 
