@@ -44,7 +44,9 @@ _TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files ar
 _SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
 _SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
 _CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the deflection, where no curve says it
-_AS_DEVIATION = 1 / 1.6  # an explanation is one of few: as a standard deviation it is this part of its distance
+_AS_DEVIATION = (
+    1 / 1.4
+)  # of an explanation: as a standard deviation its distance times this holds it in any arrangement
 _CLIP = 5.0  # robust standard deviations
 _SLIDING = 0.03  # of the deflection: while the shaft slides, its next pad may already carry a little
 
@@ -81,7 +83,7 @@ def _explanations(design: FloatArray, distances: FloatArray, solution: FloatArra
         others = np.delete(np.arange(4), pad)
         shifts[pad] = np.linalg.solve(design[others], distances[others]) - solution
         suspects[pad] = distances[pad] - design[pad] @ (solution + shifts[pad])
-    # two of the four lie along each axis
+    # of pads at right angles two of the four lie along each axis
     covariance = 0.5 * _AS_DEVIATION**2 * shifts[:, :2].T @ shifts[:, :2]
     return covariance, suspects
 
