@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -25,6 +26,7 @@ from tests.seeds import first_quick
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, merge, reach
 from tpjb_ident.check.lines import excitation_line, other_line, steady_level
+from tpjb_ident.check.observation import _at_rest
 from tpjb_ident.check.signals import check_signal, is_spare
 from tpjb_ident.check.wiring import definiteness, explanation, indefiniteness, plane_of, pointing, repairs
 from tpjb_ident.identification.identify import identify
@@ -317,3 +319,19 @@ def test_what_one_of_many_static_runs_shows_stays_its_own():
     assert reports(["clearance", "dynamic", "dynamic"], [0]) == [1, 1, 1]
     assert reports(["dry_pivot"] * 5 + ["dynamic"], [1]) == [0, 1, 0, 0, 0, 0]
     assert reports(["dry_pivot"] * 5 + ["dynamic"], [1, 2, 3]) == [0, 1, 1, 1, 0, 1]
+
+
+def test_an_accelerometer_across_the_drive_may_read_nothing():
+    """Where the housing does not move; not along the drive, not where both are dead, not on a floating housing."""
+    axes = {"displacement": (45.0, 135.0), "force": (0.0, 90.0), "acceleration": (0.0, 90.0)}
+    channels = tuple(Channel(f"{q} {a:g}", q, axis=math.radians(a)) for q, pair in axes.items() for a in pair)
+
+    def resting(force, acceleration):
+        z = np.array([[[1e-6, 1e-6, *force, *acceleration]]] * 5, dtype=complex)
+        places = {"force": [2, 3], "acceleration": [4, 5]}
+        return _at_rest(SimpleNamespace(z=z, channels=channels, pick=places.get), 30.0)
+
+    assert resting((900.0, 2.0), (0.1, 0.0)) == {"acceleration 90"}
+    assert resting((900.0, 900.0), (1.0, 0.0)) == set()
+    assert resting((900.0, 2.0), (0.0, 0.0)) == set()
+    assert resting((900.0, 2.0), (15.0, 0.0)) == set()

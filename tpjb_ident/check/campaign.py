@@ -54,7 +54,7 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
         return _sorted(error.problems)
     observations: list[Observation] = []
     for count, run in enumerate(campaign.runs, start=1):
-        observations.append(observe(run))
+        observations.append(observe(run, mass=campaign.housing_mass))
         if progress is not None:
             progress(count, len(campaign.runs))
     observations, conditions = judged(campaign, observations)

@@ -14,6 +14,7 @@ from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
+from rigdata.vector import directions
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.lines import (
     RecordLines,
@@ -43,6 +44,10 @@ OFF_SET_POINT = 0.02
 NO_NOISE = "no noise"
 #: Samples that tell the quantiles of a channel, and whether it has noise.
 _SPREAD = 8192
+#: Share of the force below which the housing's inertia is not missed.
+_NO_INERTIA = 1e-3
+#: Inertia over force below which a housing stands on its cells.
+_ON_CELLS = 0.1
 
 
 @dataclass(frozen=True)
@@ -100,10 +105,11 @@ class Observation:
         return bool(np.any((size > 8 * self.lines.floor[places]) & (size > 0)))
 
 
-def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Observation:
+def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0, mass: float = 0.0) -> Observation:
     """Read every channel of `run` once, block by block, and judge each by itself.
 
-    `phasors` are those of identification, of which an excitation line is meant; without them a dynamic run is fitted.
+    `phasors` are those of identification, of which an excitation line is meant; without them a dynamic run is fitted,
+    and `mass` is the housing's [kg].
     """
     report = Reporter(run)
     try:
@@ -125,8 +131,10 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
     noise_free = bool(first) and _is_noise_free(run, live, used, lines)
     if noise_free:
         report.ask(NO_NOISE)
+    at_rest = frozenset() if phasors is None else _at_rest(phasors, phasors.housing_mass or mass)
     for name in first:
-        check_signal(report, run.channels[name], statistics[name], noise_free, alive)
+        if not (name in at_rest and statistics[name].constant):
+            check_signal(report, run.channels[name], statistics[name], noise_free, alive)
     speeds = [first[n] for n, c in run.channels.items() if n in first and c.quantity == "speed"]
     speed = next((float(np.nanmedian(values)) for values in speeds if np.isfinite(values).any()), math.nan)
     observation = Observation(run, report, digest=digest, speed=speed)
@@ -189,6 +197,27 @@ def _read_block(
             severity: Severity = "error" if needed(run, channel) else "warning"
             report.take([replace(problem, severity=severity) for problem in error.problems])
     return blocks
+
+
+def _at_rest(phasors: RunPhasors, mass: float) -> frozenset[str]:
+    """Accelerometers along which the cells push so little that the housing's inertia is nothing beside the force.
+
+    What they would show is that of the others, as the forces along both are.
+    """
+    cells = phasors.pick("force")
+    accelerometers = phasors.pick("acceleration")
+    if not phasors.z.size or len(cells) < 2 or len(accelerometers) < 2:
+        return frozenset()
+    line = np.nan_to_num(phasors.z[:, 0])
+    force = line[:, cells] @ plane_of([phasors.channels[k] for k in cells]).T
+    along = directions([phasors.channels[k].axis or 0.0 for k in accelerometers])
+    push = np.median(np.abs(force @ along.T), axis=0)
+    missed = _NO_INERTIA * float(np.median(np.linalg.norm(force, axis=1)))
+    size = mass * np.median(np.abs(line[:, accelerometers]), axis=0)
+    inertia = float(np.max(size / np.maximum(push, max(missed, 1e-300))))
+    # a housing that hangs free moves without a push
+    still = (0.0 < inertia < _ON_CELLS) & (inertia * push < missed)
+    return frozenset(phasors.channels[k].name for k, rests in zip(accelerometers, still) if rests)
 
 
 def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: RecordLines) -> bool:
