@@ -308,8 +308,9 @@ def _axial_tilt(setup: Setup, film: PadFilm) -> AxialTilt:
 def _following_heat(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
     """What a temperature that follows the motion adds to a pad's film, (n, 2, 2)."""
     wedge = (film.pad.pad_clearance, *film.approach(equilibrium.position))
-    running = film.running(equilibrium.surface_speed, setup.bearing.oil)
-    return np.array([heat_impedance(film.grid, film.work, wedge, running, float(w), _SETTLED) for w in omega])
+    return np.array(
+        [heat_impedance(film.grid, film.work, wedge, equilibrium.running, float(w), _SETTLED) for w in omega]
+    )
 
 
 def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:

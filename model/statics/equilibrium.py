@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from model.conditions import has_answer
+from model.film.oil_state import Running
 from model.statics.pad_film import PadFilm
 from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
@@ -33,7 +33,7 @@ class Equilibrium:
     temperature_residual: float
     journal_temperature: float
     status: tuple[Condition, ...]
-    surface_speed: float
+    running: Running  #: What every film runs with for itself.
     begun: Begun
 
     @property
@@ -43,16 +43,14 @@ class Equilibrium:
 
     @property
     def mean_journal_temperature(self) -> float:
-        """The journal's temperature, or the mean over the films that carry where it takes no heat [degC]."""
+        """The journal's temperature, or where it takes no heat that of the films that carry, by area [degC].
+
+        The oil's where it enters if none does.
+        """
         if math.isfinite(self.journal_temperature):
             return self.journal_temperature
-        return mean_temperature(self.films)
-
-
-def mean_temperature(films: Sequence[PadFilm]) -> float:
-    """Mean temperature of the films that carry, by area [degC]; the oil's where it enters if none does."""
-    carrying = [f for f in films if not f.idle]
-    if not carrying:
-        return films[0].inlet
-    area = sum(float(f.grid.area.sum()) for f in carrying)
-    return sum(float((f.grid.area * f.work.temperature).sum()) for f in carrying) / area
+        carrying = [f for f in self.films if not f.idle]
+        if not carrying:
+            return self.films[0].inlet
+        area = sum(float(f.grid.area.sum()) for f in carrying)
+        return sum(float((f.grid.area * f.work.temperature).sum()) for f in carrying) / area

@@ -11,7 +11,6 @@ import numpy as np
 from model.bearing import Oil, Pad
 from model.film.cross_film import CrossFilm, cross_film
 from model.film.mesh import FilmGrid, FilmWork, OilConstants, film_grid, film_works
-from model.film.oil_state import Running
 from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces
 from model.pad.bending import PadDeformation, pad_deformation
@@ -39,7 +38,6 @@ class PadFilm:
     deflection: float = 0.0
     idle: bool = False
     forces: FilmForces | None = None
-    kept: float = 1.0
     rupture: str = "swift-stieber"
     resting: RestingFilm | None = None
     cross: CrossFilm | None = None
@@ -72,13 +70,6 @@ class PadFilm:
         a = self.rigid_approach(position) - self.deflection
         b = float(self.tangent @ position) + self.pivot_radius * self.tilt
         return a, b
-
-    def running(self, surface_speed: float, oil: Oil) -> Running:
-        """What the film runs with.
-
-        What a share of the heat does, all of it does to oil that takes up more per kelvin.
-        """
-        return Running(surface_speed, oil_constants(oil), (oil.specific_heat / self.kept, oil.conductivity / self.kept))
 
 
 def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFilm | None]:
@@ -113,7 +104,6 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFil
                 inlet=setup.inlet_temperature,
                 bent=bent[k],
                 deformation=pad_deformation(pad, bearing, grid, setup.options.conduction) if solid else None,
-                kept=1.0 - setup.heat_loss,
                 rupture=rupture_of(setup),
                 cross=None if crosses is None else CrossFilm(crosses.edges, *(values[k] for values in crosses[1:])),
             )
@@ -141,12 +131,6 @@ def axial_shape(grid: FilmGrid) -> FloatArray:
     pivot hold.
     """
     return np.outer(grid.cos, grid.z)
-
-
-def aligned_tilt(setup: Setup, pivot_angle: float) -> float:
-    """Axial tilt at which a pad lies along the shaft [rad]."""
-    angle, toward = setup.misalignment
-    return angle * math.cos(pivot_angle - toward)
 
 
 def rupture_of(setup: Setup) -> str:

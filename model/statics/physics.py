@@ -27,23 +27,29 @@ def couples_heat(setup: Setup) -> bool:
     )
 
 
-def case_of(setup: Setup, load: FloatArray, surface_speed: float, heat: float) -> Case:
-    """The numbers of a search; `heat` is the share of the heat that the films keep."""
+def running_of(setup: Setup, surface_speed: float, heat: float) -> Running:
+    """What every film runs with for itself; `heat` is the share of the heat that the films keep.
+
+    What a share of the heat does, all of it does to oil that takes up more per kelvin.
+    """
+    oil, kept = setup.bearing.oil, (1.0 - setup.heat_loss) * heat
+    specific = math.inf if setup.thermal == "isothermal" else oil.specific_heat / kept
+    return Running(float(surface_speed), oil_constants(oil), (specific, oil.conductivity / kept))
+
+
+def case_of(setup: Setup, load: FloatArray, running: Running, heat: float) -> Case:
+    """The numbers of a search; `running` and `heat` as of `running_of`."""
     oil, growth, length = setup.bearing.oil, setup.growth, setup.bearing.length
     kept, supply = (1.0 - setup.heat_loss) * heat, float(setup.inlet_temperature)
     thermal = ISOTHERMAL if setup.thermal == "isothermal" else ALONE
     if couples_heat(setup):
         thermal = ACROSS if setup.thermal == "thd" else COUPLED
-    carried = (oil.specific_heat, oil.conductivity)
-    if thermal == ALONE:  # what a share of the heat does, all of it does to oil that takes up more per kelvin
-        carried = (oil.specific_heat / kept, oil.conductivity / kept)
-    if thermal == ISOTHERMAL:
-        carried = (math.inf, oil.conductivity)
+        running = running._replace(heat=(oil.specific_heat, oil.conductivity))
     model, bends = FILM_MODELS[rupture_of(setup)], setup.flexible_pads or setup.pads_follow
     plain = model == SWIFT_STIEBER and not (couples_heat(setup) or bends)
     return Case(
         load=np.array(load, dtype=float),
-        running=Running(float(surface_speed), oil_constants(oil), carried),
+        running=running,
         hold=hold_numbers(setup),
         accuracy=float(setup.accuracy),
         thermal=thermal,

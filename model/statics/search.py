@@ -47,9 +47,9 @@ from model.statics.compiled.start import first_position, pivot_curve
 from model.statics.conditions import status_of
 from model.statics.cross_heat import settle_cross_temperatures
 from model.statics.equilibrium import Begun, Equilibrium
-from model.statics.pad_film import aligned_tilt, axial_shape, pad_films
+from model.statics.pad_film import axial_shape, pad_films
 from model.statics.pad_flow import through_flow
-from model.statics.physics import bodies_of, case_of, couples_heat
+from model.statics.physics import bodies_of, case_of, couples_heat, running_of
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Condition
 
@@ -73,23 +73,18 @@ class Search:
         if setup.growth is not None:  # the clearances of a journal as warm as the supply
             cold = setup.change(bearing=grown(setup.bearing, setup.growth, supply, supply))
         self.films, self.works, self.grids, self.crosses = pad_films(cold)
-        for film in self.films:
-            film.kept *= heat
         self.other: BoolArray = np.zeros(len(self.films), dtype=np.bool_)  #: Pads of another equilibrium.
         #: Of every pad its curve's first point that counts, and the temperatures along the curve.
         self.rises: list[tuple[int, FloatArray]] = []
-        self.case = case_of(setup, self.load, self.surface_speed, heat)
+        #: What every film runs with for itself.
+        self.running = running_of(setup, speed * setup.bearing.journal_radius, heat)
+        self.case = case_of(setup, self.load, self.running, heat)
         self.bodies = bodies_of(setup, self.case, self.films)
         self.pads = self._pads()
         self.state = self._state()
         self.operator = None
         if self.crosses is not None:
             self.operator = CrossOperator.place(*self.crosses.temperature.shape[1:])
-
-    @property
-    def surface_speed(self) -> float:
-        """Of the journal [m/s]."""
-        return self.speed * self.setup.bearing.journal_radius
 
     def _pads(self) -> PadStack:
         films, count = self.films, len(self.films)
@@ -114,7 +109,8 @@ class Search:
         axial = np.zeros(n)
         if self.case.axial:
             if not any(self.case.hold):  # nothing holds it: that is nearly there
-                axial[:] = [aligned_tilt(self.setup, f.pad.pivot_angle) for f in self.films]
+                lean, toward = self.setup.misalignment
+                axial[:] = [lean * math.cos(f.pad.pivot_angle - toward) for f in self.films]  # along the shaft
             for film, tilt in zip(self.films, axial.tolist(), strict=True):
                 film.work.extra[:] += tilt * axial_shape(film.grid)
         zeros: dict[str, Any] = {name: np.zeros(n) for name in ("tilt", "deflection", "passed", "least")}
@@ -145,12 +141,9 @@ class Search:
     def _find_curves(self) -> None:
         """Find the curve of every pad's loaded attitudes; pads that are alike share it."""
         load = max(float(np.hypot(*self.load)), 1.0)
-        case, oil = self.case, self.setup.bearing.oil
-        # what the films run with, each for itself
-        cold = case.thermal == ISOTHERMAL
-        running = case.running if cold else self.films[0].running(self.surface_speed, oil)
-        size = self.setup.bearing.journal_radius**2 * self.setup.bearing.length
-        viscosity = float(oil.viscosity(case.supply))
+        bearing, running, supply = self.setup.bearing, self.running, self.case.supply
+        size = bearing.journal_radius**2 * bearing.length
+        viscosity = float(bearing.oil.viscosity(supply))
         pads, alike = self.pads, dict[tuple[int, float, int], int]()
         for m, film in enumerate(self.films):
             clearance, law = float(pads.clearance[m]), self.setup.pivots[m]
@@ -159,8 +152,8 @@ class Search:
                 pads.rows[m], pads.attitudes[m] = pads.rows[first], pads.attitudes[first]
                 self.rises.append(self.rises[first])
                 continue
-            curve = attitudes(film.grid, clearance, running, case.supply, load)
-            unit = viscosity * self.surface_speed * size / clearance**2
+            curve = attitudes(film.grid, clearance, running, supply, load)
+            unit = viscosity * running.speed * size / clearance**2
             gives = np.empty(0)
             if pads.laws[m, 0] == OTHER:
                 gives = np.array([law.deflection(w) for w in (curve.load * unit).tolist()])
@@ -176,6 +169,7 @@ class Search:
         pads, state = self.pads, self.state
         state.position[:], loaded, self.other = first_position(self.case.load, pads)
         state.idle[:] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
+        self.idle_by_curves = int(state.idle.sum())
         self.load_pads(loaded)
         begun = (state.position, state.tilt, state.deflection, self.works.temperature)
         self.begun = Begun(*(values.copy() for values in begun))
@@ -183,12 +177,6 @@ class Search:
             values[~loaded] = math.nan
         if np.any(pads.rows < 2):  # the place is of none that carries without a curve
             self.begun.position[:] = math.nan
-
-    def idle_by_curves(self) -> int:
-        """How many pads carry nothing where the curves carry the load."""
-        if self.case.hold.flexure > 0.0 or not self.state.idle.any():
-            return 0
-        return int(np.sum(~first_position(self.case.load, self.pads)[1]))
 
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
@@ -235,7 +223,7 @@ class Search:
                 film.work.ruptured[:] = False
                 wedge = (float(pads.clearance[m]), float(pads.attitudes[m, 1, 0]), 0.0)
                 set_viscosity(film.work, self.case.running.oil)
-                film.forces = solve_film(film.grid, film.work, wedge, self.surface_speed, False)
+                film.forces = solve_film(film.grid, film.work, wedge, self.running.speed, False)
                 even.append(film.number)
         return even
 
@@ -325,8 +313,7 @@ class Search:
             return np.zeros((2, 2))
         film = self.films[m]
         wedge = (float(self.pads.clearance[m]), *self.state.wedge[m].tolist())
-        running = film.running(self.surface_speed, self.setup.bearing.oil)
-        return np.asarray(heat_impedance(film.grid, film.work, wedge, running, 0.0, _TOLD).real)
+        return np.asarray(heat_impedance(film.grid, film.work, wedge, self.running, 0.0, _TOLD).real)
 
     def _heat_across(self, relaxation: float) -> float:
         """Temperatures across the films for their pressures; returns the largest change asked for [K]."""
@@ -368,10 +355,10 @@ class Search:
             names.append(named("pads {pads} neither stick nor slide at rest", largest.tolist()))
         if code != SETTLED:
             names.append(named("not converged"))
-        status = status_of(self.setup, self.load, films, self.surface_speed, float(figures[BACKFLOW]), names)
+        status = status_of(self.setup, self.load, films, self.running.speed, float(figures[BACKFLOW]), names)
         return Equilibrium(
             self.state.position.copy(), tuple(films), int(trail[ITERATION]), float(trail[RESIDUAL]), float(trail[HEAT]),
-            float(figures[JOURNAL]), status, self.surface_speed, self.begun,
+            float(figures[JOURNAL]), status, self.running, self.begun,
         )  # fmt: skip
 
 

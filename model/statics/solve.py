@@ -46,7 +46,7 @@ def solve_equilibrium(
             warm = _settled(search, search.run())
             # where pads are left idle that could carry, another start may leave others
             loose = pads_of("pads {pads} cannot keep their load", warm.status)
-            if warm.converged and not loose and sum(f.idle for f in warm.films) <= search.idle_by_curves():
+            if warm.converged and not loose and sum(f.idle for f in warm.films) <= search.idle_by_curves:
                 return warm
     search = _standing(setup, load, speed)
     near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]

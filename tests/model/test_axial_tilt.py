@@ -95,7 +95,7 @@ def test_pivots_that_hold_leave_todays_answer(spherical):
 def test_the_film_by_tilt_is_the_slope_of_its_forces_and_its_damping_is_symmetric(spherical):
     p = run(spherical, toward=0.4)
     film = p.equilibrium.films[0]
-    grid, work, speed = film.grid, film.work, p.equilibrium.surface_speed
+    grid, work, speed = film.grid, film.work, p.equilibrium.running.speed
     wedge, shape = (film.pad.pad_clearance, *film.approach(p.bearing_position)), axial_shape(film.grid)
     solve_film(grid, work, wedge, speed, False)
     still = shape_slopes(grid, work, conductances(grid, work, wedge), shape[:, :, None])[:, 0]

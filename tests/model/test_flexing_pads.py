@@ -79,7 +79,7 @@ class _Marched:
     def __init__(self, p: Prediction, pad: int) -> None:
         film = p.equilibrium.films[pad]
         grid, work, bearing = film.grid, film.work, p.setup.bearing
-        self.speed, self.clearance = p.equilibrium.surface_speed, film.pad.pad_clearance
+        self.speed, self.clearance = p.equilibrium.running.speed, film.pad.pad_clearance
         self.viscosity, self.density = float(work.viscosity[1, 1]), float(work.density[1, 1])
         self.start = np.array(film.approach(p.bearing_position))
         self.angle, z = grid.angle, grid.z
