@@ -50,20 +50,16 @@ def held_along_one_line(films: Sequence[PadFilm]) -> bool:
     return len(normals) > 0 and np.linalg.matrix_rank(normals, tol=1e-6) < 2
 
 
-def overloaded_pads(films: Sequence[PadFilm]) -> list[Condition]:
-    """The pads whose film is too thin, whose pressure too high or whose oil too hot for a pad to live."""
-    pads = [
-        f.number
-        for f in films
-        if not f.idle
-        and (
-            float(f.work.thickness.min()) < _THINNEST_FILM
-            or float(f.work.pressure.max()) > _HIGHEST_PRESSURE
-            or float(f.work.temperature.max()) > HOTTEST_FILM
-        )
-    ]
-    limits = f"{1e6 * _THINNEST_FILM:g} um, {_HIGHEST_PRESSURE / 1e6:g} MPa, {HOTTEST_FILM:g} degC"
-    return [named("overloaded pads {pads}", pads, limits)] if pads else []
+def overloaded_pads(films: Sequence[PadFilm]) -> list[int]:
+    """Numbers of the pads whose film is too thin, whose pressure too high or whose oil too hot for a pad to live."""
+    numbers = []
+    for film in films:
+        work = film.work
+        thin = float(work.thickness.min()) < _THINNEST_FILM
+        pressed = float(work.pressure.max()) > _HIGHEST_PRESSURE
+        if not film.idle and (thin or pressed or float(work.temperature.max()) > HOTTEST_FILM):
+            numbers.append(film.number)
+    return numbers
 
 
 def status_of(
@@ -73,32 +69,35 @@ def status_of(
 
     `speed` of the journal's surface [m/s]; `back`: share of the oil that runs back at a leading edge.
     """
-    names = list(failures)
-    if names and unsupported(setup, load):
-        names.insert(0, named("no pads against the load"))
-    if not names:
-        names += overloaded_pads(films)
-    if idle := [f.number for f in films if f.idle]:
-        names.append(named("idle pads {pads}", idle))
-    if back > 0.0:
-        names.append(named("flow back at a leading edge"))
-    if short := starved(films):
-        ends = "and their films start where it suffices" if films[0].rupture == "jfo" else "and run as if it did"
-        names.append(named("pads {pads} are short of oil", short, ends))
-    return (*names, *regimes(setup, films, speed))
-
-
-def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> list[Condition]:
-    """Named regimes beyond what the equations hold for: pads in each other's way, films not laminar, oil too hot."""
-    names = _misfits(setup)
-    reynolds = largest_reynolds(films, surface_speed)
-    if reynolds > _LAMINAR and setup.options.turbulence == "none":
-        names.append(named("film not laminar: Re {number:.0f}", number=reynolds))
-    warmth = np.array([f.work.temperature for f in films if f.forces is not None])
-    low, high = (float(warmth.min()), float(warmth.max())) if len(warmth) else _OIL_DATA
-    if low < _OIL_DATA[0] or high > _OIL_DATA[1]:
-        names.append(named("oil beyond its data: {number:.0f} degC", number=low if low < _OIL_DATA[0] else high))
-    return names
+    pads = setup.bearing.pads
+    heavy = [] if failures else overloaded_pads(films)
+    limits = f"{1e6 * _THINNEST_FILM:g} um, {_HIGHEST_PRESSURE / 1e6:g} MPa, {HOTTEST_FILM:g} degC"
+    idle, short = [f.number for f in films if f.idle], starved(films)
+    ends = "and their films start where it suffices" if films[0].rupture == "jfo" else "and run as if it did"
+    # pads in the journal's way, or in each other's, stand in bearings built in code: a file is refused
+    narrow = [k for k, p in enumerate(pads, 1) if not p.assembled_clearance + setup.clearance_change > 0.0]
+    meeting = []
+    for number, other, room in pad_rooms(setup.bearing):
+        gap = room - pads[number - 1].arc
+        if gap < 1e-9:
+            meeting.append(named("pads {pads} touch" if gap > -1e-9 else "pads {pads} overlap", (number, other)))
+    reynolds = largest_reynolds(films, speed)
+    swirls = reynolds > _LAMINAR and setup.options.turbulence == "none"
+    warmth = [f.work.temperature for f in films if f.forces is not None] or [np.array(_OIL_DATA)]
+    low, high = float(np.min(warmth)), float(np.max(warmth))
+    cold = low < _OIL_DATA[0]
+    conditions = (
+        (bool(heavy), named("overloaded pads {pads}", heavy, limits)),
+        (bool(idle), named("idle pads {pads}", idle)),
+        (back > 0.0, named("flow back at a leading edge")),
+        (bool(short), named("pads {pads} are short of oil", short, ends)),
+        (bool(narrow), named("interference: no clearance at pads {pads}", narrow)),
+        *((True, condition) for condition in meeting),
+        (swirls, named("film not laminar: Re {number:.0f}", number=reynolds)),
+        (cold or high > _OIL_DATA[1], named("oil beyond its data: {number:.0f} degC", number=low if cold else high)),
+    )
+    against = [named("no pads against the load")] if failures and unsupported(setup, load) else []
+    return (*against, *failures, *(condition for holds, condition in conditions if holds))
 
 
 def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
@@ -111,17 +110,3 @@ def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
         ]
     numbers += [f.resting.reynolds for f in films if f.resting is not None]
     return max((n for n in numbers if math.isfinite(n)), default=math.nan)
-
-
-def _misfits(setup: Setup) -> list[Condition]:
-    """Pads that stand in each other's way, or in the journal's, in a bearing built in code (a file is refused)."""
-    pads = setup.bearing.pads
-    names = []
-    inside = [k for k, p in enumerate(pads, 1) if not p.assembled_clearance + setup.clearance_change > 0.0]
-    if inside:
-        names.append(named("interference: no clearance at pads {pads}", inside))
-    for number, other, room in pad_rooms(setup.bearing):
-        gap = room - pads[number - 1].arc
-        if gap < 1e-9:
-            names.append(named("pads {pads} touch" if gap > -1e-9 else "pads {pads} overlap", (number, other)))
-    return names

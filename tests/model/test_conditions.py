@@ -105,11 +105,11 @@ def test_limits_of_a_pad_are_told_apart(rocker):
     hot = films[1]
     kept = hot.work.temperature[3, 1]
     hot.work.temperature[3, 1] = 151.0
-    assert overloaded_pads(films)[0].pads == (2,)
+    assert overloaded_pads(films) == [2]
     hot.work.temperature[3, 1] = kept
     films[2].work.pressure[5, 0] = 46e6
     films[3].work.thickness[5, 0] = 2e-6
-    assert overloaded_pads(films)[0].pads == (3, 4)
+    assert overloaded_pads(films) == [3, 4]
     films[2].idle = films[3].idle = True  # what carries nothing is not overloaded
     assert overloaded_pads(films) == []
 
