@@ -14,12 +14,11 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from model.film.cross_energy import cross_operator
-from model.film.cross_film import CrossOperator, cross_pressure_change
+from model.film.cross_film import CrossFilm, CrossOperator, cross_pressure_change
 from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
 from model.film.oil_state import edge_flows
 from model.pad.bending import PadDeformation
@@ -37,15 +36,6 @@ _ROUGH_TOLERANCE, _ROUGH = 0.15, 3.0
 _FACE_SHARE = 0.1
 
 
-class CrossAnswer(NamedTuple):
-    """What one film's temperatures are made of: with all else at zero, per kelvin of its inlet, of the journal."""
-
-    fields: FloatArray  #: (nt + 1, n, 3): Of the cells [degC].
-    faces: FloatArray  #: (3, nt + 1, nz + 1): Of the pad's face [degC].
-    outlet: FloatArray  #: (3,): Flow-weighted at the trailing edge [degC].
-    taken: FloatArray  #: (3,): By the journal [W].
-
-
 def settle_cross_temperatures(
     films: list[PadFilm], pads: PadStack, state: PadState, case: Case, relaxation: float, operator: CrossOperator
 ) -> float:
@@ -57,7 +47,7 @@ def settle_cross_temperatures(
     flows = np.empty((n, 2))
     outlets = np.zeros((n, 3))
     taken = np.zeros((n, 3))
-    answers: dict[int, CrossAnswer] = {}
+    answers: dict[int, tuple[FloatArray, FloatArray]] = {}
     journal, around = float(state.figures[JOURNAL]), float(state.inlet.mean())  # what the grooves hold, on the mean
     start = journal if math.isfinite(journal) else case.supply
     for m, film in enumerate(films):
@@ -68,8 +58,9 @@ def settle_cross_temperatures(
         entering, sides = edge_flows(film.grid, film.work, math.inf)
         flows[m] = entering, entering - sides
         far = state.heating[m] > _ROUGH
-        answer = _answer(film, case, (start, float(state.inlet[m]), around), far, state.figures, operator)
-        answers[m], outlets[m], taken[m] = answer, answer.outlet, answer.taken
+        temperatures = (start, float(state.inlet[m]), around)
+        fields, faces, outlets[m], taken[m] = _answer(film, case, temperatures, far, state.figures, operator)
+        answers[m] = fields, faces
     inlets, journal = balance_heat(pads.order, (flows, outlets, taken), state.solved, case.supply, case.mixing)
     change = 0.0
     for m, inlet in enumerate(inlets.tolist()):
@@ -78,9 +69,10 @@ def settle_cross_temperatures(
         state.heating[m] = abs(hotter)
         if m in answers:
             weights = np.array([1.0, inlet, journal])
-            state.heating[m] = _warm(films[m], answers[m], weights, limits)
             film, running = films[m], case.running
             assert film.cross is not None
+            state.heating[m] = _warm(film.cross, answers[m], weights, limits)
+            film.outlet = float(outlets[m] @ weights)
             shift = state.shift[m]
             more = cross_pressure_change(film.grid, film.work, film.cross, running.speed, running.oil, shift)
             state.corrected[m] = state.force[m] + more
@@ -89,17 +81,16 @@ def settle_cross_temperatures(
     return change
 
 
-def _warm(film: PadFilm, answer: CrossAnswer, weights: FloatArray, limits: tuple[float, float]) -> float:
+def _warm(
+    cross: CrossFilm, answer: tuple[FloatArray, FloatArray], weights: FloatArray, limits: tuple[float, float]
+) -> float:
     """Change a film's temperatures by a share of what is asked for, no more than a limit; returns the largest [K]."""
-    cross = film.cross
-    assert cross is not None
-    asked = (answer.fields @ weights).reshape(cross.temperature.shape) - cross.temperature
-    face = np.tensordot(weights, answer.faces, 1) - cross.face
+    asked = (answer[0] @ weights).reshape(cross.temperature.shape) - cross.temperature
+    face = np.tensordot(weights, answer[1], 1) - cross.face
     change = float(np.maximum(np.abs(asked).max(), np.abs(face).max()))
     share = _limited_share(change, limits)
     cross.temperature[:] += share * asked
     cross.face[:] += share * face
-    film.outlet = float(answer.outlet @ weights)
     return change
 
 
@@ -124,10 +115,12 @@ def _answer(
     far: bool,
     figures: FloatArray,
     operator: CrossOperator,
-) -> CrossAnswer:
-    """A film's answers, for the temperatures so far of the journal, the inlet and the oil around the pads.
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """What a film's temperatures are made of: with all else at zero, per kelvin of its inlet, of the journal.
 
-    Which share of its oil runs back where it enters is noted in the figures.
+    Of the cells (nt + 1, n, 3), the pad's face (3, nt + 1, nz + 1), the oil at the trailing edge (3,) [degC], and what
+    the journal takes (3,) [W]; for the temperatures so far of journal, inlet and the oil around the pads. Which share
+    of the oil runs back where it enters is noted in the figures.
     """
     journal, inlet, around = temperatures
     cross, pad, (specific, conductivity) = film.cross, film.deformation, case.running.heat
@@ -155,4 +148,4 @@ def _answer(
         more = conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
         kept[0] += more if math.isfinite(more) else 0.0
     weight = operator.carried / operator.carried.sum()
-    return CrossAnswer(fields, faces, weight.ravel() @ fields[-1], kept)
+    return fields, faces, weight.ravel() @ fields[-1], kept

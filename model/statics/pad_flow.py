@@ -30,10 +30,11 @@ class PadFlow(NamedTuple):
 
 
 def pad_flow(film: PadFilm, oil: Oil) -> PadFlow:
-    """Oil of a pad in a solved equilibrium; NaN where it has no film."""
+    """Oil of a pad where a search has ended; NaN where it has no film."""
     entering, leaving = through_flow(film)
     outlet = outlet_temperature(film)
-    sides = film.inlet if film.idle else _side_temperature(film)
+    work = film.work
+    sides = film.inlet if film.idle else _mixed(work.temperature[:, -1], work.flow_z[:, -1], film.inlet)
     return PadFlow(
         entering / float(oil.density(film.inlet)),
         leaving / float(oil.density(outlet)),
@@ -47,8 +48,6 @@ def through_flow(film: PadFilm) -> tuple[float, float]:
     """What passes the leading edge and the trailing edge [kg/s]; see `edge_flows`."""
     if film.resting is not None:
         return film.resting.flow, film.resting.flow
-    if film.forces is None:
-        return math.nan, math.nan
     entering, sides = edge_flows(film.grid, film.work, _limit(film))
     return entering, entering - sides
 
@@ -74,21 +73,16 @@ def starved(films: Sequence[PadFilm]) -> list[int]:
     return short
 
 
-def _side_temperature(film: PadFilm) -> float:
-    flow, edge = film.work.flow_z[:, -1], film.work.temperature[:, -1]
-    return float((flow * edge).sum() / flow.sum()) if flow.sum() > 0.0 else film.inlet
+def _mixed(temperature: FloatArray, flow: FloatArray, otherwise: float) -> float:
+    """Temperature of oil that leaves along an edge [degC]."""
+    return float(temperature @ flow / flow.sum()) if flow.sum() > 0.0 else otherwise
 
 
 def outlet_temperature(film: PadFilm) -> float:
     """Flow-weighted temperature at the trailing edge [degC]; an idle pad's film heats up by shear alone."""
     if film.resting is not None:
         return film.resting.outlet
-    if film.forces is None:
-        return film.inlet
-    if film.cross is not None:
-        return film.outlet
-    flow = film.work.flow_x[-1]
-    return float(film.work.temperature[-1] @ flow / flow.sum())
+    return film.outlet if film.cross is not None else _mixed(film.work.temperature[-1], film.work.flow_x[-1], math.nan)
 
 
 def _ruptured(work: FilmWork) -> BoolArray:
