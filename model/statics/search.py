@@ -82,9 +82,6 @@ class Search:
         self.bodies = bodies_of(setup, self.case, self.films)
         self.pads = self._pads()
         self.state = self._state()
-        self.operator = None
-        if self.crosses is not None:
-            self.operator = CrossOperator.place(*self.crosses.temperature.shape[1:])
 
     def _pads(self) -> PadStack:
         films, count = self.films, len(self.films)
@@ -229,10 +226,9 @@ class Search:
 
     def start_from(self, start: Equilibrium) -> bool:
         """Take over a neighbour's state, moved as the curves are; False if it has none or its mesh does not fit."""
-        if len(start.films) != len(self.films) or not start.converged:
-            return False
         coupled, state = couples_heat(self.setup), self.state
-        if any(f.work.pressure.shape != o.work.pressure.shape for f, o in zip(self.films, start.films, strict=True)):
+        mesh = self.works.pressure.shape
+        if not start.converged or mesh != (len(start.films), *start.films[0].work.pressure.shape):
             return False
         self.stand()
         # where a pad has no curve, here or there, nothing is moved; pads that friction holds stay where they are held
@@ -276,6 +272,7 @@ class Search:
         """Iterate from where the search stands."""
         memory = fresh_memory(vector_size(self.state, self.case))
         problem = Problem(self.grids, self.bodies, self.pads, self.works, self.state, self.case)
+        operator = None if self.crosses is None else CrossOperator.place(*self.crosses.temperature.shape[1:])
         code = ASKS_OIL
         while code in (ASKS_OIL, ASKS_HEAT, ASKS_LAWS, ASKS_STABLE):
             code = iterate(problem, memory)
@@ -287,7 +284,10 @@ class Search:
                         eddies = turbulent if film.rupture == "turbulent" else (0.0, 0.0)
                         set_cross_viscosity(film.cross, film.work, running.oil, eddies)
             elif code == ASKS_HEAT:
-                memory.trail[HEAT] = self._heat_across(float(memory.trail[RELAXED]))
+                assert operator is not None
+                relaxed = float(memory.trail[RELAXED])
+                change = settle_cross_temperatures(self.films, self.pads, self.state, self.case, relaxed, operator)
+                memory.trail[HEAT] = change
             elif code == ASKS_LAWS:
                 ask_laws(self.setup.pivots, self.pads.laws, self.state.felt[:, 0])
             elif code == ASKS_STABLE:
@@ -315,14 +315,9 @@ class Search:
         wedge = (float(self.pads.clearance[m]), *self.state.wedge[m].tolist())
         return np.asarray(heat_impedance(film.grid, film.work, wedge, self.running, 0.0, _TOLD).real)
 
-    def _heat_across(self, relaxation: float) -> float:
-        """Temperatures across the films for their pressures; returns the largest change asked for [K]."""
-        assert self.operator is not None
-        return settle_cross_temperatures(self.films, self.pads, self.state, self.case, relaxation, self.operator)
-
     def _take_over(self) -> None:
         """Leave the films where the arrays stand."""
-        state, grown_by = self.state, self.setup.growth is not None
+        state = self.state
         for m, film in enumerate(self.films):
             film.tilt = float(state.tilt[m])
             film.deflection = float(state.deflection[m])
@@ -330,15 +325,12 @@ class Search:
             film.axial_tilt = float(state.axial[m])
             film.inlet = float(state.inlet[m])
             film.supplied = float(state.supplied[m])
-            film.forces = film.resting = None
             if self.setup.flexible_pads:
                 film.bent = state.bent[m]
-            if state.solved[m]:
-                forces = state.force[m], state.stiffness[m], state.damping[m]
-                film.forces = FilmForces(*forces, float(state.least[m]), int(state.steps[m]))
-            else:
-                film.resting = RestingFilm(*state.resting[m].tolist())
-            if grown_by:
+            forces = state.force[m], state.stiffness[m], state.damping[m], float(state.least[m]), int(state.steps[m])
+            film.forces = FilmForces(*forces) if state.solved[m] else None
+            film.resting = None if state.solved[m] else RestingFilm(*state.resting[m].tolist())
+            if self.setup.growth is not None:
                 clearance = float(self.pads.clearance[m])
                 assembled = film.pad.assembled_clearance + clearance - film.pad.pad_clearance
                 film.pad = replace(film.pad, pad_clearance=clearance, assembled_clearance=assembled)

@@ -18,7 +18,6 @@ from model.statics.pad_flow import starved
 from model.statics.physics import couples_heat
 from model.statics.search import Search
 from rigdata.arrays import FloatArray
-from rigdata.problem import Condition
 
 #: First share of the load or the heat, where the whole of it finds no equilibrium at once, and the least step on.
 _FIRST_SHARE, _LEAST_STEP = 0.25, 0.02
@@ -101,34 +100,26 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
     if not result.converged or not any(f.idle for f in result.films):
         return result
     refused = set(held)
-    above = search.margins()
     near = _NEAR_SOFT if search.setup.flexible_pads or couples_heat(search.setup) else _NEAR
     while True:
+        above = search.margins()
         doubtful = [m for m, f in enumerate(result.films) if f.idle and above[m] > -near and m not in refused]
         if not doubtful:
-            break
+            return _named(search, result, near, held)
         pad = max(doubtful, key=lambda m: float(above[m]))
         trial = Search(search.setup, search.load, search.speed, search.heat)
         trial.start_from(result)
         trial.case = trial.case._replace(tried=pad)
         trial.load_pads(np.arange(len(trial.films)) == pad)
         other = trial.run()
-        fewer = sum(f.idle for f in other.films) < sum(f.idle for f in result.films)
         refused.add(pad)
         if trial.state.idle[pad] and above[pad] < 0.0 and near == _NEAR:
             # where its own film carries nothing, those of pads with the same curve that stand farther off do not either
             refused.update(m for m in doubtful if search.rises[m] is search.rises[pad])
-        if other.converged and not other.films[pad].idle and (fewer or not _left_above(trial, other, near)):
-            search = trial
-            result = other
-            above = trial.margins()
-    return _named(search, result, near, held)
-
-
-def _left_above(search: Search, result: Equilibrium, near: float) -> list[int]:
-    """Pads (from 0) that idle clearly above their folds."""
-    above = search.margins()
-    return [m for m, f in enumerate(result.films) if f.idle and above[m] > near]
+        idle = trial.state.idle
+        fewer = idle.sum() < sum(f.idle for f in result.films)
+        if other.converged and not idle[pad] and (fewer or not np.any(idle & (trial.margins() > near))):
+            search, result = trial, other
 
 
 def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int]) -> Equilibrium:
@@ -137,28 +128,28 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
     One that would carry where it idles, and carrying pushes the journal off, is left idle where its film opens both
     ways; where it does not, nothing keeps it idle either.
     """
-    names: list[Condition] = []
+    films, above = result.films, search.margins()
     even = search.even_films()
-    unloaded = _left_above(search, result, near)
-    films = result.films
-    off = [m for m in unloaded if m in held or films[m].rigid_approach(result.position) <= 0.0]
-    restless = [m + 1 for m in unloaded if m not in off]
-    off = sorted({*off, *(m for m in held if films[m].idle)})
-    if restless:
-        names = [named("pads {pads} can neither carry nor idle", restless), named("not converged")]
-    elif off:
-        names = [named("pads {pads} cannot keep their load", [m + 1 for m in off])]
-    if even and not restless:
-        names.append(named("pads {pads} stand concentric", even))
-    edge = [m + 1 for m, above in enumerate(search.margins()) if abs(above) < _EDGE and m + 1 not in even]
-    if edge:
-        names.append(named("pads {pads} on the edge of carrying", edge))
-    if search.other.any() and not restless:
-        idling = np.flatnonzero(~search.other) + 1
-        names.append(named("another equilibrium exists", idling.tolist()))
-    if search.case.hold.flexure == 0.0 and conditions.held_along_one_line(films):
-        names.append(named("nothing holds the journal across its load"))
-    return replace(result, status=(*names, *result.status)) if names else result
+    off, restless = [], []
+    for m, film in enumerate(films):
+        opens = film.rigid_approach(result.position) <= 0.0
+        if film.idle and (m in held or (above[m] > near and opens)):
+            off.append(film.number)
+        elif film.idle and above[m] > near:
+            restless.append(film.number)
+    edge = [f.number for f in films if abs(above[f.number - 1]) < _EDGE and f.number not in even]
+    another = search.other.any() and not restless
+    across = search.case.hold.flexure == 0.0 and conditions.held_along_one_line(films)
+    names = (
+        (bool(restless), named("pads {pads} can neither carry nor idle", restless)),
+        (bool(restless), named("not converged")),
+        (bool(off) and not restless, named("pads {pads} cannot keep their load", off)),
+        (bool(even) and not restless, named("pads {pads} stand concentric", even)),
+        (bool(edge), named("pads {pads} on the edge of carrying", edge)),
+        (another, named("another equilibrium exists", (np.flatnonzero(~search.other) + 1).tolist())),
+        (across, named("nothing holds the journal across its load")),
+    )
+    return replace(result, status=(*(name for holds, name in names if holds), *result.status))
 
 
 def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
