@@ -159,10 +159,9 @@ class Search:
             )
             self.rises.append((len(curve.load) - int(pads.rows[m]), curve.rise))
 
-    def stand(self) -> None:
-        """Put journal and pads where the curves carry the load, and films as warm as they are there."""
-        if not self.rises:
-            self._find_curves()
+    def stand(self) -> Search:
+        """Put journal and pads where the curves carry the load, and films as warm as they are there; returns itself."""
+        self._find_curves()
         pads, state = self.pads, self.state
         state.position[:], loaded, self.other = first_position(self.case.load, pads)
         state.idle[:] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
@@ -174,6 +173,7 @@ class Search:
             values[~loaded] = math.nan
         if np.any(pads.rows < 2):  # the place is of none that carries without a curve
             self.begun.position[:] = math.nan
+        return self
 
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
@@ -301,19 +301,15 @@ class Search:
         for m in np.flatnonzero(state.solved).tolist():
             if not is_doubtful(self.case, pads, state, m):
                 continue
-            if not is_stable(self.case, pads, state, m, state.stiffness[m] + self._heat_stiffness(m)):
+            stiffness = state.stiffness[m]
+            if self.case.thermal in (ALONE, COUPLED):  # the temperature follows, and that is known
+                film, wedge = self.films[m], (float(pads.clearance[m]), *state.wedge[m].tolist())
+                stiffness = stiffness + heat_impedance(film.grid, film.work, wedge, self.running, 0.0, _TOLD).real
+            if not is_stable(self.case, pads, state, m, stiffness):
                 moved = True
                 if not rescue(pads, self.works, state, m):
                     let_idle(state, m)
         return moved
-
-    def _heat_stiffness(self, m: int) -> FloatArray:
-        """What a temperature that follows adds to a film's stiffness, (2, 2) [N/m]."""
-        if self.case.thermal not in (ALONE, COUPLED):
-            return np.zeros((2, 2))
-        film = self.films[m]
-        wedge = (float(self.pads.clearance[m]), *self.state.wedge[m].tolist())
-        return np.asarray(heat_impedance(film.grid, film.work, wedge, self.running, 0.0, _TOLD).real)
 
     def _take_over(self) -> None:
         """Leave the films where the arrays stand."""

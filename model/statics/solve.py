@@ -47,11 +47,11 @@ def solve_equilibrium(
             loose = pads_of("pads {pads} cannot keep their load", warm.status)
             if warm.converged and not loose and sum(f.idle for f in warm.films) <= search.idle_by_curves:
                 return warm
-    search = _standing(setup, load, speed)
+    search = Search(setup, load, speed).stand()
     near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]
     result = _settled(search, search.run())
     if near and not result.converged:  # they may find no rest where they carry
-        search = _standing(setup, load, speed)
+        search = Search(setup, load, speed).stand()
         search.let_idle(near)
         other = _settled(search, search.run())
         result = other if other.converged or len(other.status) > len(result.status) else result
@@ -61,13 +61,6 @@ def solve_equilibrium(
         if patient and not result.converged:
             result = attempt(setup, load, speed, result)
     return result
-
-
-def _standing(setup: Setup, load: FloatArray, speed: float, heat: float = 1.0) -> Search:
-    """A search that stands where the curves of the pads carry the load."""
-    search = Search(setup, load, speed, heat)
-    search.stand()
-    return search
 
 
 def _try_sets(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
@@ -82,7 +75,7 @@ def _try_sets(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium)
         return failed
     for size in range(count, 1, -1):
         for pads in itertools.combinations(range(count), size):
-            search = _standing(setup, load, speed)
+            search = Search(setup, load, speed).stand()
             loaded = np.isin(np.arange(count), pads)
             search.load_pads(loaded & (search.pads.rows >= 2))
             search.let_idle(np.flatnonzero(~loaded).tolist())
@@ -156,7 +149,7 @@ def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilib
     """Let pads idle that friction holds where their film loses its load, or whose oil fills no gap: nothing else is."""
     if not setup.friction and math.isinf(setup.bearing.oil.supply_flow):
         return failed
-    search, held = _standing(setup, load, speed), frozenset[int]()
+    search, held = Search(setup, load, speed).stand(), frozenset[int]()
     for _ in range(len(search.films) + 1):
         result = search.run()
         # those that idle where a full gap at their leading edge would take more oil than there is
