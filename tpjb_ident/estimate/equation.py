@@ -105,26 +105,29 @@ def force_rows(rig: Rig, blocks: Blocks, force: ComplexArray) -> ComplexArray:
 def film_columns(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
     """d(T B u) / d(h_xx, h_xy, h_yx, h_yy), complex, (n, m + 2, 4): h at the set point moves h at the run's load."""
     n = len(blocks)
-    h, d = state.h[blocks.point], state.u[:, :2]
+    h = state.h[blocks.point]
     growth = np.ones((n, 2, 2))
     known = state.slope_known[blocks.point]
     size = np.where(h.real == 0.0, 1.0, h.real)
     power = np.clip(state.slope[blocks.point].real / size, -2.0, 2.0)
     growth[known] += (blocks.miss.real[:, None, None] * power)[known]
-    return film_force_rows(rig, blocks, state, entry_forces(growth.reshape(n, 4), d))
+    return film_change_rows(rig, blocks, state, entry_changes(growth.reshape(n, 4)))
 
 
-def entry_forces(size: ComplexArray | FloatArray, d: ComplexArray) -> ComplexArray:
-    """Forces (n, 2, k) of single entries xx, xy, yx, yy of H, over and over, `size` (n, k) each, at the motion d."""
-    force = np.zeros((len(d), 2, size.shape[1]), complex)
-    for k in range(size.shape[1]):
-        force[:, k % 4 // 2, k] = size[:, k] * d[:, k % 2]
-    return force
+def entry_changes(size: ComplexArray | FloatArray) -> ComplexArray:
+    """Changes of H by single entries xx, xy, yx, yy, over and over, `size` (n, k) each, (n, k, 2, 2)."""
+    entries = np.tile(np.eye(4).reshape(4, 2, 2), (size.shape[1] // 4, 1, 1))
+    return np.asarray(size[:, :, None, None] * entries, complex)
 
 
 def entry_sizes(h: ComplexArray) -> ComplexArray:
     """Sizes of the eight numbers of H (n, 2, 2), those of Im h times i, (n, 8)."""
     return np.concatenate([np.abs(h.real), 1j * np.abs(h.imag)], axis=1).reshape(len(h), 8)
+
+
+def film_change_rows(rig: Rig, blocks: Blocks, state: State, changes: ComplexArray) -> ComplexArray:
+    """Changes of H (n, k, 2, 2) in the readings, by their forces at the motion, (n, m + 2, k)."""
+    return film_force_rows(rig, blocks, state, np.einsum("nkij,nj->nik", changes, state.u[:, :2]))
 
 
 def film_force_rows(rig: Rig, blocks: Blocks, state: State, force: ComplexArray) -> ComplexArray:

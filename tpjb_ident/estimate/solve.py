@@ -30,7 +30,7 @@ from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, 
 from tpjb_ident.estimate.parameters import Table
 from tpjb_ident.estimate.scatter import Residuals, Scatter, mixed_dof
 from tpjb_ident.estimate.shape import Shape
-from tpjb_ident.estimate.term import Additive, Fitted, Term
+from tpjb_ident.estimate.term import Additive, FilmTerm, Fitted, Term
 
 #: Steps of Gauss-Newton, at most, and the relative change of H at which it ends.
 _STEPS, _CONVERGED = 18, 1e-9
@@ -326,9 +326,8 @@ class Solver:
             shift = np.zeros_like(blocks.z)
             for term in self.terms:
                 value = state.parameters[term.name]
-                of_film = term.film_change(blocks, state, value)
-                if of_film is not None:
-                    change = change + of_film
+                if isinstance(term, FilmTerm):
+                    change = change + term.film_change(blocks, state, value)
                 elif isinstance(term, Additive):
                     shift = shift + term.shift(blocks, state, value)[:, : shift.shape[1]]
             factors.append(state.factor)

@@ -6,6 +6,7 @@ A user's own term is a subclass handed to `tpjb_ident.estimate.solve`; docs/desi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
-from tpjb_ident.estimate.equation import HOUSING_ROWS, State
+from tpjb_ident.estimate.equation import HOUSING_ROWS, State, film_change_rows
 
 #: Largest logarithm of a factor.
 _LARGEST = 5.0
@@ -97,10 +98,6 @@ class Term:
         """Bring the parameters' values (q,) into the state."""
         raise NotImplementedError
 
-    def film_change(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray | None:
-        """By how much H of a run differs from its point's, (n, 2, 2) [N/m]; None of a term that is not the film's."""
-        return None
-
     def random_effects(self, blocks: Blocks, state: State) -> ComplexArray | None:
         """Patterns of the readings whose size is another one in every block, of one deviation, (n, m + 2, k)."""
         return None
@@ -131,12 +128,6 @@ class Term:
         """Zeros to be filled in, (n, m + 2, q)."""
         n, m = blocks.z.shape
         return np.zeros((n, m + HOUSING_ROWS, self.width), complex)
-
-    def of_blocks(self, blocks: Blocks, value: FloatArray) -> FloatArray:
-        """Values of the points' own parameters by block, (n, width); zero where the point has none."""
-        table = np.zeros((len(blocks.points), self.width))
-        table[list(self.points)] = value.reshape(len(self.points), -1)
-        return table[blocks.point]
 
 
 class Factor(Term):
@@ -172,9 +163,39 @@ class Additive(Term):
     def shift(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
         """What the parameters' values (q,) add to the readings, (n, m + 2)."""
         columns = self.columns(blocks, state)
+        if not self.points:
+            return np.asarray(columns @ value)
+        table = np.zeros((len(blocks.points), self.width))
+        table[list(self.points)] = value.reshape(-1, self.width)
+        return np.asarray(np.einsum("nrl,nl->nr", columns, table[blocks.point]))
+
+
+class FilmTerm(Additive):
+    """A term that changes H of the runs: points of one group by the same numbers, `group` (P,), -1 by none."""
+
+    group: IntArray
+
+    def changes(self, blocks: Blocks, state: State) -> ComplexArray:
+        """Change of a block's H per unit of every number of its group, (n, k, 2, 2) [N/m]."""
+        raise NotImplementedError
+
+    def columns(self, blocks: Blocks, state: State) -> ComplexArray:
+        """The changes' forces in the readings, those of a block's own group; points' own numbers are one group each."""
+        rows = film_change_rows(self.rig, blocks, state, self.changes(blocks, state))
         if self.points:
-            return np.asarray(np.einsum("nrl,nl->nr", columns, self.of_blocks(blocks, value)))
-        return np.asarray(columns @ value)
+            return rows
+        n, m, k = rows.shape
+        group = self.group[blocks.point]
+        columns = np.zeros((n, m, self.width // k, k), complex)
+        mine = np.flatnonzero(group >= 0)
+        columns[mine, :, group[mine]] = rows[mine]
+        return columns.reshape(n, m, self.width)
+
+    def film_change(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
+        """By how much H of a run differs from its point's, (n, 2, 2) [N/m]."""
+        changes, group = self.changes(blocks, state), self.group[blocks.point]
+        numbers = value.reshape(-1, changes.shape[1])[group] * (group >= 0)[:, None]
+        return np.asarray(np.einsum("nk,nkij->nij", numbers, changes))
 
 
 def exceeding(fitted: Fitted, parameters: tuple[Parameter, ...], limit: float = 3.0) -> list[int]:
@@ -191,10 +212,6 @@ def exceeding(fitted: Fitted, parameters: tuple[Parameter, ...], limit: float = 
     return places
 
 
-def of_groups(rows: ComplexArray, group: IntArray, number: int) -> ComplexArray:
-    """Columns (n, m, number k) of which a block has those of its group alone, `rows` (n, m, k); -1 is no group."""
-    n, m, k = rows.shape
-    columns = np.zeros((n, m, number, k), complex)
-    mine = np.flatnonzero(group >= 0)
-    columns[mine, :, group[mine]] = rows[mine]
-    return columns.reshape(n, m, number * k)
+def numbered(name: str, unit: str, deviations: Sequence[float]) -> tuple[Parameter, ...]:
+    """Parameters that differ by a number after their name."""
+    return tuple(Parameter(f"{name}, {i}", unit, deviation) for i, deviation in enumerate(deviations))

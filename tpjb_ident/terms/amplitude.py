@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.estimate.arrowhead import NUMBERS
 from tpjb_ident.estimate.blocks import Blocks, Rig, totals
-from tpjb_ident.estimate.equation import State, entry_forces, entry_sizes, film_force_rows
+from tpjb_ident.estimate.equation import State, entry_changes, entry_sizes
 from tpjb_ident.estimate.shape import real_numbers
-from tpjb_ident.estimate.term import Additive, Fitted, Parameter
+from tpjb_ident.estimate.term import FilmTerm, Fitted, numbered
 
 #: Name of the condition where the runs tell G.
 ZERO_AMPLITUDE = "zero amplitude"
@@ -24,11 +25,9 @@ _AS_DEVIATION = 1 / 1.6
 _SEVERAL = 1.3
 #: Cosine between the motions of two runs from which they have one direction.
 _ALIKE = 0.98
-#: Numbers of G at a point.
-_NUMBERS = 8
 
 
-class Amplitude(Additive):
+class Amplitude(FilmTerm):
     """Real and imaginary parts of G at every point whose film shows harmonics, each over its own entry of H."""
 
     name = "amplitude"
@@ -42,19 +41,17 @@ class Amplitude(Additive):
         self.points = tuple(np.flatnonzero(blocks.bent > 0).tolist())
         self._several = np.zeros(number, dtype=bool)
         self._several[list(self.points)] = [_several(motion[blocks.point == p]) for p in self.points]
-        parameters = []
+        self.group = np.where(blocks.bent > 0, np.cumsum(blocks.bent > 0) - 1, -1)
         for p in self.points:
             place = f"{blocks.points[p].static_load:g} N, {blocks.points[p].excitation_hz:g} Hz"
-            deviation = _AS_DEVIATION * float(blocks.bent[p])
-            parameters += [Parameter(f"{place}, {i}", "1", deviation) for i in range(_NUMBERS)]
-        self.parameters = tuple(parameters)
+            self.parameters += numbered(place, "1", [_AS_DEVIATION * float(blocks.bent[p])] * NUMBERS)
 
     def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> tuple[Condition, ...]:
         """What to say where the runs of a point tell G; `h` (2, 2) [N/m]."""
         if point not in self.points:
             return ()
-        first = _NUMBERS * self.points.index(point)
-        part = slice(first, first + _NUMBERS)
+        first = NUMBERS * self.points.index(point)
+        part = slice(first, first + NUMBERS)
         if not fitted.estimated[part].any():
             return ()
         entries = real_numbers(h)
@@ -62,22 +59,11 @@ class Amplitude(Additive):
         text = f"h at the runs' mean amplitude differs by {100 * share:.1f} % from that at none"
         return (Condition(ZERO_AMPLITUDE, f"{text}; K and C are those at none, by the runs' several amplitudes"),)
 
-    def columns(self, blocks: Blocks, state: State) -> ComplexArray:
-        """a^2 G d in the cells."""
-        d = state.u[:, :2]
-        size = self._square(blocks, d)[:, None] * entry_sizes(state.h[blocks.point])
-        return film_force_rows(self.rig, blocks, state, entry_forces(size, d))
-
-    def film_change(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
-        """a^2 G of every run."""
-        size = self._square(blocks, state.u[:, :2])[:, None] * entry_sizes(state.h[blocks.point])
-        change = (self.of_blocks(blocks, value) * size).reshape(-1, 2, 2, 2)
-        return np.asarray(change.sum(axis=1))
-
-    def _square(self, blocks: Blocks, d: ComplexArray) -> FloatArray:
-        """a^2 of every run (n,); one where a point has one amplitude, nothing where its film shows no harmonics."""
-        square = np.sum(np.abs(d) ** 2, axis=1) / self._mean[blocks.point]
-        return np.where(blocks.bent[blocks.point] > 0, np.where(self._several[blocks.point], square, 1.0), 0.0)
+    def changes(self, blocks: Blocks, state: State) -> ComplexArray:
+        """a^2 G; a^2 is one where a point has one amplitude, nothing where its film shows no harmonics."""
+        square = np.sum(np.abs(state.u[:, :2]) ** 2, axis=1) / self._mean[blocks.point]
+        square = np.where(self.group[blocks.point] >= 0, np.where(self._several[blocks.point], square, 1.0), 0.0)
+        return entry_changes(square[:, None] * entry_sizes(state.h[blocks.point]))
 
 
 def _several(z: ComplexArray) -> bool:

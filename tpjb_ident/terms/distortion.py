@@ -10,15 +10,14 @@ up to 0.6, they change H by 0.13 to 0.62 times as much as a random band of one d
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.estimate.arrowhead import NUMBERS
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, entry_forces, entry_sizes, film_force_rows
+from tpjb_ident.estimate.equation import State, entry_changes, entry_sizes, film_force_rows
 from tpjb_ident.estimate.noise import scatter_patterns
-from tpjb_ident.estimate.term import Additive, Parameter, of_groups
+from tpjb_ident.estimate.term import FilmTerm, numbered
 
 #: Change of H over the squared motion of a band and of two tones, over a blow's peak in one sense, in both its square.
 _BAND, _PAIR, _BLOW, _BLOWS = 20.0, 10.0, 1.5, 5.0
@@ -28,8 +27,6 @@ _LINE = 3.0
 _AS_DEVIATION = 1 / 1.6
 #: Changes below this share are not worth telling [share of H].
 _NOTHING = 2e-4
-#: Numbers of a band.
-_NUMBERS = 8
 
 
 def band_change(kind: str, rms: float, peak: float, one_sided: float) -> float:
@@ -45,7 +42,7 @@ def line_scatter(rms: float) -> float:
     return _LINE * rms if _BAND * rms**2 > _NOTHING else 0.0
 
 
-class Distortion(Additive):
+class Distortion(FilmTerm):
     """Real and imaginary parts of H of every band, each changed by its own share, which no run tells; lines scatter.
 
     `share`, `scatter` by band, `band` (P,) of every point.
@@ -58,26 +55,21 @@ class Distortion(Additive):
         self,
         rig: Rig,
         blocks: Blocks,
-        share: Sequence[float] | FloatArray = (),
+        share: FloatArray | None = None,
         band: IntArray | None = None,
         scatter: FloatArray | None = None,
     ) -> None:
         super().__init__(rig, blocks)
         self._scatter = scatter
         self._band = np.zeros(len(blocks.points), dtype=np.intp) if band is None else band
-        self._bent = [b for b, size in enumerate(share) if size > 0]
-        parameters = []
-        for b in self._bent:
-            deviation = _AS_DEVIATION * float(share[b])
-            parameters += [Parameter(f"band {b + 1}, {i}", "1", deviation) for i in range(_NUMBERS)]
-        self.parameters = tuple(parameters)
+        share = np.zeros(1) if share is None else share
+        self.group = np.where(share > 0, np.cumsum(share > 0) - 1, -1)[self._band]
+        for b in np.flatnonzero(share):
+            self.parameters += numbered(f"band {b + 1}", "1", [_AS_DEVIATION * float(share[b])] * NUMBERS)
 
-    def columns(self, blocks: Blocks, state: State) -> ComplexArray:
-        """G d in the cells, G a share of every entry of H."""
-        force = entry_forces(entry_sizes(state.h[blocks.point]), state.u[:, :2])
-        rows = film_force_rows(self.rig, blocks, state, force)
-        bands = [self._bent.index(b) if b in self._bent else -1 for b in self._band[blocks.point].tolist()]
-        return of_groups(rows, np.array(bands, dtype=np.intp), len(self._bent))
+    def changes(self, blocks: Blocks, state: State) -> ComplexArray:
+        """A share of every entry of H."""
+        return entry_changes(entry_sizes(state.h[blocks.point]))
 
     def random_effects(self, blocks: Blocks, state: State) -> ComplexArray | None:
         """The film's force at every line of one phase set, along X and Y: cells and housing answer to it alike."""
