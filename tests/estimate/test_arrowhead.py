@@ -33,6 +33,11 @@ def shared(to_prior, precision, always=False):
     return Prior(to_prior, precision, np.broadcast_to(always, to_prior.shape), np.zeros(to_prior.shape, dtype=bool))
 
 
+def none(points):
+    """Points without parameters of their own."""
+    return Prior(np.zeros((points, 0)), np.zeros((points, 0)), *np.zeros((2, points, 0), dtype=bool))
+
+
 def dense(point, r, J_h, J_t, to_prior, precision):
     """Least squares of all unknowns at once: rows of the blocks and of the priors."""
     rows = np.zeros((BLOCKS * ROWS + PARAMETERS, NUMBERS * POINTS + PARAMETERS))
@@ -49,7 +54,7 @@ def dense(point, r, J_h, J_t, to_prior, precision):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_step_is_the_dense_solve(seed):
     point, r, J_h, J_t, to_prior, precision = problem(seed)
-    found = step(taken(point, r, J_h, J_t), shared(to_prior, precision, True), Prior.none(POINTS))
+    found = step(taken(point, r, J_h, J_t), shared(to_prior, precision, True), none(POINTS))
     unknowns, covariance = dense(point, r, J_h, J_t, to_prior, precision)
     numbers = NUMBERS * POINTS
     np.testing.assert_allclose(found.h.ravel(), unknowns[:numbers], rtol=1e-10, atol=1e-10)
@@ -67,7 +72,7 @@ def test_a_step_is_the_dense_solve(seed):
 def test_what_the_rows_do_not_tell_is_considered(weak):
     """Its value stays at its prior; the covariance is that of an estimator which takes it for known, and is wrong."""
     point, r, J_h, J_t, to_prior, precision = problem(7, weak)
-    found = step(taken(point, r, J_h, J_t), shared(to_prior, precision), Prior.none(POINTS))
+    found = step(taken(point, r, J_h, J_t), shared(to_prior, precision), none(POINTS))
     np.testing.assert_array_equal(np.flatnonzero(~found.estimated), weak)
     np.testing.assert_array_equal(found.theta[list(weak)], to_prior[list(weak)])
     np.testing.assert_allclose(found.deviation[list(weak)], 1 / np.sqrt(precision[list(weak)]))
@@ -116,7 +121,7 @@ def test_parameters_of_single_points_are_those_of_a_border_that_holds_them_all(w
     all_sums = Sums.empty(POINTS, PARAMETERS + POINTS * OWN)
     all_sums.add(point, np.ones(len(point)), r, J_h, border)
     joined = (np.concatenate([to_prior, distance.ravel()]), np.concatenate([precision, own.precision.ravel()]))
-    bordered = step(all_sums, shared(*joined), Prior.none(POINTS))
+    bordered = step(all_sums, shared(*joined), none(POINTS))
     np.testing.assert_array_equal(found.by_point.estimated.ravel(), bordered.estimated[PARAMETERS:])
     assert found.by_point.estimated.sum() <= POINTS * (OWN - len(weak))
     for value, other in (
@@ -125,7 +130,6 @@ def test_parameters_of_single_points_are_those_of_a_border_that_holds_them_all(w
         (found.by_point.change.ravel(), bordered.theta[PARAMETERS:]),
         (found.by_point.deviation.ravel(), bordered.deviation[PARAMETERS:]),
         (found.deviation, bordered.deviation[:PARAMETERS]),
-        (found.conditional, bordered.conditional),
         (found.records, bordered.records),
         (found.factors(), bordered.factors()[:PARAMETERS]),
     ):
@@ -139,14 +143,14 @@ def test_parameters_of_single_points_are_those_of_a_border_that_holds_them_all(w
 def test_always_means_always():
     point, r, J_h, J_t, to_prior, precision = problem(8, (2,))
     always = np.arange(PARAMETERS) == 2
-    assert step(taken(point, r, J_h, J_t), shared(to_prior, precision, always), Prior.none(POINTS)).estimated.all()
+    assert step(taken(point, r, J_h, J_t), shared(to_prior, precision, always), none(POINTS)).estimated.all()
 
 
 def test_never_means_never_and_the_prior_passes_on():
     point, r, J_h, J_t, to_prior, precision = problem(8)
     never = np.arange(PARAMETERS) == 1
     prior = Prior(to_prior, precision, np.zeros(PARAMETERS, dtype=bool), never)
-    free, found = (step(taken(point, r, J_h, J_t), p, Prior.none(POINTS)) for p in (shared(to_prior, precision), prior))
+    free, found = (step(taken(point, r, J_h, J_t), p, none(POINTS)) for p in (shared(to_prior, precision), prior))
     assert free.estimated[1]
     np.testing.assert_array_equal(found.estimated, free.estimated & ~never)
     assert found.theta[1] == to_prior[1]
@@ -158,14 +162,14 @@ def test_a_parameter_is_estimated_from_four_fifths_of_its_prior_on():
     for tells, estimated in ((0.81, False), (0.79, True)):
         assert (tells < CONSIDERED) is estimated
         sums = Sums(np.eye(8)[None], np.zeros((1, 8, 1)), np.zeros((1, 8)), np.array([[tells**-2 - 1]]), np.zeros(1))
-        assert step(sums, shared(np.zeros(1), np.ones(1)), Prior.none(1)).estimated[0] == estimated
+        assert step(sums, shared(np.zeros(1), np.ones(1)), none(1)).estimated[0] == estimated
 
 
 def test_without_any_parameter_the_points_stand_alone():
     point, r, J_h, _, _, _ = problem(9)
     sums = Sums.empty(POINTS, 0)
     sums.add(point, np.ones(len(point)), r, J_h, np.zeros((BLOCKS, ROWS, 0)))
-    found = step(sums, shared(np.zeros(0), np.zeros(0)), Prior.none(POINTS))
+    found = step(sums, shared(np.zeros(0), np.zeros(0)), none(POINTS))
     for p in range(POINTS):
         mine = point == p
         alone = np.linalg.lstsq(J_h[mine].reshape(-1, NUMBERS), r[mine].ravel(), rcond=None)[0]

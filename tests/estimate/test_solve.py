@@ -160,8 +160,8 @@ def test_one_bad_run_of_five_is_given_no_weight(seed):
     case = Case(directions=5)
     rig, blocks, truth = struck(case, [7], 0.2, seed)
     solution = solved(rig, blocks, truth)
-    assert solution.weights[7] < 0.01
-    assert np.delete(solution.weights, 7).min() > 0.1
+    assert solution.scatter.weights[7] < 0.01
+    assert np.delete(solution.scatter.weights, 7).min() > 0.1
     assert np.abs(away(solution, truth)).max() < 5
     clean, unspoilt, _ = made(case, seed)
     usual = deviations(solved(clean, unspoilt, truth))

@@ -48,12 +48,6 @@ class Prior:
         is_learnt = np.sqrt(np.abs(posterior) * self.precision) < CONSIDERED
         return np.asarray((is_learnt | self.always) & ~self.never)
 
-    @staticmethod
-    def none(points: int) -> Prior:
-        """Points without parameters of their own."""
-        none, nothing = np.zeros((points, 0)), np.zeros((points, 0), dtype=bool)
-        return Prior(none, none, nothing, nothing)
-
 
 @dataclass
 class Sums:
@@ -122,7 +116,6 @@ class Step:
     h: FloatArray  #: (P, k)
     theta: FloatArray  #: (q,)
     by_point: Own
-    conditional: FloatArray = field(repr=False)  #: (P, k, k): covariance of H with all parameters given
     records: FloatArray = field(repr=False)  #: (P, k, k): that the records leave, the learning of parameters included
     K: FloatArray = field(repr=False)  #: (P, k, q)
     S: FloatArray = field(repr=False)  #: (q, q)
@@ -158,7 +151,6 @@ class Step:
 def step(sums: Sums, shared: Prior, by_point: Prior) -> Step:
     """Solve the normal equations; the points' own parameters are the last of their numbers."""
     k = sums.A.shape[1] - by_point.precision.shape[1]
-    conditional = sums.conditional(k)
     A, g = sums.A.copy(), sums.g_h.copy()
     last = np.arange(k, A.shape[1])
     A[:, last, last] += by_point.precision
@@ -196,7 +188,7 @@ def step(sums: Sums, shared: Prior, by_point: Prior) -> Step:
     )
     weight = np.concatenate([np.zeros((len(A), k)), by_point.precision * is_learnt], axis=1)
     records = _records(A_inverse, K, S, S_inverse, weight, shared.precision)[:, :k, :k]
-    return Step(x[:, :k], theta, points, conditional, records, K[:, :k], S, S_inverse, estimated, shared.precision)
+    return Step(x[:, :k], theta, points, records, K[:, :k], S, S_inverse, estimated, shared.precision)
 
 
 def _by_prior(is_learnt: BoolArray, learnt: FloatArray, passed: FloatArray, root: FloatArray) -> FloatArray:

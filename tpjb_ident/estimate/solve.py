@@ -52,7 +52,6 @@ class Solution:
 
     h: ComplexArray  #: (P, 2, 2), N/m: at the frequency found; NaN where the runs do not tell it
     records: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2
-    conditional: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2: of `records`, with the terms' parameters given
     shares: dict[str, FloatArray] = field(repr=False)  #: (P, 8, 8) by term, (N/m)^2
     factors: FloatArray = field(repr=False)  #: (q, P, 8), N/m: a standard deviation of every shared parameter
     fitted: dict[str, Fitted] = field(repr=False)
@@ -60,14 +59,11 @@ class Solution:
     scatter: Scatter = field(repr=False)
     chi_square: FloatArray  #: (P,): of the blocks' equations, reduced
     spare: FloatArray  #: (P,): real equations beyond the unknowns
-    weights: FloatArray = field(repr=False)  #: (n,): of the blocks
     scatter_share: FloatArray = field(repr=False)  #: (n, 4): of the components' variance that is the runs' scatter
     factor: ComplexArray = field(repr=False)  #: (n, m): what multiplies the readings of every block
     shift: ComplexArray = field(repr=False)  #: (n, m), SI: what is in the readings beside the motion's part
     run_change: ComplexArray = field(repr=False)  #: (n, 2, 2), N/m: H of a run beside that of its point
-    motion: ComplexArray = field(repr=False)  #: (n, 4): true displacement and acceleration
     housing_noise: float  #: scatter of the housing's equations over its acceleration
-    steps: int
 
     def freedom(self, group: int, chosen: BoolArray, noise_dof: float) -> FloatArray:
         """Degrees of freedom of a group's random part (k,): its records' noise and its runs' scatter.
@@ -77,7 +73,7 @@ class Solution:
         total = np.diag(self.records[group])
         if not chosen.any():
             return np.full(len(total), noise_dof)
-        share = np.average(self.scatter_share[chosen], axis=0, weights=np.maximum(self.weights[chosen], 1e-9))
+        share = np.average(self.scatter_share[chosen], axis=0, weights=np.maximum(self.scatter.weights[chosen], 1e-9))
         phase = (np.arange(len(total)) // 4) % 2  # stiffness, damping, mass: four numbers each
         repeat = np.array([1 - share[components].mean() for components in PHASES])[phase] * total
         between = np.array([self.scatter.freedom(group, components) for components in PHASES])[phase]
@@ -134,7 +130,6 @@ class Solver:
 
     def run(self) -> Solution:
         """Steps until H rests."""
-        count = 0
         # runs that stand apart are told at the robust start, before one of them pulls the others away
         self.scatter = self._scatter(self._sums(first=True)[1], 0)
         for count in range(1, _STEPS + 1):
@@ -151,7 +146,7 @@ class Solver:
                 break
         sums, fit = self._sums()
         last = step(sums, self.shared.prior(), self.by_point.prior())
-        return self._solution(last, fit, count)
+        return self._solution(last, fit)
 
     def _value(self, term: Term) -> FloatArray:
         """Values of a term's parameters."""
@@ -278,7 +273,7 @@ class Solver:
         size = np.abs(self.h).max(axis=(1, 2))
         return float((np.abs(change).max(axis=(1, 2)) / size).max(initial=0.0))
 
-    def _solution(self, last: Step, fit: Residuals, count: int) -> Solution:
+    def _solution(self, last: Step, fit: Residuals) -> Solution:
         groups = self.shape.groups
         factors = last.factors()
         fitted, shares = {}, {}
@@ -302,7 +297,6 @@ class Solver:
         return Solution(
             np.where(self.solvable[:, None, None], self.h, np.nan),
             last.records * self.unit**2,
-            last.conditional * self.unit**2,
             shares,
             factors * self.unit,
             fitted,
@@ -310,12 +304,9 @@ class Solver:
             self.scatter,
             chi_square / np.maximum(spare, 1.0),
             spare,
-            weight,
             np.clip(self.scatter.variance[self.group] * fit.information, 0.0, 1.0),
             *self._apart(),
-            self.u,
             self.housing_noise,
-            count,
         )
 
     def _apart(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -45,7 +45,7 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
     if not np.isfinite(solution.h).all():
         return None
     run_weights = np.zeros(table.n_directions)
-    run_weights[blocks.run] = solution.weights
+    run_weights[blocks.run] = solution.scatter.weights
     return TableFit(
         solution.h[0],
         means.weights * run_weights[table.direction],

@@ -82,7 +82,7 @@ def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare
     for b in np.flatnonzero(blocks.point == p):
         g = names.index(blocks.runs[blocks.run[b]])
         shift[g] = solution.shift[b] + solved.mains_shift[b]
-        factor[g], change[g], weight[g] = solution.factor[b], solution.run_change[b], solution.weights[b]
+        factor[g], change[g], weight[g] = solution.factor[b], solution.run_change[b], solution.scatter.weights[b]
     estimate, budget = _estimate(solved, p, weight, data)
     in_cells = solved.cell_pickup if p in solved.in_cells else 0.0
     conditions, shaft = _conditions(solved, p), bool(means.shaft_conditions)
