@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.phasors.phasor_cases import complex_normal, hermitian
-from tpjb_ident.estimate.motion import motion_in
-from tpjb_ident.estimate.window_means import Readings, aligned, window_means
+from tpjb_ident.estimate.window_means import Readings, aligned, motion_in, window_means
 
 RUNS, WINDOWS, CHANNELS = 5, 12, 4
 RUN = np.repeat(np.arange(RUNS), WINDOWS)

@@ -12,7 +12,7 @@ from scipy.stats import binom
 from tests.phasors import phasor_cases
 from tests.phasors.phasor_cases import H
 from tpjb_ident.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
-from tpjb_ident.identification.methods import disagreement
+from tpjb_ident.identification.point import disagreement
 from tpjb_ident.results.quality import (
     amplitude,
     coherence,

@@ -17,7 +17,7 @@ from rigdata.problem import refuse
 from rigdata.run import Run
 from rigdata.vector import directions, inverse_directions
 from tpjb_ident.check.signals import is_spare
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.bad_samples import BAD_LIMIT, robust_deviation
 from tpjb_ident.phasors.channel_times import device_readers
 from tpjb_ident.phasors.run_data import QUANTITIES
@@ -110,9 +110,9 @@ def read_samples(
         channels.append(channel)
         rows.append(_at(_bridged(run, channel, values), at * (1 + (fast or {}).get(channel.name, 0.0))))
         lost = max(lost, float((~np.isfinite(values)).mean()))
-    condition = (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),)
+    bridged = holding((lost > _TOLD_LOST, "samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"))
     driven = command[:, inside] if command.any() else None
-    return Samples(rate, tuple(channels), np.array(rows)[:, inside], driven, condition if lost > _TOLD_LOST else ())
+    return Samples(rate, tuple(channels), np.array(rows)[:, inside], driven, bridged)
 
 
 def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, FloatArray, FloatArray]]:

@@ -9,7 +9,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, stacked
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.sensors import axes_of, sensors_of
@@ -26,10 +26,8 @@ _LOAD_ERROR = 2e-4
 def unstated(campaign: Campaign) -> tuple[Condition, ...]:
     """Say which probes and cells have no uncertainty in the manifest."""
     names = [s.name for s in sensors_of(campaign) if s.quantity in QUANTITIES[:2] and s.uncertainty is None]
-    if not names:
-        return ()
     text = f"no uncertainty in the manifest for {', '.join(names)}: their systematic part is left out"
-    return (Condition("calibration-uncertainty-unstated", text),)
+    return holding((names, "calibration-uncertainty-unstated", text))
 
 
 def run_temperatures(campaign: Campaign, measured: Iterable[tuple[str, Mapping[int, float]]]) -> dict[str, float]:

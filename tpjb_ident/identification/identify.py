@@ -14,8 +14,7 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.identification.campaign_blocks import unstated
 from tpjb_ident.identification.campaign_solution import solve_campaign
 from tpjb_ident.identification.identify_bands import identify_bands
-from tpjb_ident.identification.methods import own_method
-from tpjb_ident.identification.point import PointTask, finished_point, point_share
+from tpjb_ident.identification.point import PointTask, finished_point, own_method, point_share
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.phasors.mains_frequency import mains_frequency

@@ -13,9 +13,8 @@ from rigdata.campaign import Campaign
 from rigdata.vector import directions, plane_vector
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
-from tpjb_ident.estimate.motion import motion_in
 from tpjb_ident.estimate.sensors import alive
-from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation, window_means
+from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation, motion_in, window_means
 from tpjb_ident.estimators.mm import mm_fit, within_directions
 from tpjb_ident.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
 from tpjb_ident.phasors.shaft import shaft_order

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter
 
@@ -56,11 +56,9 @@ class Clock(Factor):
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Rates that stand clear of their errors."""
         clear = np.abs(self._total(fitted)) > _CLEAR * fitted.deviation
-        if not clear.any():
-            return ()
         rates = ", ".join(self.words(fitted))
         text = f"against the first device's clock: {rates}; put right from the start of each record"
-        return (Condition("clocks-differ", text),)
+        return holding((clear.any(), "clocks-differ", text))
 
     def words(self, fitted: Fitted) -> tuple[str, ...]:
         """Rates in ppm."""

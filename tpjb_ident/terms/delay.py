@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, exceeding
 
@@ -48,7 +48,4 @@ class Delay(Factor):
             late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)
             contradictions = [condition for conditions in self.rig.contradicted.values() for condition in conditions]
             return tuple(condition for condition in contradictions if condition == OUT_OF_STEP and late.any())
-        names = [self.parameters[k].name for k in exceeding(fitted, self.parameters)]
-        if not names:
-            return ()
-        return (Condition(OUT_OF_STEP, f"{'; '.join(self.words(fitted))}"),)
+        return holding((exceeding(fitted, self.parameters), OUT_OF_STEP, "; ".join(self.words(fitted))))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
 
@@ -38,6 +38,4 @@ class Temperature(Factor):
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Drifts beyond what is stated."""
-        if not exceeding(fitted, self.parameters):
-            return ()
-        return (Condition("probes-drift", "; ".join(self.words(fitted))),)
+        return holding((exceeding(fitted, self.parameters), "probes-drift", "; ".join(self.words(fitted))))
