@@ -35,6 +35,7 @@ class Sensor:
     temperature_coefficient_uncertainty: float = 0.0
     corner_uncertainty: float = 0.0  #: Hz: of a low corner that nobody states, one deviation
     out_of_step: bool = False  #: leads what the springs under the housing make of the cells' force
+    axis: float = 0.0  #: rad: as the campaign has it; a run's own counts in its blocks
 
 
 @dataclass(frozen=True)

@@ -84,11 +84,6 @@ class Scatter:
         degrees = np.maximum(np.minimum(self.spare[components] + _ALIKE, self.spare.sum()), 1.0)
         return float(1 / max(float(np.sum(share**2 / degrees)), 1e-12))
 
-    @staticmethod
-    def unjudged(groups: int, blocks: int) -> Scatter:
-        """No scatter yet, all blocks count and none is judged: where lines of one run stand for many runs."""
-        return replace(Scatter.none(groups, blocks), judges=False)
-
     def fixed(self, groups: int, weights: FloatArray) -> Scatter:
         """Pooled scatter for other groups of the same blocks, with weights (n,); both stay."""
         none, unit = np.zeros(groups, dtype=bool), np.ones(groups)

@@ -46,6 +46,7 @@ def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
                 channel.plane,
                 channel.temperature_coefficient_uncertainty,
                 0.0 if _has_low_corner(channel) else CORNERS.get(quantity, 0.0),
+                axis=float(channel.axis or 0.0),
             )
             for channel in alike
         ]

@@ -129,7 +129,9 @@ def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution,
     data = task.data
     by_load, spare = _own_scatter(data, task.correct)
     lines = len(data.band)
-    shape = Shape(data.line, count=lines, scatter=Scatter.unjudged(lines, len(data.blocks)))
+    # lines of one run stand for many runs: none is judged
+    scatter = replace(Scatter.none(lines, len(data.blocks)), judges=False)
+    shape = Shape(data.line, count=lines, scatter=scatter)
     size, freedom = _FIRST, np.inf
     for _ in range(_ROUNDS if spare.any() else 0):
         task = task.with_gains(np.hypot(by_load, size * spare))

@@ -11,10 +11,11 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
 from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, Sensor, film_force, vector
 from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
+from tpjb_ident.estimate.shape import complex_matrix
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures
 from tpjb_ident.identification.clocks import solved_with_clocks
-from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means, sensor_axes
+from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means
 from tpjb_ident.results.linearity import FilmChange, film_change
 from tpjb_ident.runs.finished_runs import RunDigest
 from tpjb_ident.runs.point_data import PointData
@@ -59,7 +60,7 @@ class CampaignSolution:
         """H of every point at the frequency found, (P, 2, 2) [N/m]."""
         h = self.solution.h.copy()
         for p, fit in self.mains.items():
-            h[p] = h[p] + fit.change
+            h[p] = h[p] + complex_matrix(fit.shift)
         return h
 
 
@@ -74,7 +75,7 @@ def solve_campaign(
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
     sensors = sensors_of(campaign)
     temperatures = run_temperatures(campaign, [(digest.run, digest.temperatures) for digest in digests])
-    common = MeansTask(sensors, sensor_axes(sensors, campaign), temperatures=temperatures)
+    common = MeansTask(sensors, temperatures=temperatures)
     loads = static_loads(campaign, points)
 
     def solver(rig: Rig, blocks: Blocks, start: ComplexArray, rates: Mapping[str, float]) -> Solver:

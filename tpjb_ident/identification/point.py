@@ -15,7 +15,14 @@ from tpjb_ident.estimators.rlm import RlmSettings
 from tpjb_ident.estimators.solved_windows import not_locked
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.campaign_solution import CampaignSolution
-from tpjb_ident.identification.point_means import MeansTask, channel_windows, clock_turns, vectors, window_times
+from tpjb_ident.identification.point_means import (
+    MeansTask,
+    channel_windows,
+    clock_turns,
+    means_attenuation,
+    vectors,
+    window_times,
+)
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.identification.shared_changes import sources_of, total
 from tpjb_ident.phasors.run_data import RunPhasors
@@ -135,7 +142,7 @@ def _estimate(
         means.condition,
         float(solution.chi_square[p]),
         int(max(solution.spare[p], 0)),
-        means.attenuation,
+        means_attenuation(windows, solved.task),
         total(common.values()),
     )
     return estimate, random | common

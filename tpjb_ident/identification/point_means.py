@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.calibration import Channel
-from rigdata.campaign import Campaign
 from rigdata.vector import directions, plane_vector
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
@@ -34,9 +33,7 @@ class PointMeans:
     start: ComplexArray  #: (2, 2), N/m: NaN where the windows give none
     means: WindowMeans | None
     channels: tuple[tuple[Channel | None, ...], ...]  #: (g, m): None where a run says nothing of a sensor
-    load_error: FloatArray  #: (g,), N: standard error of the mean load's size
     condition: float
-    attenuation: FloatArray = field(repr=False)  #: (2,)
     residual: tuple[ComplexArray, float] = field(repr=False)  #: density of the noise (m, m) and its degrees of freedom
     usable: BoolArray = field(repr=False)  #: (n,): windows with a drive and a phasor of every channel of their run
     status: tuple[Condition, ...] = ()
@@ -49,9 +46,13 @@ class MeansTask:
     """What every point's windows are averaged with."""
 
     sensors: tuple[Sensor, ...]
-    along: FloatArray  #: (m, 2)
     rates: Mapping[str, float] = field(default_factory=dict)  #: of the devices' clocks, relative
     temperatures: Mapping[str, float] = field(default_factory=dict)  #: of the runs, at the probes [K]
+
+    @property
+    def along(self) -> FloatArray:
+        """Unit vectors of the sensors' axes, (m, 2)."""
+        return directions([sensor.axis for sensor in self.sensors])
 
     def of(self, quantity: str) -> list[int]:
         """Places of the sensors of a quantity."""
@@ -66,18 +67,16 @@ def point_means(task: MeansTask, data: PointData) -> PointMeans:
     present = np.array([[channel is not None for channel in run] for run in channels])
     D, F = vectors(z, data, task)
     table = phasor_table(D, F, data.run_index)
-    errors = _load_errors(data)
     weights, start, status = _robust_start(table)
     film = _film(task, data.mass)
     readings = Readings([sensor.device for sensor in task.sensors], film)
     means = window_means(z, data.run_index, time, readings, weights, present)
     condition = displacement_condition(table.D, weights[table.valid])
-    attenuation = np.full(2, np.nan) if means is None else _attenuation(means, task)
     shaft, conditions = _shaft(data, means, task)
     residual = _residual_density(data, task, means, film)
     usable = np.asarray(np.isfinite(np.where(present[data.run_index], z, 0.0)).all(axis=1))
     more = (status, shaft, conditions)
-    return PointMeans(start, means, channels, errors, condition, attenuation, residual, usable, *more)
+    return PointMeans(start, means, channels, condition, residual, usable, *more)
 
 
 def _film(task: MeansTask, mass: float) -> FloatArray:
@@ -203,14 +202,6 @@ def clock_turns(data: PointData, task: MeansTask, time: FloatArray) -> ComplexAr
     return np.asarray(np.exp(1j * np.multiply.outer(omega[data.run_index] * time, rates)))
 
 
-def sensor_axes(sensors: Sequence[Sensor], campaign: Campaign) -> FloatArray:
-    """Unit vectors of the sensors' axes, (m, 2)."""
-    channels = dict(campaign.channels)
-    for run in campaign.of_kind("dynamic"):
-        channels = dict(run.channels) | channels
-    return directions(np.array([channels[sensor.name].axis for sensor in sensors], dtype=float))
-
-
 def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[Condition, ...]]:
     """Weights (n,) of all given windows, H (2, 2) and the start's conditions."""
     weights = np.zeros(len(table.valid))
@@ -225,16 +216,7 @@ def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[C
     return weights, fit.coefficients * table.h_scale, conditions
 
 
-def _load_errors(data: PointData) -> FloatArray:
-    """Standard error of the size of every run's mean cell force, (g,) [N]."""
-    errors = []
-    for run in data.runs:
-        rows = run.cell_force.mean[np.isfinite(run.cell_force.mean).all(axis=1)]
-        errors.append(float(np.linalg.norm(rows.std(axis=0, ddof=1)) / np.sqrt(len(rows))) if len(rows) > 1 else 0.0)
-    return np.array(errors)
-
-
-def _attenuation(means: WindowMeans, task: MeansTask) -> FloatArray:
+def means_attenuation(means: WindowMeans, task: MeansTask) -> FloatArray:
     """Noise over total power of the displacements, (2,)."""
     rows = task.of("displacement")
     plane = np.linalg.pinv(task.along[rows])

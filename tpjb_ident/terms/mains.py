@@ -17,6 +17,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
+from tpjb_ident.estimate.shape import complex_matrix
 
 MAINS_ON_LINE = "mains on excitation line"
 MAINS_CORRECTED = "mains corrected"
@@ -86,7 +87,7 @@ class MainsEquations:
 
     def h(self, x: FloatArray) -> ComplexArray:
         """H of the unknowns, (2, 2) [N/m]; `x` (8 + g m,)."""
-        return np.asarray((x[:4] + 1j * x[4:8]).reshape(2, 2) * self.scale, dtype=complex)
+        return complex_matrix(x[:8]) * self.scale
 
     def entries(self, x: FloatArray) -> FloatArray:
         """The eight real entries of H [N/m]; `x` (8 + g m,)."""
@@ -189,11 +190,6 @@ class MainsFit:
     covariance: FloatArray  #: (8, 8), N^2/m^2: what not knowing the angles leaves in H
     dof: float
     chi_square: float
-
-    @property
-    def change(self) -> ComplexArray:
-        """The shift as a matrix, (2, 2) [N/m]."""
-        return (self.shift[:4] + 1j * self.shift[4:]).reshape(2, 2)
 
     def condition(self, pickup: Pickup) -> Condition:
         """What was done about it."""
