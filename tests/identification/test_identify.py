@@ -10,6 +10,8 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import Fault, Noise, RigPlan, RigTruth, VirtualRig, operating_points
 from tests.rigs.held_run import HeldReader, channels, columns, lines_in_noise, run_of
+from tpjb_ident.estimate.solve import Solver
+from tpjb_ident.identification import campaign_solution
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.extraction import extract
@@ -279,3 +281,19 @@ def test_cells_ten_times_off_in_all_runs_make_every_point_doubtful(campaign_of):
     wrong = replace(rig([(3500.0, 25.0)], seed=12), faults=(Fault("scaled", "*", "L1*", value=0.1),))
     [point] = identify(load_campaign(campaign_of(wrong)), IdentifySettings(methods=())).points
     assert "cells-contradict-set-points" in point.quality
+
+
+def test_where_the_iteration_runs_away_a_point_is_what_its_windows_say(small_campaign, monkeypatch):
+    campaign = load_campaign(small_campaign)
+    solved = identify(campaign)
+
+    class RunsAway(Solver):
+        def run(self):
+            if self.solvable.any():
+                raise np.linalg.LinAlgError
+            return super().run()
+
+    monkeypatch.setattr(campaign_solution, "Solver", RunsAway)
+    for point, whole in zip(identify(campaign).points, solved.points, strict=True):
+        assert point.budget == {}
+        assert np.linalg.norm(point.stiffness.h - whole.stiffness.h) < 0.05 * np.linalg.norm(whole.stiffness.h)

@@ -18,7 +18,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (123.71, 14_741),  # 124.83, shafts that give, slower devices over a band, foundations, ranges
+    "measurement": (123.75, 14_745),  # 124.83, shafts that give, slower devices over a band, foundations, ranges
     "model": (78.60, 10_528),
     "rigdata": (61.96, 8_330),
     "diagnosis": (38.51, 4_763),  # 38.48, look-alikes, tolerances that say an effect together
