@@ -18,14 +18,14 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (123.75, 14_745),  # 124.83, shafts that give, slower devices over a band, foundations, ranges
+    "measurement": (123.83, 14_752),  # 123.75, and a solve that runs away is told in every path
     "model": (78.60, 10_528),
     "rigdata": (61.96, 8_330),
     "diagnosis": (38.51, 4_763),  # 38.48, look-alikes, tolerances that say an effect together
     "cli": (22.81, 3_147),
     "report": (23.75, 3_121),
     "pivot": (17.45, 2_312),  # creep of the deflection, free ways to the pad, and the refusals that check asks for too
-    "clearance": (9.52, 1_186),  # what three and four pads leave open, unequal probes, a shaft or a zero that moves
+    "clearance": (9.52, 1_184),  # what three and four pads leave open, unequal probes, a shaft or a zero that moves
     "compare": (12.09, 1_643),
     "watch": (5.65, 686),
     "top level": (4.60, 878),  # a condition more; a column finds its unit by its name: fewer tokens, ten lines more

@@ -7,12 +7,12 @@ pulling H towards zero: there is no separate step of errors in variables.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.arrowhead import NUMBERS, Step, Sums, are_told, step
 from tpjb_ident.estimate.blocks import Blocks, Rig, totals, vector
 from tpjb_ident.estimate.equation import (
@@ -64,6 +64,7 @@ class Solution:
     shift: ComplexArray = field(repr=False)  #: (n, m), SI: what is in the readings beside the motion's part
     run_change: ComplexArray = field(repr=False)  #: (n, 2, 2), N/m: H of a run beside that of its point
     housing_noise: float  #: scatter of the housing's equations over its acceleration
+    ran_away: bool = False  #: no point has an answer
 
     def freedom(self, group: int, chosen: BoolArray, noise_dof: float) -> FloatArray:
         """Degrees of freedom of a group's random part (k,): its records' noise and its runs' scatter.
@@ -85,7 +86,9 @@ class Solution:
 
     def conditions(self) -> tuple[Condition, ...]:
         """What the terms' tests say of the rig: it touches every point."""
-        return tuple(condition for term in self.terms for condition in term.conditions(self.fitted[term.name]))
+        conditions = [condition for term in self.terms for condition in term.conditions(self.fitted[term.name])]
+        text = "the runs together give no H, as where they are driven below their noise: it is the windows' alone"
+        return (*conditions, *holding((self.ran_away, "iteration-limit", text)))
 
 
 class Solver:
@@ -129,7 +132,15 @@ class Solver:
         return self
 
     def run(self) -> Solution:
-        """Steps until H rests."""
+        """Steps until H rests; where it runs away, once more without it: no point has an answer then."""
+        try:
+            return self._settled()
+        except np.linalg.LinAlgError:
+            terms = tuple(dict.fromkeys((*self.terms, *self.random)))
+            nothing = Solver(self.rig, self.blocks, terms, np.full_like(self.h, np.nan), self.to_set_point, self.shape)
+            return replace(nothing._settled(), ran_away=True)
+
+    def _settled(self) -> Solution:
         # runs that stand apart are told at the robust start, before one of them pulls the others away
         self.scatter = self._scatter(self._sums(first=True)[1], 0)
         for count in range(1, _STEPS + 1):
