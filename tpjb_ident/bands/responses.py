@@ -27,8 +27,6 @@ _NOTHING = 1e-9
 _FREEDOM = 65.0
 #: Phase sets that show the distortion of a multi-sine, and likeness from which two are one.
 _SETS, _ALIKE = 3, 0.6
-#: A line is driven from this share of the largest on.
-_DRIVEN = 0.05
 #: Chance below which noise alone does not make a response.
 _CHANCE = 1e-4
 
@@ -100,12 +98,6 @@ def _driven(run: RunSpectra) -> FloatArray:
     assert run.command is not None
     power, along = np.linalg.eigh((run.command[0].T @ run.command[0].conj()).real)
     return np.asarray(along[:, power > _AT_REST * power[-1]])
-
-
-def tones(runs: Sequence[RunSpectra]) -> int:
-    """Lines of a periodic excitation that are driven, in the run with the most."""
-    sizes = [np.linalg.norm(run.D.mean(axis=0), axis=1) for run in runs]
-    return max(int(np.sum(size > _DRIVEN * size.max(initial=0.0))) for size in sizes)
 
 
 def one_phase_set(runs: Sequence[RunSpectra]) -> bool:

@@ -28,6 +28,8 @@ from tpjb_ident.runs.point_data import mean_temperatures
 
 #: Share of the power that a period may leave where none is stated.
 _LEFT = 0.5
+#: Share of a period's largest line from which another one is driven.
+_DRIVEN = 0.03
 #: Kinds that may repeat themselves, and whose records may begin and end in motion; a hammer waits for rest.
 OPEN_ENDS = ("multisine", "random", "sweep")
 
@@ -47,10 +49,12 @@ class RunSpectra:
     disturbances: tuple[Line, ...]
     period: float | None
     temperatures: dict[int, float]
-    rms: float = 0.0  #: m: of the motion over the band
+    clean_rms: float = 0.0  #: m: of the motion without disturbing lines
     peak: float = 0.0  #: m: largest motion
     one_sided: float = 0.0  #: 1 where what drives goes to one side only, 0 where to both alike
     by_time: RunSpectra | None = field(default=None, repr=False)  #: of the record times the time from its middle [s]
+    #: by order n the phasors (1, n_bins, ..) of the record turned n times as fast as the shaft: at f, what is at f - nX
+    turned: dict[int, RunPhasors] = field(default_factory=dict, repr=False)
 
     @property
     def frequencies(self) -> FloatArray:
@@ -68,9 +72,30 @@ class RunSpectra:
         return self.phasors.oil_force(slice(None))
 
     @property
+    def shaft(self) -> float:
+        """Speed at which the shaft is seen to turn, zero where it does not show [Hz]."""
+        return next((line.frequency for line in self.disturbances if line.name == "1X"), 0.0)
+
+    @cached_property
+    def driven(self) -> BoolArray:
+        """Bins (n_bins,) that the excitation drives; of a period the film fills others by its curvature."""
+        if self.period is None:
+            return np.ones(len(self.frequencies), dtype=bool)
+        drives = [self.D, self.F] if self.command is None else [self.command]
+        sizes = [np.linalg.norm(drive.mean(axis=0), axis=1) for drive in drives]
+        return np.asarray(np.max([size / max(size.max(), 1e-300) for size in sizes], axis=0) > _DRIVEN)
+
+    @property
     def amplitude(self) -> float:
         """Of a sine that moves the shaft as much as all bins of the band together do [m]."""
         return float(np.sqrt(np.sum(np.mean(np.abs(self.D) ** 2, axis=0))))
+
+    @property
+    def rms(self) -> float:
+        """Rms of the motion that the excitation makes [m]."""
+        if self.period is None:
+            return self.clean_rms
+        return float(np.linalg.norm(self.D.mean(axis=0)[self.driven & ~self.disturbed]) / np.sqrt(2))
 
 
 def run_spectra(
@@ -109,11 +134,22 @@ def run_spectra(
         temperatures,
         *_motion(clean),
     )
+    spectra = _turned(spectra, clean, places)
     if period is not None:
         return spectra
     time = (np.arange(clean.length) - 0.5 * (clean.length - 1)) / clean.rate  # from the middle of the record
     phasors, command = transformed(clean.mapped(lambda rows: rows * time))
     return replace(spectra, by_time=replace(spectra, phasors=phasors, command=command))
+
+
+def _turned(spectra: RunSpectra, samples: Samples, places: IntArray) -> RunSpectra:
+    """The spectra with those of the record turned as fast as the shaft and twice as fast, where the shaft shows."""
+    turned = {}
+    for order in (1, 2) if spectra.shaft else ():
+        wave = np.exp(2j * np.pi * order * spectra.shaft / samples.rate * np.arange(samples.length))
+        bins = np.fft.fft(samples.rows * wave, axis=1)[:, places * len(spectra.phasors.start)]
+        turned[order] = replace(spectra.phasors, z=bins.T[None] * (2 / samples.length))
+    return replace(spectra, turned=turned)
 
 
 def _motion(samples: Samples) -> tuple[float, float, float]:

@@ -10,7 +10,8 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_noise, stands_out, tones
+from tpjb_ident.bands.film_products import film_products
+from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_noise, stands_out
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.sensors import alive, axes_of
@@ -18,7 +19,7 @@ from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.campaign_blocks import calibration_numbers
 from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.runs.static_load import missed_load
-from tpjb_ident.terms.distortion import band_change, line_scatter
+from tpjb_ident.terms.distortion import band_change, line_scatter, worth_stating
 
 #: F ratio from which an excitation tells the displacements from their noise,
 STRONG = 10.0
@@ -70,7 +71,8 @@ def band_blocks(
             row |= {"run": len(runs), "temperature": warmth, "miss": missed_load(miss, members)}
             for place, response in enumerate(_run_rows(point, spectra, channels, warmth, turn)):
                 at = {"point": groups[b] + place, "omega": 2 * np.pi * point.plan.middles[place]}
-                rows += [values | row | at for values in response]
+                is_driven = spectra[0].driven[point.plan.bins[place]].any()
+                rows += [values | row | at for values in response if is_driven]
             runs.append(", ".join(names))
     blocks = stacked(operating, runs, len(sensors), rows)
     line = np.concatenate([plan.line + first for plan, first in zip(plans, lines)])
@@ -96,16 +98,20 @@ def band_blocks(
 
 def _film(point: BandPoint, clearance: float | None) -> tuple[float, float]:
     """What a film that is not linear may do to H and, in one phase set of a multi-sine, to single lines."""
-    if not clearance:
-        return 0.0, 0.0
-    rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
-    one_sided = max(s.one_sided for s in point.spectra)
     periodic = point.method == "periods"
     # two tones make nothing of one another that falls on them
-    pair = periodic and tones(point.spectra) < 3
+    pair = periodic and max(s.driven.sum() for s in point.spectra) < 3
     # alike in all runs: more than the two that h needs do not average it away
     repeats = np.sqrt(max(len(point.spectra), 2) / 2) if periodic and not pair and one_phase_set(point.spectra) else 0.0
-    return band_change("pair" if pair else point.group.kind, rms, peak, one_sided), line_scatter(rms) * repeats
+    lines = film_products(point.spectra)
+    change, scatter = lines.change, lines.scatter
+    if np.isnan(change) and clearance:
+        rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
+        one_sided = max(s.one_sided for s in point.spectra)
+        change = band_change("pair" if pair else point.group.kind, rms, peak, one_sided)
+        scatter = line_scatter(rms) if lines.even else change
+    change, scatter = np.nan_to_num([change, scatter])
+    return worth_stating(change + lines.orbit), float(np.hypot(scatter * repeats, lines.turning))
 
 
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:

@@ -4,7 +4,8 @@ A channel sampled at f_s and written at a higher rate (filled up by a logger pro
 shows at f, noise too, at f_s - f and f_s + f, of size (f / (f_s -+ f))^n: n = 1 where values are held, 2 along straight
 lines, 4 along cubic splines. A line itself comes out smaller (and late, where values are held) by a factor that the
 rates alone determine. Images give the rate away: the phases of the spectrum at f and f_s - f add up to the same angle
-at all f, which those of a record at its own rate do at no sum of two frequencies.
+at all f, which those of a record at its own rate do at no sum of two frequencies, but one: what a film that is not
+linear makes of the shaft's own motion stands at X - f and 2X - f, and is no image.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import find_peaks
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.channel_times import device_readers
 from tpjb_ident.phasors.found_lines import vertex
+from tpjb_ident.phasors.lines import SPEED_DRIFT
 from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Seconds from the start that are looked at, and powers of two of samples, at least and at most.
@@ -86,16 +88,17 @@ def filled_channels(run: Run) -> dict[str, SlowerChannel]:
         power = np.clip(np.log2(_LOOK * reader.rate) + 1, _LEAST_POWER, _MOST_POWER)
         rows = reader.read(0, min(reader.length, 2 ** int(power) - 2)).rows
         for channel, values in zip(reader.channels, rows):
-            filling = slower_channel(values, reader.rate)
+            filling = slower_channel(values, reader.rate, run.point.shaft_speed_hz)
             if filling is not None:
                 slower[channel.name] = filling
     return slower
 
 
-def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | None:
+def slower_channel(values: FloatArray, export_rate: float, speed: float = 0.0) -> SlowerChannel | None:
     """How a channel was filled up, told from the beginning of its readings (n,); None where it was not.
 
-    Phases agree at twice the rate as well, where the export reaches so far; those of blows do not.
+    Phases agree at twice the rate as well, where the export reaches so far; those of blows do not. `speed` of the
+    shaft [Hz].
     """
     clean = _clean_stretch(values)
     n = len(clean)
@@ -104,6 +107,7 @@ def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | No
     spectrum = np.fft.rfft((clean - clean.mean()) * np.hanning(n))
     size, agreement, chance = np.abs(spectrum), *_pair_agreement(spectrum)
     peaks = find_peaks(agreement)[0]
+    peaks = peaks[~_is_of_shaft(peaks * export_rate / n, speed, export_rate / n)]
     for k in peaks[chance[peaks] > _CLEAR].tolist():
         order = _filling_order(size, k)
         nearby = np.median(agreement[max(k - _BESIDE, 0) : k + _BESIDE + 1])
@@ -115,6 +119,12 @@ def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | No
             even = abs(ratio - round(ratio)) < _EVEN * ratio
             return SlowerChannel(export_rate / round(ratio) if even else rate, export_rate, order)
     return None
+
+
+def _is_of_shaft(sums: FloatArray, speed: float, step: float) -> BoolArray:
+    """Which sums of frequencies (n,) [Hz] the shaft's own motion makes of any other, in bins of `step` [Hz]."""
+    orders = np.array([1.0, 2.0]) * (speed > 0)
+    return np.asarray((np.abs(sums[:, None] - orders * speed) < orders * (SPEED_DRIFT + 2 * step)).any(axis=1))
 
 
 def _clean_stretch(values: FloatArray) -> FloatArray:

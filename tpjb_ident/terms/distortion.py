@@ -34,12 +34,17 @@ def band_change(kind: str, rms: float, peak: float, one_sided: float) -> float:
     share = (_PAIR if kind == "pair" else _BAND) * rms**2
     if kind == "impact":
         share = _BLOW * peak * one_sided + _BLOWS * peak**2
-    return share if share > _NOTHING else 0.0
+    return worth_stating(share)
 
 
 def line_scatter(rms: float) -> float:
     """Relative scatter of a line's film force in a multi-sine of one phase set; `rms` over the clearance."""
     return _LINE * rms if _BAND * rms**2 > _NOTHING else 0.0
+
+
+def worth_stating(share: float) -> float:
+    """A share of H, none where it is too small to tell."""
+    return share if share > _NOTHING else 0.0
 
 
 class Distortion(FilmTerm):

@@ -1,0 +1,165 @@
+"""What a film that is not linear makes of a band's motion: at lines that nothing drives, and with the shaft's orbit.
+
+A film that hardens with the square of the motion answers h D + kappa |D|^2 D. Of lines with random phases the sums of
+three that meet at a fourth are noise that repeats with the period, of power 6 kappa^2 (S * S * S) with S the two-sided
+power of the motion; what two of them take off again is no noise but a change of h by 3 kappa sigma^2, sigma^2 the
+motion's mean square (Pintelon and Schoukens, System Identification, 2nd ed. 2012, chapter 3). A film with a square term
+kappa_2 makes sums of two as well, 2 kappa_2^2 (S * S), which scatter and change nothing. Lines that are left out show
+both, where sums reach them. A film of the form x / (1 - x / c)^n has kappa of about 3/4 kappa_2^2 / h, which is taken
+at least: it stands in where all odd lines are driven (with sines, 4.5 q2^2).
+
+The shaft's orbit makes of every line another one at f - 2X, half as large as its change of h at f. Where the shaft
+turns with a multiple of the period, what it makes at f - X falls on other lines, with another phase in every run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.signal import fftconvolve
+
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.bands.run_spectra import RunSpectra
+from tpjb_ident.estimate.shape import over_frequency
+
+#: Undriven lines that tell, at least, and how much of what falls on driven lines must fall on them.
+_LEAST_LINES, _REACHED = 3, 0.1
+#: Of what the lines show so much is allowed for, as with sines; change of h for the force at f - 2X.
+_ALLOWED, _ORBIT = 1.3, 2.0
+#: Bins of the whole record within which one line falls on another.
+_ON_LINE = 1.0
+#: Motion across the drive, over that along it, that is itself a product of other lines.
+_ACROSS = 0.2
+#: Kappa over kappa_2^2 / h.
+_STANDS_IN = 0.75
+#: Rounds in which powers, each as uncertain as it is large, are weighed.
+_ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class FilmProducts:
+    """What the film's curvature does to a band's result; NaN where no line tells."""
+
+    change: float  #: share by which the band's own motion may change H
+    scatter: float  #: of a driven line's film force, relative, alike in all repeats
+    orbit: float  #: share by which the shaft's orbit may change H
+    turning: float  #: relative scatter of a line's film force that differs from run to run with the shaft's angle
+    even: bool  #: whether sums of two driven lines fall on driven ones
+
+
+def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
+    """What the lines of a point's runs tell."""
+    driven = np.all([run.driven & ~run.disturbed for run in runs], axis=0)
+    film = _Film.of(runs, driven)
+    orbit = _ALLOWED * _ORBIT * film.at_turned(runs, 2)
+    if runs[0].period is None or not driven.any():
+        return FilmProducts(np.nan, np.nan, orbit, 0.0, True)
+    orders = [order for order in (1, 2) if _falls_on_lines(runs[0], order)]
+    shaft = orbit, float(np.linalg.norm([film.at_turned(runs, order) for order in orders]))
+    silent = ~np.any([run.driven | run.disturbed for run in runs], axis=0)
+    number = np.round(runs[0].frequencies * runs[0].period).astype(int)
+    motion = np.mean([np.sum(np.abs(run.D.mean(axis=0)) ** 2, axis=1) * run.driven for run in runs], axis=0)
+    sums = np.stack(_sums(number, motion / 4), axis=1)
+    reached = sums > _REACHED * np.median(sums[driven | silent], axis=0)
+    silent &= reached.any(axis=1)
+    even = bool(reached[driven, 0].mean() > 0.5)
+    if silent.sum() < _LEAST_LINES:
+        return FilmProducts(np.nan, np.nan, *shaft, even)
+    square, cube = _curvature(sums[silent] * [8.0, 24.0], film.excess(runs, silent))  # of amplitudes' squares, 4 S
+    stiffness = np.sqrt(film.force / motion[driven].mean())
+    cube = max(cube, (_STANDS_IN * square / stiffness) ** 2)
+    change = 3 * np.sqrt(cube) * max(run.rms for run in runs) ** 2 / stiffness
+    scatter = np.sqrt((sums[driven] @ [8 * square, 24 * cube]).mean() / film.force)
+    return FilmProducts(_ALLOWED * float(change), _ALLOWED * float(scatter), *shaft, even)
+
+
+def _falls_on_lines(run: RunSpectra, order: int) -> bool:
+    """Whether the shaft turns with the period, so that what stands at n X - f is on driven lines."""
+    assert run.period is not None
+    turns = order * run.shaft * run.period
+    if not turns or abs(turns - round(turns)) * len(run.phasors.start) > _ON_LINE:
+        return False
+    number = np.round(run.frequencies[run.driven] * run.period)
+    return bool(np.isin(np.abs(round(turns) - number), number).any())
+
+
+def _curvature(sums: FloatArray, power: FloatArray) -> tuple[float, float]:
+    """Squares of kappa_2 and kappa by powers (n,) at some lines, as `sums` (n, 2) of two and three lines make them."""
+    size = np.maximum(sums.max(axis=0), np.finfo(float).tiny)
+    expected = np.ones(len(power))
+    for _ in range(_ROUNDS):
+        numbers = nnls(sums / size / expected[:, None], power / expected)[0]
+        expected = np.maximum(sums / size @ numbers, 1e-3 * max(float((sums / size @ numbers).max()), 1e-300))
+        expected /= expected.max()
+    square, cube = numbers / size
+    return float(square), float(cube)
+
+
+def _sums(number: IntArray, power: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sums over two and three lines of either sign that meet at a line, of their powers; `number` (n,) of periods."""
+    top = int(number.max())
+    lines = np.zeros(2 * top + 1)
+    lines[top + number], lines[top - number] = power, power
+    two = fftconvolve(lines, lines)
+    three = fftconvolve(two, lines)
+    return np.maximum(two[2 * top + number], 0.0), np.maximum(three[3 * top + number], 0.0)
+
+
+@dataclass(frozen=True)
+class _Film:
+    """K-C-M of the driven lines by least squares."""
+
+    driven: BoolArray  #: (n_bins,)
+    numbers: FloatArray  #: (12,)
+    middle: float  #: rad/s
+    force: float  #: N^2: mean square of the driven lines' film force
+
+    @staticmethod
+    def of(runs: Sequence[RunSpectra], driven: BoolArray) -> _Film:
+        """The film of some runs by their driven lines (n_bins,)."""
+        omega = 2 * np.pi * runs[0].frequencies[driven]
+        middle = float(np.median(omega)) if len(omega) else 1.0
+        columns = _columns(omega, middle)
+        D, F = (np.array([getattr(run, name).mean(axis=0)[driven] for run in runs]) for name in "DF")
+        design = np.einsum("kijq,rkj->rkiq", columns, D).reshape(-1, columns.shape[3])
+        rows = np.concatenate([design.real, design.imag])
+        numbers = np.linalg.lstsq(rows, np.concatenate([F.real.ravel(), F.imag.ravel()]), rcond=None)[0]
+        return _Film(driven, numbers, middle, float(np.mean(np.sum(np.abs(F) ** 2, axis=2))) if F.size else np.inf)
+
+    def unexplained(self, D: ComplexArray, F: ComplexArray, frequencies: FloatArray) -> ComplexArray:
+        """Force beyond h D at some frequencies [Hz], negative ones too, (n_windows, n_bins, 2) [N]."""
+        h = _columns(2 * np.pi * frequencies, self.middle) @ self.numbers
+        return np.asarray(F - np.einsum("kij,wkj->wki", h, D))
+
+    def excess(self, runs: Sequence[RunSpectra], places: BoolArray) -> FloatArray:
+        """Mean square of the runs' unexplained force at some bins without its noise, (n,) [N^2]."""
+        squares = []
+        for run in runs:
+            force = self.unexplained(run.D[:, places], run.F[:, places], run.frequencies[places])
+            noise = np.sum(np.var(force, axis=0, ddof=1), axis=1) / len(force)
+            squares.append(np.sum(np.abs(force.mean(axis=0)) ** 2, axis=1) - noise)
+        return np.asarray(np.mean(squares, axis=0))
+
+    def at_turned(self, runs: Sequence[RunSpectra], order: int) -> float:
+        """Force at f - nX that goes with a run's motion at f, over the force at f; zero where noise explains it."""
+        squares = [0.0]
+        for run in runs:
+            if order in run.turned and self.driven.any():
+                turned, motion = run.turned[order], run.D.mean(axis=0)[self.driven]
+                D, F = turned.displacement.phasors, turned.oil_force(slice(None))
+                force = self.unexplained(D, F, run.frequencies - order * run.shaft)[0, self.driven]
+                kept = motion @ np.linalg.lstsq(motion, force, rcond=_ACROSS)[0]
+                noise = np.sum(np.abs(force - kept) ** 2) * 2 / max(len(force) - 2, 1)
+                squares.append((np.sum(np.abs(kept) ** 2) - noise) / len(force) / self.force)
+        return float(np.sqrt(max(np.sum(squares) / max(len(squares) - 1, 1), 0.0)))
+
+
+def _columns(omega: FloatArray, middle: float) -> ComplexArray:
+    """Change of h (n, 2, 2, 12) by the numbers of K-C-M."""
+    shape = over_frequency("K-C-M", np.zeros(len(omega), dtype=np.intp), omega, np.array([middle]))
+    assert shape.columns is not None
+    columns = shape.columns[:, :4] + 1j * shape.columns[:, 4:]
+    return np.asarray(columns.reshape(len(omega), 2, 2, -1))
