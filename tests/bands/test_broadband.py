@@ -20,7 +20,7 @@ from tests.rigs.band_rig import BandRig, band_plans, stiffness
 from tests.studies.band_coverage import true_parameters
 from tpjb_ident.bands.classic import classic_line
 from tpjb_ident.bands.period import find_period, resampled
-from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_noise, stands_out, tones
+from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_noise, stands_out
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.bands.samples import Samples
 from tpjb_ident.conditions import untrusted
@@ -439,16 +439,15 @@ def test_one_phase_set_is_told_from_several():
     assert not one_phase_set(other)
 
 
-def test_tones_are_the_lines_that_are_driven():
+def test_lines_are_driven_where_the_command_is_or_else_what_moves():
     rng = np.random.default_rng(9)
-
-    def run(*places):
-        D = 1e-3 * _complex(rng, (8, 60, 2))
-        D[:, list(places)] += np.exp(1j * rng.uniform(0, 6, len(places)))[:, None] * [1.0, 0.3]
-        return spectra(D, D)
-
-    assert tones([run(30, 37), run(30, 37)]) == 2
-    assert tones([run(30, 37), run(15, 28, 43)]) == 3
+    D = 1e-3 * _complex(rng, (8, 60, 2))
+    D[:, [30, 37]] += np.exp(1j * rng.uniform(0, 6, 2))[:, None] * [1.0, 0.3]
+    assert np.flatnonzero(spectra(D, D, period=1.0).driven).tolist() == [30, 37]
+    command = np.zeros((8, 60, 2), complex)
+    command[:, 37] = 1.0
+    assert np.flatnonzero(spectra(D, D, command, period=1.0).driven).tolist() == [37]
+    assert spectra(D, D, command).driven.all()
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,16 @@ def test_blows_and_sweeps_fill_no_channel():
         assert slower_channel(values + noise, 2000.0) is None
 
 
+def test_what_the_film_makes_of_the_shaft_s_orbit_is_no_image():
+    """A film that is not linear puts every line of a band at X - f and 2X - f again, as slow sampling does."""
+    rng, t, speed = np.random.default_rng(4), np.arange(8000) / 2000.0, 97.0
+    lines = np.arange(6.1, 70.0, 0.3)
+    band = np.cos(2 * np.pi * np.outer(t, lines) + rng.uniform(0, 6, len(lines))).sum(axis=1)
+    for order in (1, 2):
+        values = band * (1 + 0.1 * np.cos(2 * np.pi * order * speed * t)) + 0.01 * rng.standard_normal(len(t))
+        assert slower_channel(values, 2000.0, speed) is None
+
+
 def test_straight_lines_make_a_sine_smaller_by_sinc_squared():
     assert SlowerChannel(300.0, 2000.0, 2).at(np.array([25.0]))[0] == pytest.approx(np.sinc(25 / 300) ** 2)
     held = SlowerChannel(250.0, 2000.0, 1).at(np.array([25.0]))[0]

@@ -28,8 +28,8 @@ from tpjb_ident.runs.point_data import mean_temperatures
 
 #: Share of the power that a period may leave where none is stated.
 _LEFT = 0.5
-#: Share of a period's largest line from which another one is driven.
-_DRIVEN = 0.03
+#: Share of a period's largest line from which another one is driven, in the command, and in motion or force.
+_DRIVEN, _MOVED = 0.03, 0.1
 #: Kinds that may repeat themselves, and whose records may begin and end in motion; a hammer waits for rest.
 OPEN_ENDS = ("multisine", "random", "sweep")
 
@@ -81,9 +81,10 @@ class RunSpectra:
         """Bins (n_bins,) that the excitation drives; of a period the film fills others by its curvature."""
         if self.period is None:
             return np.ones(len(self.frequencies), dtype=bool)
+        least = _MOVED if self.command is None else _DRIVEN
         drives = [self.D, self.F] if self.command is None else [self.command]
         sizes = [np.linalg.norm(drive.mean(axis=0), axis=1) for drive in drives]
-        return np.asarray(np.max([size / max(size.max(), 1e-300) for size in sizes], axis=0) > _DRIVEN)
+        return np.asarray(np.max([size / max(size.max(), 1e-300) for size in sizes], axis=0) > least)
 
     @property
     def amplitude(self) -> float:

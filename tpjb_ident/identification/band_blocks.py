@@ -41,7 +41,8 @@ class BandBlocks:
     driven: BoolArray  #: (L,): whether an excitation stands above the noise
     clear: BoolArray  #: (L,): whether it does so by far in both directions
     bent: FloatArray  #: (B,): share by which the motion may change H
-    uneven: FloatArray  #: (B,): relative scatter of the lines' film force, in one phase set
+    uneven: FloatArray  #: (B,): relative scatter of the lines' film force that no repeat averages away
+    turning: FloatArray  #: (B,): the same that differs from run to run with the shaft's angle
 
 
 def band_blocks(
@@ -82,7 +83,7 @@ def band_blocks(
     strong = _strengths(Rig(sensors, 1.0), blocks, line[blocks.point], len(driven)) > STRONG
     band = np.repeat(np.arange(len(points)), np.diff(lines))
     quiet = np.array([point.method == "hv" for point in points])[band]
-    bent, uneven = np.array([_film(point, clearance) for point in points]).T
+    bent, repeated, turning = np.array([_film(point, clearance) for point in points]).T
     return BandBlocks(
         blocks.part(np.flatnonzero(driven[line[blocks.point]])),
         2 * np.pi * np.concatenate([plan.middles for plan in plans]),
@@ -92,12 +93,13 @@ def band_blocks(
         driven,
         np.where(quiet, np.nan_to_num(coherent) > _LEAST_COHERENCE, strong),
         bent,
-        uneven,
+        np.hypot(repeated, turning),
+        turning,
     )
 
 
-def _film(point: BandPoint, clearance: float | None) -> tuple[float, float]:
-    """What a film that is not linear may do to H and, in one phase set of a multi-sine, to single lines."""
+def _film(point: BandPoint, clearance: float | None) -> tuple[float, float, float]:
+    """What a film that is not linear may do to H, to lines of one phase set alike in all runs, and in each run."""
     periodic = point.method == "periods"
     # two tones make nothing of one another that falls on them
     pair = periodic and max(s.driven.sum() for s in point.spectra) < 3
@@ -111,7 +113,7 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, float]:
         change = band_change("pair" if pair else point.group.kind, rms, peak, one_sided)
         scatter = line_scatter(rms) if lines.even else change
     change, scatter = np.nan_to_num([change, scatter])
-    return worth_stating(change + lines.orbit), float(np.hypot(scatter * repeats, lines.turning))
+    return worth_stating(change + lines.orbit), scatter * repeats, lines.turning
 
 
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:

@@ -151,7 +151,8 @@ def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution,
 def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArray]:
     """Scatter that a run's gain has by its missed load, which may be one, or do what nothing tells, (number of runs,).
 
-    And one for every run whose point has more than the two runs that h needs, else zero.
+    And one for every run whose point has more than the two runs that h needs, else zero: what the film makes of the
+    shaft's turning on the lines themselves differs from run to run as well, and would pass for a gain.
     """
     blocks = data.blocks
     families: dict[tuple[object, ...], set[float]] = {}
@@ -162,7 +163,7 @@ def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArra
     by_load[blocks.run] = np.hypot(GAIN_OR_LOAD, UNKNOWN_EXPONENT * alone[blocks.point]) * np.abs(blocks.miss.real)
     runs, first = np.unique(blocks.run, return_index=True)
     band = data.band[data.line[blocks.point[first]]]
-    spare[runs] = np.bincount(band)[band] > 2
+    spare[runs] = (np.bincount(band)[band] > 2) & (data.turning[band] < _FIRST)
     return by_load, spare
 
 
