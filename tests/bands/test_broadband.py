@@ -12,7 +12,7 @@ import pytest
 from rigdata import load_campaign
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tests.phasors.phasor_cases import vector_channels
 from tests.rigs import closed_form as cf
 from tests.rigs.band_campaign import write_band_campaign
@@ -376,8 +376,7 @@ def _column(name: str, kind: str) -> str:
 @pytest.mark.slow
 def test_the_command_writes_h_over_the_band_whole(tmp_path):
     path = campaign(tmp_path, BandRig(kind="multisine", seconds=6.0))
-    result = tpjb("identify", path, "--plain", "--keep-r", "--out", tmp_path / "out")
-    assert result.exit_code == 0, result.output
+    result = ended(0, "identify", path, "--plain", "--keep-r", "--out", tmp_path / "out")
     plain = pd.read_csv(tmp_path / "out" / "plain.csv")
     assert len(plain) == 0  # Eq. (15) line by line is for sines
     assert "kxx_N_per_m" in plain
@@ -393,8 +392,7 @@ def test_the_command_writes_h_over_the_band_whole(tmp_path):
     )
     for (_, name, kind), variance in kinds.sum().items():
         assert np.isclose(rows[_column(name, kind)], np.sqrt(variance), rtol=1e-9).any(), (name, kind)
-    exported = tpjb("export", tmp_path / "out", "--to", "ross", "--out", tmp_path / "ross")
-    assert exported.exit_code == 0, exported.output
+    ended(0, "export", tmp_path / "out", "--to", "ross", "--out", tmp_path / "ross")
     assert tpjb("check", path, "--out", tmp_path / "checked").exit_code == 0
 
 
@@ -424,8 +422,7 @@ def test_a_band_is_compared_and_stands_beside_sines(tmp_path):
 @pytest.mark.slow
 def test_a_band_that_the_record_cannot_resolve_is_refused(tmp_path):
     path = campaign(tmp_path, BandRig(kind="random", seconds=0.4))
-    result = tpjb("identify", path, "--out", tmp_path / "out")
-    assert result.exit_code == 2
+    result = ended(2, "identify", path, "--out", tmp_path / "out")
     assert "record" in result.output
 
 
@@ -496,8 +493,7 @@ def test_a_multisine_that_starts_late_or_ends_early_is_taken_where_it_drives(tmp
 @pytest.mark.parametrize("band", [(8.0, 60.0), (25.0, 28.5)])
 def test_a_band_in_which_nothing_drives_gives_no_line_and_says_so(tmp_path, band):
     rig = cf.Rig(excitation="multisine", band=band, seconds=6.0, directions=(20.0, 110.0), amplitude=1e-9)
-    result = tpjb("identify", cf.write_rig(tmp_path, rig), "--out", tmp_path / "out")
-    assert result.exit_code == 3, result.output
+    result = ended(3, "identify", cf.write_rig(tmp_path, rig), "--out", tmp_path / "out")
     assert "excitation-too-weak" in result.output
     assert pd.read_csv(tmp_path / "out" / "frf.csv").empty
 

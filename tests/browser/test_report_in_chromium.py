@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import tpjb
+from tests.command_line import ended
 
 pytestmark = pytest.mark.slow
 
@@ -53,8 +53,7 @@ OVERFLOW = """
 def report(tmp_path_factory):
     """Report of `tpjb demo`."""
     out = tmp_path_factory.mktemp("report") / "demo"
-    done = tpjb("demo", "--quiet", "--out", out)
-    assert done.exit_code == 0, done.output
+    ended(0, "demo", "--quiet", "--out", out)
     return out / "report.html"
 
 

@@ -18,7 +18,7 @@ import typer
 from typer.testing import CliRunner
 
 from rigdata.problem import Problem, RigDataError
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.commands.app import app
 from tpjb_ident.cli.options import ROCKER
@@ -187,8 +187,7 @@ def test_the_readme_s_commands_run_and_say_first_the_verdict_and_last_the_next_c
     run = [SHORT.get(words[0], words) for words in lines if words and words[0] not in RUN_ELSEWHERE]
     assert {words[0] for words in run} >= set(VERDICTS)
     for words in run:
-        result = tpjb(*words)
-        assert result.exit_code == 0, f"{words}\n{result.output}"
+        result = ended(0, *words)
         if words[0] in VERDICTS:
             first, *_, last = result.stdout.strip().splitlines()
             assert VERDICTS[words[0]] in first
@@ -200,8 +199,7 @@ def test_the_readme_s_commands_run_and_say_first_the_verdict_and_last_the_next_c
 @pytest.mark.slow
 def test_of_a_watch_and_of_a_page_as_well(tmp_path):
     folder = tmp_path / "here"
-    result = tpjb("simulate", ROCKER, "--plan", "short", "--load", "5 kN", "--format", "csv", "--out", folder)
-    assert result.exit_code == 0, result.output
+    ended(0, "simulate", ROCKER, "--plan", "short", "--load", "5 kN", "--format", "csv", "--out", folder)
     campaign = folder / "campaign"
     watched = tpjb("watch", campaign, "--once", "--settle", "0 s", "--out", tmp_path / "o").stdout.strip().splitlines()
     assert watched[0] == "virtual: 22 of 22 runs landed, 0 to be repeated, 0 to look at."
@@ -212,8 +210,7 @@ def test_of_a_watch_and_of_a_page_as_well(tmp_path):
 
 @pytest.mark.slow
 def test_after_a_prediction_without_answer_comes_one_that_may_have_it(tmp_path):
-    result = tpjb("predict", ROCKER, "--load", "500 kN", "--out", tmp_path / "o")
-    assert result.exit_code == 3
+    result = ended(3, "predict", ROCKER, "--load", "500 kN", "--out", tmp_path / "o")
     expected = ["Next:", "tpjb", "predict", ROCKER, "--load", "500 kN", "--speed", "22 Hz"]
     assert shlex.split(result.stdout.strip().splitlines()[-1]) == [
         *expected, "--pivots", "rigid", "--thermal", "isothermal",

@@ -19,7 +19,7 @@ import pytest
 from model.growth import Growth
 from model.options import Options
 from rigdata.campaign import load_campaign
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tpjb_ident.cli.commands.predict import parse_physics
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime import executors
@@ -36,8 +36,7 @@ def identified(small_campaign, tmp_path_factory):
 
 
 def test_help_lists_every_command():
-    result = tpjb("--help")
-    assert result.exit_code == 0
+    result = ended(0, "--help")
     listed = [line.split()[0] for line in result.stdout.partition("Commands:")[2].splitlines() if line.strip()]
     assert set(COMMANDS) <= set(listed)
 
@@ -136,16 +135,14 @@ def test_one_direction_is_no_answer_and_exits_3(small_campaign, tmp_path):
         kept = [r for r in runs if 'kind = "dynamic"' in r and 'excitation_direction = "0 deg"' in r]
         assert len(kept) == 2
         file.attrs["manifest"] = "[[runs]]".join([head, *kept])
-    result = tpjb("identify", narrow, "--out", tmp_path / "out")
-    assert result.exit_code == 3
+    result = ended(3, "identify", narrow, "--out", tmp_path / "out")
     assert "not to be trusted" in result.stderr
     assert (tmp_path / "out" / "coefficients.csv").exists()
 
 
 @pytest.mark.slow
 def test_locus_and_clearance(small_campaign, tmp_path):
-    result = tpjb("locus", small_campaign, "--out", tmp_path / "out")
-    assert result.exit_code == 0, result.output
+    ended(0, "locus", small_campaign, "--out", tmp_path / "out")
     clearance = pd.read_csv(tmp_path / "out" / "clearance.csv")
     assert clearance["clearance_pushed_m"].notna().all()
     assert (clearance["clearance_m"] - 80e-6).abs().max() < 2e-6
@@ -153,9 +150,8 @@ def test_locus_and_clearance(small_campaign, tmp_path):
 
 
 def test_predict_every_combination(rocker_file, tmp_path):
-    result = tpjb("predict", rocker_file, "--load", "2.5, 5 kN", "--excitation", "20, 25 Hz", "--pivots", "6e8 N/m",
+    ended(0, "predict", rocker_file, "--load", "2.5, 5 kN", "--excitation", "20, 25 Hz", "--pivots", "6e8 N/m",
                   "--thermal", "isothermal", "--out", tmp_path / "out")  # fmt: skip
-    assert result.exit_code == 0, result.output
     frame = pd.read_csv(tmp_path / "out" / "prediction.csv")
     assert list(zip(frame["static_load_N"], frame["excitation_Hz"], strict=True)) == [
         (2500.0, 20.0), (2500.0, 25.0), (5000.0, 20.0), (5000.0, 25.0)
@@ -172,8 +168,7 @@ def test_an_effect_that_the_bearing_cannot_have_is_refused_with_its_file(
     effects = tmp_path / "nine.toml"
     effects.write_text('schema = "tpjb-effects/1"\n[[effects]]\nname = "soft_pivot"\npad = 9\nstiffness_factor = 0.3\n')
     source = (rocker_file,) if command in ("predict", "simulate") else (small_campaign, "--bearing", rocker_file)
-    result = tpjb(command, *source, "--effects", effects, "--out", tmp_path / "o")
-    assert result.exit_code == 2
+    result = ended(2, command, *source, "--effects", effects, "--out", tmp_path / "o")
     assert "--effects nine.toml: soft_pivot: pad 9 does not exist; the bearing has 5 pads." in result.stderr
     assert not (tmp_path / "o").exists()
 
@@ -229,8 +224,7 @@ def test_compare_writes_the_same_where_the_background_job_is_lost(compared, smal
 @pytest.mark.parametrize("form", ["ross", "csv", "mat"])
 def test_export_from_results(identified, tmp_path, form):
     _, out = identified
-    result = tpjb("export", out, "--to", form, "--out", tmp_path / "out")
-    assert result.exit_code == 0, result.output
+    ended(0, "export", out, "--to", form, "--out", tmp_path / "out")
     assert len(list((tmp_path / "out").iterdir())) >= 2
 
 
@@ -243,8 +237,7 @@ def test_simulate_tests_every_pad_at_the_speed_and_load_asked_for(rocker_file, t
         re.sub("pivot_angles = .*", angles, text).replace('arc = "60 deg"', 'arc = "72 deg"'), encoding="utf-8"
     )
     words = ("--plan", "short", "--speed", "3000 rpm", "--load", "20 kN", "--thermal", "isothermal", "-q")
-    result = tpjb("simulate", four, *words, "--out", tmp_path / "o")
-    assert result.exit_code == 0, result.output
+    ended(0, "simulate", four, *words, "--out", tmp_path / "o")
     campaign = load_campaign(tmp_path / "o" / "campaign.h5")
     kinds = Counter(run.kind for run in campaign.runs)
     assert kinds["dry_pivot"] == 4
@@ -257,8 +250,7 @@ def test_simulate_tests_every_pad_at_the_speed_and_load_asked_for(rocker_file, t
 def test_simulate_is_repeatable_and_readable(rocker_file, tmp_path):
     arguments = ("simulate", rocker_file, "--plan", "short", "--load", "3 kN", "--thermal", "isothermal", "--seed", "5")
     for name in "ab":
-        result = tpjb(*arguments, "--out", tmp_path / name)
-        assert result.exit_code == 0, result.output
+        ended(0, *arguments, "--out", tmp_path / name)
     a, b = (tmp_path / name / "campaign.h5" for name in "ab")
     assert a.read_bytes() == b.read_bytes()
     assert json.loads((tmp_path / "a" / "truth.json").read_text())["seed"] == 5
@@ -304,8 +296,7 @@ def test_bad_input_is_one_message_and_exit_2(arguments, says, small_campaign, ro
     monkeypatch.chdir(tmp_path)
     before = small_campaign.read_bytes()
     filled = [a.format(campaign=small_campaign, bearing=rocker_file) for a in arguments]
-    result = tpjb(*filled, "--out", tmp_path / "out")
-    assert result.exit_code == 2, result.output
+    result = ended(2, *filled, "--out", tmp_path / "out")
     assert says in result.stderr
     assert "Traceback" not in result.output
     assert list(tmp_path.iterdir()) == []
@@ -318,18 +309,16 @@ def test_a_pipe_is_refused_not_waited_for(command, tmp_path):
     pipe = tmp_path / "pipe.h5"
     os.mkfifo(pipe)
     extra = ("--to", "csv") if command == "export" else ()
-    result = tpjb(command, pipe, *extra, "--out", tmp_path / "out")
-    assert result.exit_code == 2
+    result = ended(2, command, pipe, *extra, "--out", tmp_path / "out")
     assert "a pipe" in result.stderr
 
 
 @pytest.mark.slow
 def test_plan_tells_floor_and_look_alikes_of_a_thin_campaign(rocker_file, tmp_path):
-    result = tpjb(
-        "plan", rocker_file, "--load", "5 kN", "--excitation", "25 Hz", "--locus", 0, "--no-dry", "--push", 0,
+    ended(
+        0, "plan", rocker_file, "--load", "5 kN", "--excitation", "25 Hz", "--locus", 0, "--no-dry", "--push", 0,
         "--no-temperatures", "--data-sets", "--out", tmp_path / "out",
     )  # fmt: skip
-    assert result.exit_code == 0, result.output
     data = json.loads((tmp_path / "out" / "plan.json").read_text(encoding="utf-8"))
     assert data["schema"] == "tpjb-plan/1"
     assert ["oil_viscosity", "supply_temperature"] in data["confusable"]

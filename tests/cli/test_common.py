@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rigdata.operating_point import ROTATIONS
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tpjb_ident.cli.commands.app import app
 from tpjb_ident.cli.commands.show import BARS, sparkline
 from tpjb_ident.cli.options import choices
@@ -29,8 +29,7 @@ def locus_as_json(small_campaign, tmp_path_factory):
 
 @functools.cache
 def help_of(command):
-    result = tpjb(command, "--help")
-    assert result.exit_code == 0
+    result = ended(0, command, "--help")
     return result.stdout
 
 
@@ -59,8 +58,7 @@ def test_json_is_one_document_with_the_results_in_it(locus_as_json):
 
 
 def test_json_of_a_failure_names_it_and_keeps_the_exit_code(tmp_path):
-    result = tpjb("identify", tmp_path / "nothing.h5", "--json")
-    assert result.exit_code == 2
+    result = ended(2, "identify", tmp_path / "nothing.h5", "--json")
     document = json.loads(result.stdout)
     assert document["exit_code"] == 2
     assert document["remarks"][-1]["kind"] == "error"
@@ -70,8 +68,7 @@ def test_json_of_a_failure_names_it_and_keeps_the_exit_code(tmp_path):
 
 @pytest.mark.slow
 def test_quiet_says_nothing_when_all_is_well_and_errors_when_not(small_campaign, tmp_path):
-    result = tpjb("locus", small_campaign, "--out", tmp_path / "o", "--quiet")
-    assert result.exit_code == 0
+    result = ended(0, "locus", small_campaign, "--out", tmp_path / "o", "--quiet")
     assert result.stdout == ""
     assert "doing" not in result.stderr
     assert (tmp_path / "o" / "locus.csv").exists()
@@ -112,8 +109,7 @@ def test_examples_are_of_commands_that_exist_and_their_options_too():
     ],
 )
 def test_a_mistyped_command_or_option_is_answered_with_the_nearest(typed, meant):
-    result = tpjb(*typed.split())
-    assert result.exit_code == 2
+    result = ended(2, *typed.split())
     assert meant in result.stderr
 
 
@@ -171,21 +167,18 @@ def folder(tmp_path):
 
 
 def test_init_writes_a_draft_that_check_can_work_on(folder):
-    result = tpjb("init", folder)
-    assert result.exit_code == 0, result.stderr
+    ended(0, "init", folder)
     text = (folder / "campaign.toml").read_text(encoding="utf-8")
     assert 'static_load = "5 kN"' in text
     assert 'excitation_frequency = "25 Hz"' in text
     assert "??" in text
-    checked = tpjb("check", folder, "--out", folder.parent / "o")
-    assert checked.exit_code == 2
+    checked = ended(2, "check", folder, "--out", folder.parent / "o")
     assert "sensitivity" in checked.stdout
 
 
 def test_init_never_replaces_a_manifest(folder):
     (folder / "campaign.toml").write_text("mine", encoding="utf-8")
-    result = tpjb("init", folder)
-    assert result.exit_code == 2
+    result = ended(2, "init", folder)
     assert "stays as it is" in result.stderr
     assert (folder / "campaign.toml").read_text(encoding="utf-8") == "mine"
 
@@ -199,8 +192,7 @@ def test_init_with_out_leaves_the_records_folder_alone(folder, tmp_path):
 
 def test_init_leaves_out_what_it_cannot_read_and_says_so(folder):
     (folder / "letter.txt").write_text("Dear Sir,\n", encoding="utf-8")
-    result = tpjb("init", folder)
-    assert result.exit_code == 0
+    result = ended(0, "init", folder)
     assert "letter.txt" in result.stderr
 
 
@@ -226,15 +218,13 @@ def test_show_lists_runs_and_channels(small_campaign):
 
 
 def test_show_answers_a_wrong_run_with_the_nearest(small_campaign):
-    result = tpjb("show", small_campaign, "--run", "d-2500-25-01")
-    assert result.exit_code == 2
+    result = ended(2, "show", small_campaign, "--run", "d-2500-25-01")
     assert "Did you mean 'd-02500-25-01'" in result.stderr
 
 
 @pytest.mark.slow
 def test_show_of_a_lone_file_draws_a_picture(folder, tmp_path):
-    result = tpjb("show", folder / "test-5kN.csv", "--picture", "--out", tmp_path / "o")
-    assert result.exit_code == 0, result.stderr
+    ended(0, "show", folder / "test-5kN.csv", "--picture", "--out", tmp_path / "o")
     assert (tmp_path / "o" / "figures" / "quick-look.png").stat().st_size > 5000
     assert (tmp_path / "o" / "channels.csv").exists()
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from rigdata.virtual_rig import write_campaign
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tests.identification.test_identify import rig
 
 DISTURBED = "d-05000-25-02"
@@ -89,8 +89,7 @@ def test_models_over_frequency_are_written_and_shown(disturbed):
 def plain(small_campaign, tmp_path_factory):
     """Folder with what least squares say of the small campaign."""
     out = tmp_path_factory.mktemp("plain") / "out"
-    result = tpjb("identify", small_campaign, "--method", "ols", "--out", out)
-    assert result.exit_code == 0, result.output
+    ended(0, "identify", small_campaign, "--method", "ols", "--out", out)
     return out
 
 
@@ -105,14 +104,12 @@ def test_several_excitation_lines_of_each_record(tmp_path):
     points = [(5000.0, f) for f in (15.0, 25.0, 36.0)]
     write_campaign(tmp_path / "c.h5", rig(points, seed=3, joint_frequencies=True))
     lines = ("--lines", "15, 25, 36 Hz")
-    result = tpjb("identify", tmp_path / "c.h5", *lines, "--out", tmp_path / "thrice")
-    assert result.exit_code == 3  # the file lists every record three times, once per frequency
+    result = ended(3, "identify", tmp_path / "c.h5", *lines, "--out", tmp_path / "thrice")
     assert "holds the very samples of run" in result.stderr
     with h5py.File(tmp_path / "c.h5", "r+") as file:
         for run in [name for name in file["runs"] if "-15-" not in name]:
             del file["runs"][run]
-    result = tpjb("identify", tmp_path / "c.h5", *lines, "--out", tmp_path / "out")
-    assert result.exit_code == 0, result.output
+    ended(0, "identify", tmp_path / "c.h5", *lines, "--out", tmp_path / "out")
     frame = pd.read_csv(tmp_path / "out" / "coefficients.csv")
     assert frame["excitation_Hz"].tolist() == [15.0, 25.0, 36.0]
     np.testing.assert_allclose(frame["kyy_N_per_m"], 1.8e8, rtol=0.01)
@@ -122,8 +119,7 @@ def test_several_excitation_lines_of_each_record(tmp_path):
 def test_a_known_delay_turns_the_phases(small_campaign, plain, tmp_path):
     """A force that was recorded late leads what it seems to be: h turns ahead by omega times the delay."""
     h, delays = [], ("--delay", "force=1 ms", "--delay", "acceleration=1 ms")
-    result = tpjb("identify", small_campaign, "--method", "ols", "--out", tmp_path / "out", *delays)
-    assert result.exit_code == 0, result.output
+    ended(0, "identify", small_campaign, "--method", "ols", "--out", tmp_path / "out", *delays)
     for out in (plain, tmp_path / "out"):
         row = pd.read_csv(out / "coefficients.csv").iloc[0]
         h.append(row["kyy_N_per_m"] + 2j * np.pi * 25 * row["cyy_Ns_per_m"])

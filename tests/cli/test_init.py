@@ -9,7 +9,7 @@ from model.bearing import BearingError
 from model.bearing_file import load_bearing
 from rigdata import RigDataError, load_campaign
 from rigdata.manifest.manifest import parse_manifest
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 
 TIME = np.arange(2000) / 1000.0
 
@@ -50,8 +50,7 @@ def test_columns_without_names_are_named_by_hand_and_guessed_anew(folder):
         start = manifest.read_text("utf-8").index(f"[channels.column{number}]")
         end = manifest.read_text("utf-8").index("[", start + 5)
         manifest.write_text(manifest.read_text("utf-8")[:start] + manifest.read_text("utf-8")[end:], "utf-8")
-    result = tpjb("init", folder, "--update")
-    assert result.exit_code == 0, result.stderr
+    ended(0, "init", folder, "--update")
     after = manifest.read_text("utf-8")
     assert '[channels.X1]\nquantity = "displacement"' in after
     assert '[channels.FV]\nquantity = "force"' in after
@@ -119,8 +118,7 @@ def test_filling_in_a_unit_leaves_what_is_like_it_and_a_valid_manifest_valid(fol
     text = manifest.read_text("utf-8").replace('axis = "?? deg"', 'axis = "45 deg"', 1)
     manifest.write_text(text.replace('axis = "?? deg"', 'axis = "135 deg"   # by the drawing'), "utf-8")
     assert len(load_campaign(folder).runs) == 1
-    result = tpjb("init", folder, "--update")
-    assert result.exit_code == 0, result.stderr
+    ended(0, "init", folder, "--update")
     after = manifest.read_text("utf-8")
     assert 'like = "Prox A"' in after
     assert 'axis = "135 deg"   # by the drawing' in after
@@ -134,16 +132,14 @@ def test_open_places_are_one_line_and_the_last_one_the_next_command(folder):
     assert "2 axis" in first
     assert "1 mass" in first
     assert last == f"Next: tpjb init {folder} --update"
-    result = tpjb("check", folder, "--out", folder.parent / "out")
-    assert result.exit_code == 2
+    result = ended(2, "check", folder, "--out", folder.parent / "out")
     assert sum("open (??)" in line for line in result.stdout.splitlines()) == 1
     assert "0 errors" not in result.stdout
 
 
 def test_update_without_a_manifest_says_so(folder):
     record(folder / "a.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"))
-    result = tpjb("init", folder, "--update")
-    assert result.exit_code == 2
+    result = ended(2, "init", folder, "--update")
     assert "nothing to carry on" in result.stderr
 
 

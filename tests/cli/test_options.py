@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.command_line import tpjb
+from tests.command_line import ended
 from tpjb_ident.cli.inputs import parse_value, parse_values
 from tpjb_ident.errors import BadInputError
 
@@ -105,8 +105,7 @@ PER_PAD = [
 
 
 def predicted(bearing, out, *options):
-    result = tpjb("predict", bearing, *POINT, *FILM, "--load-direction", "-60 deg", *options, "--out", out)
-    assert result.exit_code == 0, result.stderr
+    ended(0, "predict", bearing, *POINT, *FILM, "--load-direction", "-60 deg", *options, "--out", out)
     (row,) = csv.DictReader((out / "prediction.csv").read_text("utf-8").splitlines())
     return row
 
@@ -136,8 +135,7 @@ def test_predict_turns_the_shaft_the_way_that_is_asked_for_or_that_the_bearing_s
 @pytest.mark.parametrize("name", ["predict", "plan", "simulate"])
 def test_a_sense_that_there_is_not_is_refused_with_the_nearest(name, rocker_file, tmp_path):
     options = () if name == "simulate" else POINT
-    result = tpjb(name, rocker_file, *options, "--rotation", "clokwise", "--out", tmp_path / "out")
-    assert result.exit_code == 2
+    result = ended(2, name, rocker_file, *options, "--rotation", "clokwise", "--out", tmp_path / "out")
     assert "--rotation" in result.stderr
     assert "Did you mean 'clockwise'?" in result.stderr
     assert not (tmp_path / "out").exists()
@@ -151,8 +149,7 @@ def test_a_list_of_another_length_than_pads_is_refused(section, entry, value, ro
                             rocker_file.read_text("utf-8"), flags=re.MULTILINE)  # fmt: skip
     assert changed == 1
     drawing.write_text(text, "utf-8")
-    result = tpjb("predict", drawing, *POINT, "--out", tmp_path / "out")
-    assert result.exit_code == 2
+    result = ended(2, "predict", drawing, *POINT, "--out", tmp_path / "out")
     assert f"b.toml, [{section}] {entry}: 2 values for 5 pads. Give one each, or one for all." in result.stderr
     drawing.write_text(text.replace(f"[{value}, {value}]", f"[{', '.join(5 * [value])}]"), "utf-8")
     assert predicted(drawing, tmp_path / "five")["converged"] == "True"

@@ -7,7 +7,7 @@ import shutil
 
 import pytest
 
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tpjb_ident.runtime.differences import compared
 
 HEAD = "static_load_N,kxx_N_per_m,kxx_N_per_m_lo,kxx_N_per_m_hi,quality"
@@ -43,8 +43,7 @@ def plain(result) -> str:
 @pytest.mark.slow
 def test_the_same_comes_out_again_and_nothing_is_written_beside_it(results, tmp_path):
     before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
-    result = tpjb("rerun", results / "run.json", "--out", tmp_path / "again")
-    assert result.exit_code == 0, result.output
+    result = ended(0, "rerun", results / "run.json", "--out", tmp_path / "again")
     assert "nothing differs by more than 1e-06" in plain(result)
     listed = json.loads((tmp_path / "again" / "rerun.json").read_text(encoding="utf-8"))
     assert listed["schema"] == "tpjb-rerun/1"
@@ -60,8 +59,7 @@ def test_a_number_that_does_not_come_out_again_is_named_with_its_place(results):
     column = head.split(",").index("clearance_m")
     cells[column] = str(float(cells[column]) * 1.001)
     path.write_text("\n".join([head, ",".join(cells), *others]) + "\n", encoding="utf-8")
-    result = tpjb("rerun", results)
-    assert result.exit_code == 3
+    result = ended(3, "rerun", results)
     assert "clearance.csv differs row 1.clearance_m" in plain(result)
     assert "is not what was computed" in plain(result)
     assert tpjb("rerun", results, "--tolerance", "0.01").exit_code == 0
@@ -107,15 +105,13 @@ def test_a_record_from_elsewhere_decides_neither_where_to_write_nor_whom_to_ask(
         entry["options"] = {**entry["options"], **options} if isinstance(options, dict) else options
 
     edited(results, change)
-    result = tpjb("rerun", results)
-    assert result.exit_code == exit_code, result.output
+    result = ended(exit_code, "rerun", results)
     assert message in plain(result)
 
 
 @pytest.mark.parametrize("record", ["none.json", "coefficients.csv"])
 def test_what_is_no_record_is_refused(tmp_path, record):
-    result = tpjb("rerun", tmp_path / record)
-    assert result.exit_code == 2
+    ended(2, "rerun", tmp_path / record)
     (tmp_path / "run.json").write_text('{"schema": "tpjb-run/1", "commands": {"watch": {}}}', encoding="utf-8")
     assert "names no command that can be repeated" in plain(tpjb("rerun", tmp_path))
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from tests.command_line import tpjb
+from tests.command_line import ended
 from tpjb_ident.cli import terminal
 from tpjb_ident.cli.identification import cross_coupling_matters
 from tpjb_ident.cli.terminal import MOST_ROWS, Terminal, cell_len, table_lines, with_half, wrapped
@@ -150,8 +150,7 @@ def test_what_the_first_one_had_to_compile_is_not_foretold_of_the_rest(lines):
 @pytest.mark.slow
 def test_a_check_tells_how_many_runs_it_has_read(small_campaign, tmp_path, monkeypatch):
     monkeypatch.setattr(terminal, "LINE_EVERY", 0.0)
-    result = tpjb("check", small_campaign, "--out", tmp_path / "out")
-    assert result.exit_code == 0
+    result = ended(0, "check", small_campaign, "--out", tmp_path / "out")
     assert "tpjb: doing: reading small.h5: 9 of 10" in result.stderr
 
 

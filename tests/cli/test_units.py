@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tpjb_ident.columns import SYSTEMS, amount, degrees, place_of, use_units
 from tpjb_ident.compare.effect_words import shown_unit
 from tpjb_ident.presentation import us_table
@@ -59,16 +59,14 @@ def test_no_two_columns_of_a_table_become_one(table):
 
 
 def test_an_unknown_system_is_refused():
-    result = tpjb("check", "nowhere", "--units", "imperial")
-    assert result.exit_code == 2
+    result = ended(2, "check", "nowhere", "--units", "imperial")
     assert "--units: 'imperial' is not known. Use one of si, us." in result.output
 
 
 @pytest.mark.slow
 def test_a_prediction_is_printed_in_pounds_and_written_in_both(tmp_path):
     words = ("predict", "model/bearings/rocker.toml", "--thermal", "isothermal", "--pivots", "rigid")
-    result = tpjb(*words, "--units", "us", "--out", tmp_path / "o")
-    assert result.exit_code == 0, result.output
+    result = ended(0, *words, "--units", "us", "--out", tmp_path / "o")
     assert "load lbf" in result.output
     assert "kxx lbf/in" in result.output
     si, us = (pd.read_csv(tmp_path / "o" / f"prediction{end}.csv") for end in ("", "_us"))
@@ -83,8 +81,7 @@ def test_channels_are_shown_in_us_units_and_written_in_si(tmp_path):
     words = ("show", "rigdata/samples/demo.h5", "--run", "d-05000-25-01", "--out")
     shown = {}
     for system in ("si", "us"):
-        result = tpjb(*words, tmp_path / system, "--units", system)
-        assert result.exit_code == 0, result.output
+        result = ended(0, *words, tmp_path / system, "--units", system)
         rows = [line.split() for line in result.output.splitlines()]
         shown[system] = {row[0]: (row[1], float(row[4])) for row in rows if len(row) > 7 and row[2] == "2000"}
     units = {name: (shown["si"][name][0], shown["us"][name][0]) for name in ("X1A", "L1V", "T1", "K1", "A1H")}
@@ -99,10 +96,7 @@ def test_channels_are_shown_in_us_units_and_written_in_si(tmp_path):
 
 @pytest.mark.slow
 def test_a_report_in_us_units_holds_no_other(tmp_path):
-    result = tpjb(
-        "compare", "rigdata/samples/demo.h5", "--pivots", "measured", "--units", "us", "--out", tmp_path / "o"
-    )
-    assert result.exit_code == 0, result.output
+    ended(0, "compare", "rigdata/samples/demo.h5", "--pivots", "measured", "--units", "us", "--out", tmp_path / "o")
     page = (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
     words = " ".join(re.sub(r"<style.*?</style>|<script.*?</script>|<[^>]*>", " ", page, flags=re.S).split())
     assert not re.search(r"MN/m|\bkN\b|kN s/m|µm|[0-9] mm\b|MPa|°C", words)

@@ -7,7 +7,7 @@ import shutil
 
 import pytest
 
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tpjb_ident.cli.command import Command
 from tpjb_ident.cli.commands.verify import files_of
 from tpjb_ident.runtime.output_folder import READY
@@ -20,8 +20,7 @@ def located(tmp_path_factory, small_campaign):
     campaign = folder / "data" / "small.h5"
     campaign.parent.mkdir()
     shutil.copy(small_campaign, campaign)
-    result = tpjb("locus", campaign, "--out", folder / "out")
-    assert result.exit_code == 0, result.output
+    ended(0, "locus", campaign, "--out", folder / "out")
     return folder
 
 
@@ -62,8 +61,7 @@ def half_moved(place):
 )
 def test_each_state_has_its_words_and_its_exit_code(place, spoil, code, says):
     spoil(place)
-    result = tpjb("verify", place / "out")
-    assert result.exit_code == code, result.output
+    result = ended(code, "verify", place / "out")
     assert says in result.output
     if spoil is changed_table:
         assert "locus.csv" in result.stderr
@@ -71,8 +69,7 @@ def test_each_state_has_its_words_and_its_exit_code(place, spoil, code, says):
 
 def test_moved_inputs_are_found_where_they_are_said_to_be(place):
     (place / "data").rename(place / "elsewhere")
-    result = tpjb("verify", place / "out")
-    assert result.exit_code == 2
+    result = ended(2, "verify", place / "out")
     assert "--input" in result.stderr
     for given in (place / "elsewhere", place / "elsewhere" / "small.h5"):
         assert tpjb("verify", place / "out", "--input", given).exit_code == 0
@@ -89,8 +86,7 @@ NOTHING = '{"schema": "tpjb-run/2", "commands": {"locus": {"outputs": []}}}'
 @pytest.mark.parametrize("text", ["", "{}", "[" * 5000, '{"schema": "tpjb-run/1", "commands": []}', NOTHING])
 def test_without_a_record_nothing_can_be_said(place, text):
     (place / "out" / "run.json").write_text(text)
-    result = tpjb("verify", place / "out")
-    assert result.exit_code == 2
+    result = ended(2, "verify", place / "out")
     assert "run.json" in result.stderr
 
 
@@ -101,8 +97,7 @@ def test_a_record_of_a_stranger_cannot_send_us_out_of_the_folder(place):
     record["commands"]["locus"]["outputs_sha256"] = {"/etc/passwd": "0" * 64}
     record["commands"]["x"] = {"outputs": 5, "inputs_sha256": [1], "inputs_at": {"a": 7}, "versions": "no"}
     (place / "out" / "run.json").write_text(json.dumps(record))
-    result = tpjb("verify", place / "out")
-    assert result.exit_code == 3
+    result = ended(3, "verify", place / "out")
     assert "/etc/passwd is missing" in result.stdout
     assert "input ../../../../../../etc/passwd is missing" in result.stdout
 
@@ -111,8 +106,7 @@ def test_another_version_is_a_note_and_the_answer_can_be_written(place, tmp_path
     record = json.loads((place / "out" / "run.json").read_text())
     record["commands"]["locus"]["versions"]["numpy"] = "1.0"
     (place / "out" / "run.json").write_text(json.dumps(record))
-    result = tpjb("verify", place / "out", "--out", tmp_path / "answer")
-    assert result.exit_code == 0
+    result = ended(0, "verify", place / "out", "--out", tmp_path / "answer")
     assert "computed with numpy 1.0" in result.stderr
     answer = json.loads((tmp_path / "answer" / "verify.json").read_text())
     assert {f["state"] for f in answer["files"]} == {"same"}

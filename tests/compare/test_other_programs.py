@@ -12,7 +12,7 @@ import pytest
 
 from model.bearing_file import parse_bearing
 from rigdata import load_campaign
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
 from tpjb_ident.cli.commands.compare import refuse_comparison
 from tpjb_ident.compare.comparison import (
     CompareSettings,
@@ -159,8 +159,7 @@ def test_five_programs_stand_on_one_page_without_a_bearing(tmp_path, measured):
         theirs.to_csv(tmp_path / f"{name}.csv", index=False)
     options = [part for name in rows for part in ("--prediction", tmp_path / f"{name}.csv")]
     out = tmp_path / "out"
-    result = tpjb("compare", "--coefficients", measured, "--reading-error", "5%", *options, "--out", out)
-    assert result.exit_code == 0, result.output
+    result = ended(0, "compare", "--coefficients", measured, "--reading-error", "5%", *options, "--out", out)
     assert "tpjb diagnose" not in result.output
     comparison = pd.read_csv(out / "comparison.csv")
     for name, factor in rows.items():

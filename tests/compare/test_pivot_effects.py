@@ -10,7 +10,7 @@ import pytest
 from model.bearing_file import load_bearing
 from model.effects import Effect
 from rigdata.campaign import load_campaign
-from tests.command_line import tpjb
+from tests.command_line import ended
 from tests.good_campaigns import rocker_rig, written
 from tpjb_ident.compare.comparison import CompareSettings, compare_campaign
 from tpjb_ident.compare.predictions import (
@@ -70,8 +70,7 @@ def test_predict_refuses_measured_pivots_with_an_effect_that_they_hold(tmp_path,
     effects, pivots = tmp_path / "updated.effects.toml", tmp_path / "pivots.toml"
     effects.write_text(FOUND)
     pivots.write_text(MEASURED)
-    result = tpjb("predict", rocker_file, "--pivots", pivots, "--effects", effects, "--out", tmp_path / "out")
-    assert result.exit_code == 2
+    result = ended(2, "predict", rocker_file, "--pivots", pivots, "--effects", effects, "--out", tmp_path / "out")
     assert "soft_pivot would count twice" in " ".join(result.output.split())
     assert not (tmp_path / "out").exists()
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from model.bearing_file import load_bearing
-from tests.command_line import tpjb
+from tests.command_line import ended
 from tpjb_ident.compare.comparison import CompareSettings
 from tpjb_ident.compare.predictions import ModelSettings, predict_points
 from tpjb_ident.compare.tables import compare_table
@@ -62,9 +62,8 @@ def test_a_table_without_excitations_says_what_was_supposed(tmp_path):
 def test_the_command_writes_table_and_page(table, rocker_file, tmp_path):
     out = tmp_path / "out"
     table.write_text(table.read_text(encoding="utf-8").replace("1.2e8,2e8", "2.4e8,4e8"), encoding="utf-8")
-    result = tpjb("compare", "--coefficients", table, "--bearing", rocker_file, "--reading-error", "5%",
+    result = ended(0, "compare", "--coefficients", table, "--bearing", rocker_file, "--reading-error", "5%",
                   "--thermal", "isothermal", "--out", out)  # fmt: skip
-    assert result.exit_code == 0, result.output
     assert len(pd.read_csv(out / "comparison.csv")) == 4
     assert "predicted and measured" in (out / "report.html").read_text(encoding="utf-8")
     assert "tpjb diagnose --coefficients" in " ".join(result.output.split())
@@ -75,8 +74,7 @@ def test_the_command_writes_table_and_page(table, rocker_file, tmp_path):
     [((), "one of them"), (("--coefficients", "none.csv"), "no such file"), (("--coefficients", "T"), "Add --bearing")],
 )
 def test_what_is_missing_is_said(table, more, said):
-    result = tpjb("compare", *(table if m == "T" else m for m in more))
-    assert result.exit_code == 2
+    result = ended(2, "compare", *(table if m == "T" else m for m in more))
     assert said in " ".join(result.output.split())
 
 
