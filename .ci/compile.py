@@ -4,8 +4,6 @@ What starts cold in several processes at once is compiled in each: the tests' tw
 start would compile the search, of half a minute, three to five times. Where it is known already this takes seconds.
 """
 
-from __future__ import annotations
-
 import gc
 import sys
 from collections.abc import Sequence

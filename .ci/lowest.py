@@ -7,8 +7,6 @@ and of its `test` extra at its lower bound. A bound that does not hold fails her
 allowed is the one to use: the oldest versions have no wheels for newer ones.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -3,8 +3,6 @@
 The executed copies go to ``build/notebooks``, where the site takes its outputs and pictures from.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import time

@@ -7,8 +7,6 @@ installed here) into FOLDER. SOURCE_DATE_EPOCH is the time of the last commit; e
 the same source are not the same bytes.
 """
 
-from __future__ import annotations
-
 import hashlib
 import importlib.metadata
 import json

@@ -1,7 +1,5 @@
 """The command line in this process, for tests that are not about its start-up."""
 
-from __future__ import annotations
-
 import functools
 import os
 from typing import Any

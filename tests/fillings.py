@@ -1,7 +1,5 @@
 """How full the gap of a film is where it is ruptured, from what `solve_film_jfo` leaves."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from model.film.cavitation import fed_film

@@ -3,8 +3,6 @@
 Skipped where a library is not installed.
 """
 
-from __future__ import annotations
-
 import itertools
 import warnings
 from collections.abc import Mapping, Sequence

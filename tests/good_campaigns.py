@@ -16,8 +16,6 @@ or adds to a campaign copies it first (`shutil.copy`, `shutil.copytree`) or has 
 is shared by `once(session_folder / NAME, write)`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import os

@@ -1,7 +1,5 @@
 """Small manifests as text, a table a mapping; campaigns of them in a folder or in one HDF5 file."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

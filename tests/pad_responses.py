@@ -1,7 +1,5 @@
 """A pad's response to single films, field by field: what tests ask of `model.pad`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """What of many cases the quick run takes: the first; the others are of the whole one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

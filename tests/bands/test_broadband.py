@@ -1,7 +1,5 @@
 """Excitation over a band: exact where nothing disturbs, unbiased where displacements are noisy, honest where not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import h5py

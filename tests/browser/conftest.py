@@ -1,7 +1,5 @@
 """Headless Chromium over its debugging protocol: open a page, measure it, take its picture."""
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import functools

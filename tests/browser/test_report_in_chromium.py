@@ -1,7 +1,5 @@
 """The report as a reader meets it: wide and narrow, light and dark, with and without JavaScript, printed."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

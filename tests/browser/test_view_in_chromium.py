@@ -1,7 +1,5 @@
 """`tpjb view` as somebody uses it: in a browser, on this machine only."""
 
-from __future__ import annotations
-
 import contextlib
 import http.client
 import os

@@ -1,7 +1,5 @@
 """The parts of `check_campaign`, each on data whose fault is known."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

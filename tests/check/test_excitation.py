@@ -1,7 +1,5 @@
 """Runs beside one another: what drives them, along force or displacement, and what turns with the shaft."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

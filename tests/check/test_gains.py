@@ -1,7 +1,5 @@
 """One channel's gain in one run: exact limits, and what must not be taken for a gain."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import SimpleNamespace

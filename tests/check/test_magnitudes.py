@@ -1,7 +1,5 @@
 """Bounds of physics on the sizes of a run: rigs of every size pass, descriptions that are far off do not."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

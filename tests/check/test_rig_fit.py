@@ -1,7 +1,5 @@
 """Sensors and housing held against one another whatever the film does: what is found, and in which runs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Which way the shaft turns, by the force at running speed: told where it is described wrongly, else silent."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

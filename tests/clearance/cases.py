@@ -1,7 +1,5 @@
 """Rigs with clearance sweeps, and runs that are those of a campaign but for one thing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Clearance sweeps of the virtual rig: clearance per pad, centre, side angles, two push loads, refusals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

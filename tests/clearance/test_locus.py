@@ -1,7 +1,5 @@
 """Locus runs of the virtual rig: mean positions from the bearing centre, repeats, set points, the polygon as a wall."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Centre and corners of a clearance polygon: what the convention does with pads that stand off."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

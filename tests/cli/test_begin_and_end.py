@@ -3,8 +3,6 @@
 Every end is a result, one message, or a named bug.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """The commands as a user calls them: results, messages, exit codes."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """What all commands share: --json, --quiet, examples, completion, hints; and the commands init and show."""
 
-from __future__ import annotations
-
 import functools
 import json
 import os

@@ -1,7 +1,5 @@
 """`tpjb identify`: its options, its tables and what it says about them."""
 
-from __future__ import annotations
-
 import json
 
 import h5py

@@ -1,7 +1,5 @@
 """`tpjb init` beyond the first draft: columns without names, edited manifests, the bearing's draft."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

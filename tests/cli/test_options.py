@@ -3,8 +3,6 @@
 Lists and ranges with units, the sense of rotation, one value per pad.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -1,7 +1,5 @@
 """`tpjb rerun`: the same computed again with the options and inputs of run.json; what differs is named by its place."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

@@ -1,7 +1,5 @@
 """Tables fit the terminal; progress without one is a line now and then, with the remaining time once it is known."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

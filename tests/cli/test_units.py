@@ -1,7 +1,5 @@
 """`--units us` changes what people see, and nothing that is computed or stored."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

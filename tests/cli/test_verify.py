@@ -1,7 +1,5 @@
 """`tpjb verify`: unchanged, changed, missing, moved: each has its words and its exit code."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

@@ -1,7 +1,5 @@
 """Two campaigns against each other: what both share cancels, what changed is named, what nobody can tell is not."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from types import SimpleNamespace

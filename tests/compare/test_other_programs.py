@@ -1,7 +1,5 @@
 """`compare --prediction`: tables of other programs beside ours, met point by point, never interpolated."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

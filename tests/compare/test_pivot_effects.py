@@ -1,7 +1,5 @@
 """Measured pivots and effects on pivots never count twice."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Many operating points through the model, and the tables made of them."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

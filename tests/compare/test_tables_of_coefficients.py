@@ -1,7 +1,5 @@
 """`tpjb compare --coefficients`: prediction beside K and C of a table, read as `diagnose` reads them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The rocker bearing on a coarse mesh, what a campaign would show of it, and that with noise."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

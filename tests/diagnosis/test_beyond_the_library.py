@@ -1,7 +1,5 @@
 """End to end: what is partly explained, what the rest behaves like, and how an amplitude drifts, as the schema says."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

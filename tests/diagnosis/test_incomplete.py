@@ -1,7 +1,5 @@
 """What a campaign lacks must not pass for physics: no clearance sweep, two directions only, mains on the excitation."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Intervals of effects by their limits: a size, a factor on a logarithmic scale, sizes by pad."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

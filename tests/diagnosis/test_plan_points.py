@@ -1,7 +1,5 @@
 """Points of a plan as quantities: every combination, any unit, a wrong one named."""
 
-from __future__ import annotations
-
 import math
 
 import pint

@@ -1,7 +1,5 @@
 """What a load that points aside does to the positions of a locus."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Blocks of campaigns made by hand: what probes, cells and accelerometers read of a film that is known."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The arrow's normal equations against a dense least-squares solve with priors, and its budget against the sum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

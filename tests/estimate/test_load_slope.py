@@ -1,7 +1,5 @@
 """How H changes with the static load, told by a campaign's other loads."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

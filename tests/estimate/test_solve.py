@@ -1,7 +1,5 @@
 """The solve on blocks of a film that is known: exact limits, intervals by simulation, runs that stand apart."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

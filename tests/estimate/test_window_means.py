@@ -1,7 +1,5 @@
 """Windows of a point to one phasor a run and channel: weights, noise, slopes, drives that wander."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The estimators' one interface: exact answers, invariances, named conditions, refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

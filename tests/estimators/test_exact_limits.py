@@ -1,7 +1,5 @@
 """Exact limits and published values of the estimators' parts: constants, covariance, RLM, MM."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from statsmodels.robust.scale import HuberScale

@@ -1,7 +1,5 @@
 """Models over frequency, lines, windows, amplitude and calibration: answers that can be written down beforehand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """The robust joint regression and its start: units, noise of any size, cores."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import chi2

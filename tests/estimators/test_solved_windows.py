@@ -1,7 +1,5 @@
 """The default method on windows alone: exact limits, symmetry of cause and effect, directions that stand apart."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

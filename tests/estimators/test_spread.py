@@ -1,7 +1,5 @@
 """Where the interval of H comes from, and who is heard: exact limits of covariances, and starts."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

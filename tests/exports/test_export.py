@@ -1,7 +1,5 @@
 """Coefficients for rotordynamic programs."""
 
-from __future__ import annotations
-
 import importlib.metadata as metadata
 import math
 import os

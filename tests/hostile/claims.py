@@ -1,7 +1,5 @@
 """Small files whose headers claim gigabytes: made by their own libraries, and read in a process that is measured."""
 
-from __future__ import annotations
-
 import resource
 import struct
 import sys

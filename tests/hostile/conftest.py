@@ -1,7 +1,5 @@
 """What several tests of disturbed commands hold their results against."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

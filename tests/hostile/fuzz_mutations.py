@@ -4,8 +4,6 @@ The tokens are what real and hostile exports hold: infinities, units of the wron
 the writing round, words that mean something to TOML, CSV and HDF5.
 """
 
-from __future__ import annotations
-
 import random
 import re
 from collections.abc import Sequence

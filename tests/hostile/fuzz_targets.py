@@ -1,7 +1,5 @@
 """What the fuzzer feeds: each reader with its good files, and the errors that it documents."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import io

@@ -9,8 +9,6 @@ the same; is every file under its final name one of a former or a whole run; if 
 have their SHA-256; does a rerun end with the same exit code and bit-identical tables, and leave nothing else behind.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import mmap

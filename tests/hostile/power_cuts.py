@@ -9,8 +9,6 @@ copy is mounted, which has the journal recover, and asked what `kills.py` asks a
 end the new results must be there whole. Some of the copies are given the command once more. Takes Linux and root.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import shutil

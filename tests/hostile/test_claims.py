@@ -1,7 +1,5 @@
 """Sizes that a header claims are summed before anything is read: refused in 2 s and 300 MB."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A computer's clock that jumps: an hour ahead, back to 1970, at every look."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import os

@@ -1,7 +1,5 @@
 """MATLAB 5 files that brought the process down inside scipy, found by fuzzing: now refused with their byte."""
 
-from __future__ import annotations
-
 import random
 import struct
 import zlib

@@ -1,7 +1,5 @@
 """One damaged run costs itself and no other: commands name it and go on, as long as most of its kind are sound."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """How a command ends: names that are not UTF-8, warnings of numpy, signals while workers are busy."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

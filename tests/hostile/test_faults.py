@@ -1,7 +1,5 @@
 """A kill, a full disk, two runs at once: results are whole or absent, raw data untouched."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource

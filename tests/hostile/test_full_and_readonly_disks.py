@@ -1,7 +1,5 @@
 """Real disks in a mount namespace of their own: full ones, read-only ones, and one whose power is cut."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """A few hundred cases of the fuzzer (tests/studies/fuzz.py) per reader: only documented errors."""
 
-from __future__ import annotations
-
 import logging
 import random
 

@@ -1,7 +1,5 @@
 """Names and descriptions from a stranger: no page runs them, no spreadsheet computes them, no terminal obeys them."""
 
-from __future__ import annotations
-
 import math
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Terminals and pipes that cannot take what is printed: no result is lost to them, and nobody sees a traceback."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """A library that crashes, hangs or eats memory on a damaged file takes its own process along and no other."""
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """The special cases of hostile input, one by one: endless lines, claims of billions, links, numbers, names, folders."""
 
-from __future__ import annotations
-
 import resource
 import time
 from contextlib import contextmanager

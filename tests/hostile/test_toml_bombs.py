@@ -1,7 +1,5 @@
 """TOML that is meant to hurt: deep nesting, huge keys and numbers, in every file that a stranger may have written."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

@@ -1,7 +1,5 @@
 """What goes with an answer of the estimators: intervals by the method's efficiency, spare equations, refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

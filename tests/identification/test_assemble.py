@@ -1,7 +1,5 @@
 """From the phasors of all runs to a campaign's coefficients: a campaign made by hand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import SimpleNamespace

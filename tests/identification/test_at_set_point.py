@@ -1,7 +1,5 @@
 """Displacement and force of every run without what its instruments and its load have done to them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What the blocks say of the rig itself: whether the housing floats, and which devices have clocks of their own."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A campaign's records to its table: corrections, flags, columns, and what happens to bad windows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is handed from step to step, by hand: stiffness with its intervals, speeds, points of runs, instruments."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

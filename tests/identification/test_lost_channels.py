@@ -1,7 +1,5 @@
 """Runs that lack what the solve needs: they cost themselves, at worst their point, never the campaign."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """`ti.identify` from Python: the flags of the command line, a method by its name, errors that name the function."""
 
-from __future__ import annotations
-
 import inspect
 
 import pytest

@@ -6,8 +6,6 @@ Every mesh has twice the intervals of the one before, along and across. The orde
 ratio of successive differences; the error is taken against Richardson's extrapolation of the two finest meshes.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import NamedTuple

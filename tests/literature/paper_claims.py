@@ -14,8 +14,6 @@ Measured numbers that the paper does print are the axis ticks of Fig. 20 (dampin
 sentence "this model will underestimate" stands after both models.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from pathlib import Path

@@ -4,8 +4,6 @@ Source: Venables & Ripley's MASS (7.3-58.2 under R 4.2.2), run with acc = 1e-15;
 4.685, Hampel 2/4/8, scale MAD/0.6745 or Huber's proposal 2. The numbers stand in data/mass_rlm.json.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

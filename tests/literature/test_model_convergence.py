@@ -1,7 +1,5 @@
 """Observed order of mesh convergence of pressure, load, position, K and C: two, as the scheme's analysis promises."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -5,8 +5,6 @@ Four pads of 75 deg, load between pads, D 100 mm, L 70 mm, central pivots, prelo
 temperature, digitised to about 1 K; target: 4 K to their TEHD results, 5 K to their measurements.
 """
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -7,8 +7,6 @@ rigid, fixed pads of 160 deg, isoviscous, Swift-Stieber rupture; x along the loa
 (finite elements) reaches against the printed figures, 6 % or 0.06 of the coefficients, 0.01 of eps, 0.5 deg.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -4,8 +4,6 @@ Tolerances are those of sentences ("about 200 %", "2-3 times") read off figures,
 follow, the test says what it does instead, so that a change of the model shows.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -5,8 +5,6 @@ reduction. Its mesh of 40 x 20 leaves 1.4 % in kxx, 0.7 % in kyy, 0.2 % in cxx, 
 3 % here, for the rows and for the values that were extrapolated to a fine mesh (rocker, 5 kN).
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from dataclasses import replace

@@ -11,8 +11,6 @@ smaller; at L/D 1.0, E = 0.85 and 0.9 B is 5.3 % and 5.9 % high with any mesh, w
 its trend (the next row, 0.95, does so by 11 %).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

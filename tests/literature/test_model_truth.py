@@ -4,8 +4,6 @@ docs/theory.md pins the baseline down, so that K and C must agree to what meshes
 mid-length film temperatures to 0.05 K.
 """
 
-from __future__ import annotations
-
 import functools
 import json
 import math

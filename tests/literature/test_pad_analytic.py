@@ -1,7 +1,5 @@
 """The pad's finite elements against closed solutions: curved beam, bimetal, thick cylinder, and their own limit."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

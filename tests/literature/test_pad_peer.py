@@ -6,8 +6,6 @@ as here. The two discretisations differ in the shape of their functions on curve
 computed once for this test; nothing of this package went into them but the breaks of the mesh.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

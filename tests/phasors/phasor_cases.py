@@ -1,7 +1,5 @@
 """A dynamic stiffness and circular noise, for exact limits of estimates made by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From samples to windows' phasors: channels read together, chunks, clocks, delays, glitches; exact lines."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

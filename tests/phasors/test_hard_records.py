@@ -1,7 +1,5 @@
 """Records that rigs really give: bad samples, a line beside the drive, a late or switched drive, channels apart."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Long records: read once, block by block, with the same phasors as the plain way."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

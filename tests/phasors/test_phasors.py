@@ -1,7 +1,5 @@
 """Joint line fit: phasors, their sign, glitches, gaps, and lines close together."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A drive that turns with the shaft: runout is told from motion where phases and directions allow it, else refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lines of a run looked at once more: frequency errors, shafts that drift, lines that nobody mentioned."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """From blocks to a curve and its status, and records that are refused: exact staircases, one thing wrong at a time."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

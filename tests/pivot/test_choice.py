@@ -1,7 +1,5 @@
 """Which law, from which load on, and what pads tell each other: held against sums that can be done by hand."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """Creep within the holds of dry tests: named and taken off where all runs show it, and drift is not taken for it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The whole way from dry runs to curves, on small records made by hand; and who may be refused on the way."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Posterior, evidence and bounds of one law: sums that can be done in closed form, and what may change nothing."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

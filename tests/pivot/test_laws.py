@@ -1,7 +1,5 @@
 """Pivot laws: derivatives, monotony, and the printed formulas as special cases."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

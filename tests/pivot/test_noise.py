@@ -1,7 +1,5 @@
 """Noise and mains pick-up where the sums are known: single kinds of noise, exact invariants, pure tones."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Projection on a pad's axes, and directions with their standard errors against draws."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """From a dry record to blocks: glitches, pieces and branches whose number and place can be counted."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

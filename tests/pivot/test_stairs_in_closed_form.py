@@ -1,7 +1,5 @@
 """Dry tests in closed form that owe nothing to the virtual rig: free ways, loads that wander, noise, ramps."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 

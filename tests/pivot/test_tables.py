@@ -1,7 +1,5 @@
 """Tables, bands and pivots.toml in limits that are known exactly: laws without any error of their own."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from pathlib import Path

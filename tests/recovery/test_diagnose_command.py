@@ -1,7 +1,5 @@
 """`tpjb diagnose` from the records of a campaign that an independent program made, to the page and the effects file."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 The virtual rig's truths are drawn here, with seeds; the sample campaigns are in `test_golden.py`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

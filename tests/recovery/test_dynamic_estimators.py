@@ -4,8 +4,6 @@ With fixed seeds; a table of every method in every case is in `tests/studies/RES
 Fewer replicates than its 400 leave a Monte-Carlo error of 1/sqrt(2 n) on an RMSE.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

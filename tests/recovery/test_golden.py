@@ -5,8 +5,6 @@ coefficient, its interval or a flag. A change of method may: `python -m tests.re
 anew, and the commit says why.
 """
 
-from __future__ import annotations
-
 import csv
 import functools
 import json

@@ -1,7 +1,5 @@
 """Exports of strange laboratories become coefficients by few typed lines, and their drafts are true."""
 
-from __future__ import annotations
-
 import importlib
 
 import numpy as np

@@ -3,8 +3,6 @@
 The virtual rig knows nothing of `tpjb_ident`; its laws are given here as plain functions.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import replace

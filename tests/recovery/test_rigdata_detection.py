@@ -1,7 +1,5 @@
 """Faults put into good campaigns of the virtual rig: each is found and named; good campaigns raise no alarm."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -3,8 +3,6 @@
 And campaigns that turn both ways, with pivots off the middle: the leading edge is where each run's shaft comes from.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import shutil

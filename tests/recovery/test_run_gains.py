@@ -1,7 +1,5 @@
 """Gains of one channel in one run: how often `check` and `identify` find them, and what they must not blame."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Probes whose scale is wrong in all runs: ten times off shows beside the clearance, unequal gains in its angles."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@
 commit them.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a page is made of, for tests that ask whether a stranger's words became part of it."""
 
-from __future__ import annotations
-
 import html.parser
 
 VOID = frozenset({"meta", "br", "img", "link", "input", "hr"})

@@ -1,7 +1,5 @@
 """Effects and verdicts in an engineer's words and units."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

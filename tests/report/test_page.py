@@ -1,7 +1,5 @@
 """The report: self-contained, escaped, complete."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

@@ -1,7 +1,5 @@
 """Pictures against pictures that were looked at, and what they must say whatever they look like."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import subprocess

@@ -1,7 +1,5 @@
 """Figures and flags of a point with values that can be written down: coherence, orbits, reasons, patterns, signs."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """A point whose runs are all wrong alike stands apart from the other frequencies of its load."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

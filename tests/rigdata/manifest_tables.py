@@ -1,7 +1,5 @@
 """The tables of a manifest's keys, as docs/campaigns.md shows them (`python -m tests.rigdata.manifest_tables`)."""
 
-from __future__ import annotations
-
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, CSV, HOUSING, RUN, SHAFT, TOP, Field
 
 _TABLES = {

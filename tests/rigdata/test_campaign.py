@@ -1,7 +1,5 @@
 """Campaigns: loading, lazy access, vectors, fingerprints, and paths that must not leave the folder."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import pickle

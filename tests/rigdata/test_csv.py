@@ -1,7 +1,5 @@
 """CSV records: every seed of trouble of the export format, taken or refused with file, line and column."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Keys of shaft, housing, planes and temperatures; one column described otherwise for some runs."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

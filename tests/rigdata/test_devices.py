@@ -1,7 +1,5 @@
 """Channels at their own times: several rates and clocks in one run, in every format."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

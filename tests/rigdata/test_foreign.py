@@ -1,7 +1,5 @@
 """Records of other loggers: every file is written by that format's own library and read through the same Run."""
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """HDF5 campaigns: slices, rates, links, storage, filters."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tracemalloc

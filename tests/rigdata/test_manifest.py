@@ -1,7 +1,5 @@
 """The manifest: every problem at once, each with its line and a cure."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 

@@ -1,7 +1,5 @@
 """Times of day in text files, and LabVIEW measurement files."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Units that a record states are held against the manifest: units row, metadata, time column."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py

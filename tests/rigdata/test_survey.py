@@ -1,7 +1,5 @@
 """A folder of exports without a manifest: what is guessed, what is marked, and that the finished draft works."""
 
-from __future__ import annotations
-
 import math
 import shutil
 from dataclasses import replace

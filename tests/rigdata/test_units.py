@@ -1,7 +1,5 @@
 """Quantities of a rig manifest: strict grammar, SI values, clear refusals."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

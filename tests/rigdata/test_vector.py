@@ -1,7 +1,5 @@
 """Two or more directions into X and Y."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Dry pivot tests and clearance sweeps: load histories, deflection, friction, contact, the polygon."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

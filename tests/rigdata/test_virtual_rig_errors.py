@@ -1,7 +1,5 @@
 """Instrument errors: their canonical meaning, and the stiffness that the records then show."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Faults do what they say, to the run and channel asked for and to nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

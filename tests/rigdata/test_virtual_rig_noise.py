@@ -1,7 +1,5 @@
 """Noise levels are as stated; each kind goes where it belongs and nowhere else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

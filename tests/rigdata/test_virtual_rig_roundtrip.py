@@ -1,7 +1,5 @@
 """What the virtual rig writes, read back by rigdata: with no noise the records are the physics."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import replace

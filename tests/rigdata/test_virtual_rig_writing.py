@@ -1,7 +1,5 @@
 """Campaigns on disk: the same bytes for the same seed, whole or not at all, and never over something else."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

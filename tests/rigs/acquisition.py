@@ -4,8 +4,6 @@ Nothing of the toolkit is used. A rig hands over runs whose true displacement, c
 functions of time; every channel samples them at its own times, with its own axis, gain, lateness and faults.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field

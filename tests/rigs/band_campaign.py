@@ -1,7 +1,5 @@
 """Writes runs of a `BandRig` as a campaign in the rig-export format."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -5,8 +5,6 @@ kept begins and ends in motion; periodic excitation repeats within it. Film, hou
 runout, unbalance, mains and noise of every channel are those of `rig`; neither `model` nor the virtual rig takes part.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

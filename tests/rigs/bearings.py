@@ -1,7 +1,5 @@
 """Bearings that differ from a bundled one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

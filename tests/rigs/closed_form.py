@@ -5,8 +5,6 @@ or a course in time (late, switched, wandering, noise, sweep, multi-sine, blows)
 in closed form. The truth of a point is H of the film at the set load. `write_rig` makes a campaign of one in one call.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Copies of the demo campaign whose manifest or stored rate is not the one it was written with."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A simulated situation for estimators: one H, eight directions, repeats, four kinds of faults; scores in it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

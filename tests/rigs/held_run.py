@@ -1,7 +1,5 @@
 """A run whose samples are in memory, as long as a test wants it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field

@@ -8,8 +8,6 @@ largest difference of a direct coefficient from the numbers that the rig was mad
 the tutorial.
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 import shutil

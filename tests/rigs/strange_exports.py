@@ -5,8 +5,6 @@ clearance and shaken at two loads and two frequencies in two directions; each la
 of columns and names of files of its own.
 """
 
-from __future__ import annotations
-
 import datetime
 import itertools
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Operating points one after another, each started from the one before."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from model.predict import predict_setup

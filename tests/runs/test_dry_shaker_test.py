@@ -1,7 +1,5 @@
 """What the rig carries without its bearing, by a dry shaker test; a channel that tells nothing refuses it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

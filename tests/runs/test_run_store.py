@@ -1,7 +1,5 @@
 """A rerun goes on where a kill stopped it: finished runs are not repeated, stale ones are, tables stay the same."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import signal

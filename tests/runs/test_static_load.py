@@ -1,7 +1,5 @@
 """Loads that miss their set points, in size and in direction: what the cells say of every run."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

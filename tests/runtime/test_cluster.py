@@ -1,7 +1,5 @@
 """The same campaign on a Dask cluster: the same bits, even if a worker is killed half-way."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

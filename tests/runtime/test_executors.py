@@ -1,7 +1,5 @@
 """Jobs come out the same wherever they run, and a lost worker loses nothing."""
 
-from __future__ import annotations
-
 import ctypes
 import multiprocessing
 import os

@@ -1,7 +1,5 @@
 """Intervals are tested by their limits: in every table that a command writes, of points and of bands."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

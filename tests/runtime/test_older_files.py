@@ -3,8 +3,6 @@
 Files here never change. Where a version is added, a file of the one before it stays, and its reader with it.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The output folder: whole or not at all, never over somebody's files."""
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile

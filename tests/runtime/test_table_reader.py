@@ -1,7 +1,5 @@
 """Tables that come back are held to the schema, cell by cell; what run.json contradicts is named or refused."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Tables on disk: whole or not at all, no formula for a spreadsheet."""
 
-from __future__ import annotations
-
 import pandas as pd
 import pytest
 

@@ -1,7 +1,5 @@
 """The sources of the three packages, each parsed once."""
 
-from __future__ import annotations
-
 import ast
 import functools
 from collections.abc import Iterator

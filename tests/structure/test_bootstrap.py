@@ -1,7 +1,5 @@
 """One-command set-up: what it says on old Pythons, what it installs with, when it does nothing."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import importlib.util

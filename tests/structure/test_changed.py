@@ -1,7 +1,5 @@
 """`python3 tests --changed`: what lies above a change is run, what does not is not."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """Every condition is in one registry: its name, how grave it is, what it means."""
 
-from __future__ import annotations
-
 import ast
 import pickle
 

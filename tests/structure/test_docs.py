@@ -1,7 +1,5 @@
 """Documentation: every link leads somewhere, every code block runs, every command line is one."""
 
-from __future__ import annotations
-
 import ast
 import re
 import shlex

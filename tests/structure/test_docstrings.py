@@ -4,8 +4,6 @@ A face is what a user calls (the names that the three packages hand on, and thos
 methods of a class) or what a piece written by a user implements or is handed (`EXTENSION_POINTS`).
 """
 
-from __future__ import annotations
-
 import ast
 import fnmatch
 import functools

@@ -1,7 +1,5 @@
 """Every refusal of a package derives from its one base, which the command line knows."""
 
-from __future__ import annotations
-
 import ast
 
 import pytest

@@ -3,8 +3,6 @@
 An example is given `np`, `ti`, and the paths `demo` (the bundled campaign) and `rocker` (a bearing file).
 """
 
-from __future__ import annotations
-
 import doctest
 import functools
 import importlib

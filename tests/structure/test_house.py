@@ -3,8 +3,6 @@
 Exceptions are named or counted, and may only become fewer: the function or file is made smaller, no limit larger.
 """
 
-from __future__ import annotations
-
 import ast
 import functools
 from collections import Counter

@@ -1,7 +1,5 @@
 """Notebooks: stored without outputs, each told in prose first, every one of them executed in CI."""
 
-from __future__ import annotations
-
 import ast
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A source of systematic error is one file: the solve, and the path to it, know no term by name but where listed."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 

@@ -1,7 +1,5 @@
 """`import tpjb_ident as ti`: everything promised is there, nothing heavy is loaded, a foreign `model` is refused."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

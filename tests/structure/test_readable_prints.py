@@ -1,7 +1,5 @@
 """What `print` says of a bearing, a pad, a prediction and an operating point: one line a person reads."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

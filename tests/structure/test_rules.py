@@ -3,8 +3,6 @@
 Who may know whom is told in docs/design.md; exceptions are named one by one.
 """
 
-from __future__ import annotations
-
 import ast
 import functools
 import re

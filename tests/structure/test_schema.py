@@ -1,7 +1,5 @@
 """One schema of columns: the documentation lists it, and the tables hold nothing beside it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The site: pages of the notebooks and pictures are those of today, equations are typeset, the tutorial works."""
 
-from __future__ import annotations
-
 import base64
 import importlib.util
 import json

@@ -4,8 +4,6 @@ Tokens are names, operators, numbers and strings without docstrings: what a read
 A room that shrank lowers its figures here; one that must grow takes them from another room and says so in the commit.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import sys

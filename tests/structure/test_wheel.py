@@ -1,7 +1,5 @@
 """The wheel holds what it needs: built, installed outside the checkout, and the demo run from it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -5,8 +5,6 @@
 The conditions named go to the other stream.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import warnings

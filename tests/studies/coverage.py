@@ -6,8 +6,6 @@ Two counts a plan: with gains drawn from the stated uncertainty, entries of a ca
 error of the sensors or statement of it, where records, loads and runs alone speak.
 """
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

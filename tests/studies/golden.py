@@ -8,8 +8,6 @@ the same to the bit, with the largest difference of its numbers (of the value, o
 table has one); above 1e-9 it ends with exit code 1. An older checkout runs a copy of this file in its own folder.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import math

@@ -10,8 +10,6 @@ stored as they come: called again with the same ROWS it goes on. `--rings`: only
 to no preload, where least decides which pads carry.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections import Counter

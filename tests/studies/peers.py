@@ -10,8 +10,6 @@ groove: its carry-over is set to zero, or to the same share). Cross terms: the l
 coefficient. Times are processor times of the solution alone, least of the repeats.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -8,8 +8,6 @@ converged prediction is not finite or its pads' loads do not balance the load, i
 that has not converged does not say so. Rows are stored as they come: called again with the same ROWS it goes on.
 """
 
-from __future__ import annotations
-
 import math
 import time
 import warnings

@@ -4,8 +4,6 @@ A section begins with ``<!-- NAME: begin -->`` and ends with ``<!-- NAME: end --
 made it, on which commit and on which day.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

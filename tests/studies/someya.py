@@ -6,8 +6,6 @@ The bearing and what its numbers mean are those of `tests/literature/test_model_
 references beside the checkout (`../shared/references`), where they have been transcribed.
 """
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -8,8 +8,6 @@ whole commands on the bundled demo in a process of their own. First compilation 
 machine code on the disk, once in each checkout.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

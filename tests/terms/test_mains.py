@@ -1,7 +1,5 @@
 """Mains on the excitation line: its size is known, its angles are found together with H."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import SimpleNamespace

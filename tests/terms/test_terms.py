@@ -1,7 +1,5 @@
 """Every term: what is wrong with an instrument is told where the records tell it, and else stands in the interval."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What terms say of a rig, and what they say where the records cannot tell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

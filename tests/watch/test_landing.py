@@ -1,7 +1,5 @@
 """When a record counts as written."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

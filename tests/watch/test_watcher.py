@@ -1,7 +1,5 @@
 """A campaign that grows: records land whole, in part, again, under other names; the manifest is edited meanwhile."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

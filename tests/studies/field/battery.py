@@ -8,8 +8,6 @@ error beyond the condition's bound) or *silent*; of bad data *reported*, *right*
 has it in one campaign of 200. *Crash*: an exit code but 0, 2, 3. Errors and half-widths are in % of |h_ii|.
 """
 
-from __future__ import annotations
-
 import re
 import tempfile
 import time

@@ -4,8 +4,6 @@
 error and of the median half-width in % of |h_ii|. *reported*: exit code 3 or 2, or an interval that allows for it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -5,8 +5,6 @@ ruptured, in Capone's form, or a law with square and cube). The truth is H of th
 the static load. The plan, the actuator's course and the sensors are those of `closed_form`.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass, replace

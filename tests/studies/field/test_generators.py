@@ -1,7 +1,5 @@
 """The generators of the second field battery against closed forms, finer steps and the balance of power."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
