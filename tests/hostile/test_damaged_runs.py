@@ -12,6 +12,8 @@ from rigdata.virtual_rig import operating_points
 from tests.command_line import ended
 from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
 
+pytestmark = pytest.mark.slow
+
 RUN = "d-05000-25-02"
 
 
@@ -100,7 +102,6 @@ def error_of(out, truth_row):
     return max(abs(row["kxx_N_per_m"] / 1e8 - 1), abs(row["kyy_N_per_m"] / 2e8 - 1), abs(row["cxx_Ns_per_m"] / 5e5 - 1))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [*DAMAGE, "accelerometer zero"])
 def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, name):
     path = spoilt(name, RUN)
@@ -113,7 +114,6 @@ def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, n
     assert error_of(tmp_path / "out", 5000.0) < 0.02
 
 
-@pytest.mark.slow
 def test_a_check_names_every_damaged_run(spoilt):
     for name in DAMAGE:
         path = spoilt(name, RUN)
@@ -122,7 +122,6 @@ def test_a_check_names_every_damaged_run(spoilt):
         shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
-@pytest.mark.slow
 def test_a_record_that_lost_its_end_is_said_to_be_damaged(spoilt, tmp_path):
     path = spoilt("missing file")
     file = path / "runs" / f"{RUN}.csv"
@@ -132,7 +131,6 @@ def test_a_record_that_lost_its_end_is_said_to_be_damaged(spoilt, tmp_path):
     assert f"{RUN}.csv" in told.output
 
 
-@pytest.mark.slow
 def test_a_point_that_loses_all_its_runs_is_lost_and_the_answer_not_to_be_trusted(spoilt, tmp_path):
     told = ended(
         3, "identify", spoilt("missing group", *(f"d-05000-25-0{i}" for i in (1, 2, 3))), "--out", tmp_path / "out"
@@ -144,7 +142,6 @@ def test_a_point_that_loses_all_its_runs_is_lost_and_the_answer_not_to_be_truste
 DYNAMIC = [f"d-0{load}-25-0{i}" for load in (2500, 5000) for i in (1, 2, 3)]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "name", "runs", "code", "says"),
     [
@@ -163,7 +160,6 @@ def test_what_is_damaged_in_most_runs_is_no_accident(spoilt, tmp_path, command, 
         assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["n_records"].tolist() == [3, 3]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["torn chunk", "probe zero", "cut off"])
 def test_pivot_goes_on_without_a_damaged_run_and_says_which_pad_has_no_curve(spoilt, tmp_path, name):
     told = ended(3, "pivot", spoilt(name, "p-2-up"), "--out", tmp_path / "out")
@@ -172,7 +168,6 @@ def test_pivot_goes_on_without_a_damaged_run_and_says_which_pad_has_no_curve(spo
     assert sorted(set(pd.read_csv(tmp_path / "out" / "pivot_curves.csv")["pad"])) == [1, 3, 4, 5]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["missing file", "torn chunk", "probe NaN", "cell zero"])
 def test_locus_goes_on_without_a_damaged_direction(spoilt, tmp_path, name):
     told = ended(0, "locus", spoilt(name, "l-01000-02"), "--out", tmp_path / "out")
@@ -181,7 +176,6 @@ def test_locus_goes_on_without_a_damaged_direction(spoilt, tmp_path, name):
     assert len(pd.read_csv(tmp_path / "out" / "clearance.csv")) == 5
 
 
-@pytest.mark.slow
 def test_what_a_diagnosis_measures_goes_on_without_damaged_runs_and_names_them(spoilt):
     from model.bearing_file import parse_bearing
     from rigdata.campaign import load_campaign

@@ -16,6 +16,8 @@ from model.options import Options
 from model.predict import predict
 from model.prediction import Prediction
 
+pytestmark = pytest.mark.slow
+
 #: rpm: measured, their TEHD [degC]
 PEAK = {1000: (49.5, 43.7), 2000: (59.5, 53.4), 3000: (67.5, 63.2), 4000: (76.5, 72.9)}
 
@@ -36,7 +38,6 @@ def run(rpm: float, thermal: str) -> Prediction:
     return p
 
 
-@pytest.mark.slow
 def test_adiabatic_film_heats_by_what_the_load_says():
     # without carry-over and without heat into the pads the rise of a film that carries W is bound to W, not to the
     # speed: mu U / h^2 is what carries. Film and power grow with speed as they must.
@@ -54,7 +55,6 @@ def peak(p: Prediction) -> float:
     return max(float(t.max()) for t in p.face_temperature)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rpm", PEAK)
 def test_peak_pad_temperatures_without_a_chosen_constant(rpm):
     # pads' backs as a bearing file has them (50 W/m^2/K; 100 takes off 0.2 to 0.3 K), grooves by their flow balance,
@@ -66,7 +66,6 @@ def test_peak_pad_temperatures_without_a_chosen_constant(rpm):
     assert found == pytest.approx(theirs, abs=4.0 if rpm > 2000 else 6.5)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rpm", [1000, 4000])
 def test_peak_pad_temperatures_with_the_paths_of_heat_one_by_one(rpm):
     # one temperature across the film, a parabola at the faces, and a lambda of 0.9 that is ours
@@ -78,7 +77,6 @@ def test_peak_pad_temperatures_with_the_paths_of_heat_one_by_one(rpm):
     assert peak(p) == pytest.approx(PEAK[rpm][0], abs=7.0 if rpm > 3000 else 4.0)
 
 
-@pytest.mark.slow
 def test_without_those_paths_the_speed_does_not_show():
     # the paper's model: too hot at 1000 rpm, where pads and journal cool the film, too cold at 4000: hot oil stays
     rise = {rpm: run(rpm, "tehd").max_temperature - theirs for rpm, (_, theirs) in PEAK.items()}

@@ -13,6 +13,8 @@ from tests.rigs.strange_exports import CLEARANCES, KGF, LABORATORIES, LBF, PADS,
 from tpjb_ident.clearance.measure import measure_clearance
 from tpjb_ident.pivot import fit_pivots
 
+pytestmark = pytest.mark.slow
+
 #: Typed lines at most: where cells and probes are in volts, and where the files state their units.
 VOLTS, UNITS = 10, 3
 NAMES = [laboratory.name for laboratory in LABORATORIES]
@@ -41,7 +43,6 @@ def direction(guess):
     return guess.axis.value + (180.0 if guess.polarity < 0 else 0.0)
 
 
-@pytest.mark.slow
 def test_axes_and_signs_are_those_of_the_rig(surveyed):
     laboratory, result = surveyed
     for sensor in laboratory.sensors[:6]:
@@ -52,7 +53,6 @@ def test_axes_and_signs_are_those_of_the_rig(surveyed):
         assert abs((turned + 180.0) % 360.0 - 180.0) < 1e-9, f"{sensor.name}: {guess.axis}"
 
 
-@pytest.mark.slow
 def test_runs_are_what_was_done(surveyed):
     laboratory, result = surveyed
     runs = {run.file.rpartition(".")[0]: run for run in result.runs}
@@ -72,7 +72,6 @@ def test_runs_are_what_was_done(surveyed):
             assert run.direction.value == -90.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("laboratory", LABORATORIES, ids=NAMES)
 def test_from_records_to_coefficients_with_few_lines_by_hand(laboratory, tmp_path):
     needs_library(laboratory)
@@ -83,7 +82,6 @@ def test_from_records_to_coefficients_with_few_lines_by_hand(laboratory, tmp_pat
     assert way["C"] < 0.2
 
 
-@pytest.mark.slow
 def test_static_tests_of_two_devices_meet_by_their_times(tmp_path):
     pytest.importorskip("nptdms")
     laboratory = next(lab for lab in LABORATORIES if "two devices" in lab.name)

@@ -21,6 +21,8 @@ from tpjb_ident.runs.run_store import RunStore
 from tpjb_ident.runtime import executors
 from tpjb_ident.runtime.executors import ClusterError, LostJobsError, dask_workers, local_workers
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -73,7 +75,6 @@ def wait_for(address: str, count: int) -> None:
         client.wait_for_workers(count, timeout=60)
 
 
-@pytest.mark.slow
 def test_a_worker_killed_half_way_changes_no_bit(cluster, campaign_file, tmp_path):
     wait_for(str(cluster.file), 2)
     campaign = load_campaign(campaign_file)
@@ -107,7 +108,6 @@ def tables(out: Path) -> list[bytes]:
     return [(out / f"{name}.csv").read_bytes() for name in ("coefficients", "estimators", "windows")]
 
 
-@pytest.mark.slow
 def test_the_command_line_works_on_a_cluster(cluster, small_campaign, tmp_path):
     wait_for(str(cluster.file), 1)
     for name, options in (("spread", ["--scheduler", str(cluster.file)]), ("alone", ["--workers", "1"])):
@@ -115,7 +115,6 @@ def test_the_command_line_works_on_a_cluster(cluster, small_campaign, tmp_path):
     assert tables(tmp_path / "spread") == tables(tmp_path / "alone")
 
 
-@pytest.mark.slow
 def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign_file, tmp_path, monkeypatch):
     wait_for(str(cluster.file), 1)
     out = tmp_path / "out"
@@ -152,7 +151,6 @@ def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign
     assert tables(out) == tables(alone)
 
 
-@pytest.mark.slow
 def test_a_scheduler_that_is_lost_half_way_is_the_end_and_is_named(tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(executors, "_STALLED", 2.0)
     cluster = Cluster(tmp_path)
@@ -171,7 +169,6 @@ def test_a_scheduler_that_is_lost_half_way_is_the_end_and_is_named(tmp_path, mon
     assert "exception calling callback" not in caplog.text
 
 
-@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_named():
     answer = r"no Dask scheduler answers at tcp://127\.0\.0\.1:9 .*dask scheduler"
     with pytest.raises(ClusterError, match=answer), dask_workers("tcp://127.0.0.1:9", patience=1.0):
