@@ -22,7 +22,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tests.studies.results import study_parser, table, typed, write_section
@@ -37,11 +37,12 @@ _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 _STEPS = ("os.rename", "os.remove", "os.rmdir", "os.mkdir", "shutil.rmtree")
 
 
-def write_small_campaign(path: Path, seed: int = 5) -> Path:
-    """An HDF5 campaign with a little of everything, not writable."""
-    from tests.good_campaigns import rocker_rig, written
+def write_small_campaign(path: Path, commands: Sequence[str]) -> Path:
+    """An HDF5 campaign with a little of everything that the commands ask for, not writable."""
+    from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
 
-    written(path, rocker_rig(seed))
+    plan = replace(SMALL_PLAN, dynamic=(), dry=()) if set(commands) == {"locus"} else SMALL_PLAN
+    written(path, rocker_rig(5, plan=plan))
     path.chmod(0o444)
     return path
 
@@ -159,7 +160,7 @@ def make_bench(folder: Path, commands: tuple[str, ...]) -> Bench:
 
     from tpjb_ident.cli.commands.app import app
 
-    campaign = write_small_campaign(folder / "campaign.h5")
+    campaign = write_small_campaign(folder / "campaign.h5", commands)
     bench = Bench(campaign, "", 0, folder)
     for command in commands:  # once in this process, so that what they import late is there for all forks
         CliRunner().invoke(app, bench.words(command, folder / f"warm-{command}"))

@@ -10,19 +10,15 @@ import pytest
 
 from rigdata.virtual_rig import operating_points
 from tests.command_line import ended
-from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
+from tests.good_campaigns import SMALL_PLAN, rocker_rig
 
 pytestmark = pytest.mark.slow
 
 RUN = "d-05000-25-02"
 
 
-@pytest.fixture(scope="module")
-def good(tmp_path_factory):
-    """The same campaign as HDF5 file and as CSV folder."""
-    folder = tmp_path_factory.mktemp("good")
-    rig = rocker_rig(5, plan=replace(SMALL_PLAN, dynamic=operating_points([(2500.0, 25.0), (5000.0, 25.0)])))
-    return written(folder / "c.h5", rig), written(folder / "csv", rig, "csv")
+EVERY_KIND = replace(SMALL_PLAN, dynamic=operating_points([(2500.0, 25.0), (5000.0, 25.0)]))
+DYNAMIC_ALONE = replace(EVERY_KIND, locus=(), dry=(), clearance=())
 
 
 def in_file(change):
@@ -83,13 +79,16 @@ DAMAGE = CSV | HDF5
 
 
 @pytest.fixture
-def spoilt(good, tmp_path):
-    """Copies of the good campaign, each with some runs damaged."""
+def spoilt(campaign_of, tmp_path):
+    """Copies of a good campaign, as HDF5 file or as CSV folder, with some runs damaged."""
 
     def make(name, *runs):
-        source = good[1] if name in CSV else good[0]
+        plan = DYNAMIC_ALONE if all(run.startswith("d-") for run in runs) else EVERY_KIND
+        source = campaign_of(rocker_rig(5, plan=plan), "csv" if name in CSV else "hdf5")
         path = tmp_path / source.name
         (shutil.copytree if source.is_dir() else shutil.copy)(source, path)
+        for file in [path, *path.rglob("*.*")]:
+            file.chmod(0o755 if file.is_dir() else 0o644)
         for run in runs:
             (DAMAGE | {"accelerometer zero": constant("A1V", 0.0)})[name](path, run)
         return path
