@@ -465,7 +465,7 @@ def test_what_a_band_s_motion_may_do_to_the_film_is_stated(kind, rms, peak, one_
     ids=["cells and commands of a slower device", "single bad readings"],
 )
 def test_a_band_takes_slower_devices_and_single_bad_readings(tmp_path, kind, names, entries):
-    rig = cf.Rig(excitation=kind, seconds=4.0, directions=(20.0, 110.0), repeats=2)
+    rig = cf.Rig(excitation=kind, seconds=4.0, directions=(20.0, 110.0))
     path = cf.write_rig(tmp_path, rig, cf.with_entries(cf.channels_of(rig), names, **entries))
     (result,) = identify(load_campaign(path)).bands
     h = rig.film.h(result.frequencies, 5000.0).reshape(-1, 4)
@@ -478,7 +478,7 @@ def test_a_band_takes_slower_devices_and_single_bad_readings(tmp_path, kind, nam
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [(0.4, 1.0), (0.0, 0.55), (0.2, 0.8)])
 def test_a_multisine_that_starts_late_or_ends_early_is_taken_where_it_drives(tmp_path, share):
-    rig = cf.Rig(excitation="multisine", seconds=6.0, directions=(20.0, 110.0), repeats=2, share=share)
+    rig = cf.Rig(excitation="multisine", seconds=6.0, directions=(20.0, 110.0), share=share)
     result = identify(load_campaign(cf.write_rig(tmp_path, rig)))
     (band,) = result.bands
     assert len(band.lines) == 80
