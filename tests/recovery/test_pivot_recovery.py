@@ -196,9 +196,13 @@ MUST_REFUSE = (
 @pytest.mark.slow
 def test_records_that_are_not_what_they_claim_are_refused(tmp_path):
     laws = bearing("rocker", 7)
-    assert len(fit_pivots(campaign(tmp_path / "c.h5", laws, 7, dry=SHORT)[0], ANGLES)) == 5
+    good, _ = campaign(tmp_path / "c.h5", laws, 7, dry=SHORT)
+    assert len(fit_pivots(good, ANGLES)) == 5
     for fault in MUST_REFUSE:
-        source, _ = campaign(tmp_path / "c.h5", laws, 7, dry=SHORT, faults=(fault,))
+        struck = tuple(test for test in SHORT if fault.affects(f"p-{test.pad}-up"))
+        spoilt, _ = campaign(tmp_path / "spoilt.h5", laws, 7, dry=struck, faults=(fault,))
+        runs = {run.id: run for run in (*good.runs, *spoilt.runs)}
+        source = replace(good, runs=tuple(runs.values()))
         with pytest.raises(RigDataError, match=r"wrong pad|wrong channel|stuck, clipped or dead") as caught:
             fit_pivots(source, ANGLES)
         assert all(p.run and p.cure for p in caught.value.problems), fault

@@ -36,9 +36,10 @@ def _has_docstring(node) -> bool:
 
 @pytest.fixture(scope="module", autouse=True)
 def computed_once():
-    """What several examples ask of the demo alike, its comparison and its diagnosis, is computed for the first."""
+    """What several examples ask of the demo alike (K and C, comparison, diagnosis) is computed for the first."""
     from tpjb_ident.compare import comparison
     from tpjb_ident.diagnosis import campaign, from_python
+    from tpjb_ident.identification import identify
 
     answers: dict[str, object] = {}
 
@@ -54,6 +55,7 @@ def computed_once():
         return answer
 
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(identify, "identify", once(identify.identify))
         patch.setattr(comparison, "compare_campaign", once(comparison.compare_campaign))
         shared = once(campaign.diagnose_campaign)
         for module in (campaign, from_python):

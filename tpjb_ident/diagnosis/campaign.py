@@ -113,9 +113,9 @@ def diagnose_campaign(
     >>> campaign = ti.load_campaign(demo)
     >>> others = frozenset(known_effects()) - {"pivot_flexibility", "soft_pivot"}
     >>> bearing = ti.load_bearing(campaign.bearing_text)
-    >>> found = diagnose_campaign(campaign, bearing, settings=DiagnoseSettings(skip=others))
-    >>> print(found.diagnosis.verdict.effects[0].name)
-    pivot_flexibility
+    >>> found = diagnose_campaign(campaign, bearing, Baseline("measured"), DiagnoseSettings(skip=others))
+    >>> print(found.diagnosis.verdict.verdict)
+    consistent
     """
     settings, baseline = settings or DiagnoseSettings(), baseline or Baseline()
     report = progress or (lambda text, done, total: None)
