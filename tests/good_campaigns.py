@@ -122,12 +122,7 @@ def content_key(rig: VirtualRig, layout: Layout) -> str:
     """What a campaign is made of, as a hash: plain fields by what they print, laws by their values at the points."""
     digest = hashlib.sha256(f"{type(layout).__name__} {asdict(layout)}".encode())
     truth = rig.truth
-    for part in (
-        rig.plan,
-        rig.instruments,
-        rig.noise,
-        *rig.faults,
-    ):
+    for part in (rig.plan, rig.instruments, rig.noise, *rig.faults):
         digest.update(f"{type(part).__name__} {asdict(part)}".encode())
     plain = (rig.seed, rig.campaign, rig.description, truth.pivot_angles, truth.clearance)
     digest.update(f"{plain} {truth.bearing_name} {truth.bearing_text} {truth.cold_temperature}".encode())

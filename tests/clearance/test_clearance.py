@@ -9,21 +9,9 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
-from rigdata.virtual_rig import (
-    ClearanceSweep,
-    DryTest,
-    Fault,
-    Noise,
-    RigPlan,
-)
+from rigdata.virtual_rig import ClearanceSweep, DryTest, Fault, Noise, RigPlan
 from tests.clearance.cases import ANGLES, CLEARANCE, OtherRun, bearing_centre, rig, sphere
-from tpjb_ident.clearance.measure import (
-    _inseparable,
-    coldest_first,
-    measure_clearance,
-    measure_run,
-    pairs_frame,
-)
+from tpjb_ident.clearance.measure import _inseparable, coldest_first, measure_clearance, measure_run, pairs_frame
 from tpjb_ident.clearance.sweep import _settled
 from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot import fit_pivots

@@ -8,13 +8,7 @@ import pytest
 
 from rigdata.campaign import load_campaign
 from rigdata.problem import RigDataError
-from rigdata.virtual_rig import (
-    Fault,
-    Instruments,
-    RigPlan,
-    RigTruth,
-    locus_points,
-)
+from rigdata.virtual_rig import Fault, Instruments, RigPlan, RigTruth, locus_points
 from tests.clearance.cases import ANGLES, SWEEP, OtherRun, rig
 from tpjb_ident.clearance import locus
 from tpjb_ident.clearance.locus import measure_locus

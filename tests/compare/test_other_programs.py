@@ -12,10 +12,7 @@ from model.bearing_file import parse_bearing
 from rigdata import load_campaign
 from tests.command_line import ended, tpjb
 from tpjb_ident.cli.commands.compare import refuse_comparison
-from tpjb_ident.compare.comparison import (
-    CompareSettings,
-    compare_campaign,
-)
+from tpjb_ident.compare.comparison import CompareSettings, compare_campaign
 from tpjb_ident.compare.tables import compare_table, read_predictions, with_predictions
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.presentation import us_table

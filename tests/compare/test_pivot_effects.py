@@ -11,11 +11,7 @@ from rigdata.campaign import load_campaign
 from tests.command_line import ended
 from tests.good_campaigns import rocker_rig, written
 from tpjb_ident.compare.comparison import CompareSettings, compare_campaign
-from tpjb_ident.compare.predictions import (
-    counted_twice,
-    counts_from_measured,
-    refuse_counted_twice,
-)
+from tpjb_ident.compare.predictions import counted_twice, counts_from_measured, refuse_counted_twice
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.schema import STIFFNESS
 

@@ -12,12 +12,7 @@ from model.effects import Effect
 from model.pivots import measured_pivots
 from model.predict import predict
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.compare.predictions import (
-    ModelSettings,
-    predict_points,
-    pressed_beyond,
-    printed_formula,
-)
+from tpjb_ident.compare.predictions import ModelSettings, predict_points, pressed_beyond, printed_formula
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 from tpjb_ident.compare.summary import _clearance_sentence, _extrapolation_sentence
 from tpjb_ident.conditions import Condition

@@ -7,12 +7,7 @@ import numpy as np
 import pytest
 from scipy import integrate, optimize
 
-from tpjb_ident.pivot.law_fit import (
-    CONTACT_GAP,
-    CONTACT_LOAD_SPREAD,
-    FitData,
-    fit_law,
-)
+from tpjb_ident.pivot.law_fit import CONTACT_GAP, CONTACT_LOAD_SPREAD, FitData, fit_law
 from tpjb_ident.pivot.laws import BEND_SPREAD, FIXED, LAWS, NODES, SLOPE_SPREAD, TYPICAL_SLOPE
 
 LOAD = np.linspace(250.0, 5000.0, 24)

@@ -10,12 +10,7 @@ from rigdata import load_campaign
 from tests.phasors.phasor_cases import place
 from tests.rigs import closed_form as cf
 from tpjb_ident.identification.identify import identify
-from tpjb_ident.runs.static_load import (
-    MAX_MISS,
-    MAX_SIDEWAYS,
-    load_conditions,
-    load_misses,
-)
+from tpjb_ident.runs.static_load import MAX_MISS, MAX_SIDEWAYS, load_conditions, load_misses
 
 
 def loaded(ratios, load=5000.0, direction=-90.0):
