@@ -30,10 +30,10 @@ def test_the_amplitude_is_held_against_the_clearance_of_the_campaigns_bearing():
 
 
 @pytest.mark.slow
-def test_the_method_is_an_argument_of_its_own():
+def test_the_method_is_an_argument_of_its_own(small_campaign):
     assert "method" in inspect.signature(ti.identify).parameters
     with pytest.raises(ValueError, match=r"mm-eiv"):
-        ti.identify(DEMO, method="mm-eib")
+        ti.identify(small_campaign, method="mm-eib")
 
 
 def test_an_error_names_the_function():

@@ -32,7 +32,7 @@ def bearing_like(point):
 def test_random_intervals_hold_on_fresh_campaigns(tmp_path):
     inside, errors = [], []
     base = RigTruth.constant(np.diag([2e8, 4e8]), np.diag([4e5, 6e5]))
-    for seed in range(101, 104):
+    for seed in range(101, 103):
         points = operating_points([(2500.0, 25.0), (5000.0, 10.0), (5000.0, 25.0), (5000.0, 50.0), (8750.0, 25.0)])
         rig = VirtualRig(replace(base, stiffness=bearing_like), RigPlan(dynamic=points), seed=seed)
         path = tmp_path / f"{seed}.h5"
@@ -44,7 +44,7 @@ def test_random_intervals_hold_on_fresh_campaigns(tmp_path):
             inside.append((lo <= truth) & (truth <= hi))
             limit = 0.06 if p.point.excitation_hz == 50 else 0.01  # on the mains two answers can remain
             errors.append(np.abs(p.stiffness.vector[DIRECT] / truth[DIRECT] - 1) / limit)
-    # 120 entries, eight of a point share their runs: two standard deviations are about 5 %
+    # 80 entries, eight of a point share their runs: two standard deviations are about 6 %
     assert 0.9 <= np.mean(inside) <= 0.999
     assert np.max(errors) < 1
 

@@ -158,7 +158,7 @@ def test_one_campaign(tmp_path, kind):
 def test_errors_and_coverage(tmp_path):
     kinds = ["rocker", "rocker on housing", "sphere", "sphere on housing"]
     errors, scores, onsets, beyond = [], [], [], []
-    for seed in range(16):
+    for seed in range(12):
         laws = bearing(kinds[seed % 4], 100 + seed)
         source, truth = campaign(tmp_path / "c.h5", laws, 100 + seed)
         for curve, law in zip(fit_pivots(source, ANGLES), laws, strict=True):
@@ -172,7 +172,7 @@ def test_errors_and_coverage(tmp_path):
                 onsets.append(curve.onset_load / true_onset(law, gap) - 1.0)
     errors, inside = np.abs(errors), np.abs(scores) < 1.96
     assert np.all(np.median(errors, axis=0) < 0.03)
-    # 240 values from 80 independent curves: two standard errors of a share of 0.95 are 0.04
+    # 180 values from 60 independent curves: two standard errors of a share of 0.95 are 0.05
     assert 0.91 < inside.mean() < 0.995
     assert np.mean(beyond) > 0.88
     assert np.median(np.abs(onsets)) < 0.10
@@ -338,7 +338,7 @@ def test_a_pad_of_its_own_kind_keeps_its_own_law(tmp_path, odd, law):
 @pytest.mark.slow
 def test_clearance_over_seeds(tmp_path):
     misses = []
-    for seed in range(6):
+    for seed in range(4):
         laws = bearing("sphere" if seed % 2 else "rocker", 300 + seed)
         source, _ = campaign(tmp_path / "c.h5", laws, 300 + seed, clearance=(ClearanceSweep(),))
         found = measure_clearance(source, ANGLES, fit_pivots(source, ANGLES))

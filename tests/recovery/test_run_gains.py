@@ -25,11 +25,11 @@ def found(path) -> list[tuple[str | None, str]]:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("channel", "gain", "least"),
-    [("X1A", 1.03, 3), ("X1A", 1.05, 3), ("X1B", 0.95, 2), ("L1H", 1.05, 3), ("L1V", 0.97, 3)],
+    [("X1A", 1.03, 2), ("X1A", 1.05, 2), ("X1B", 0.95, 2), ("L1H", 1.05, 2), ("L1V", 0.97, 2)],
 )
 def test_small_gains_are_named_at_their_run_and_channel(campaign_of, channel, gain, least):
     places = []
-    for seed in (71, 72, 73):
+    for seed in (71, 72):
         fault = Fault("scaled", RUN, channel, value=gain)
         path = campaign_of(stiff_rig(seed, fault, plan=SHORT))
         told = check_campaign(path)
