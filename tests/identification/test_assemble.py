@@ -1,4 +1,4 @@
-"""From the phasors of all runs to a campaign's coefficients: a campaign made by hand."""
+"""From the phasors of all runs to a campaign's coefficients: a campaign made by hand, whole and with lost channels."""
 
 import math
 from dataclasses import replace
@@ -191,3 +191,35 @@ def test_a_point_gathers_what_its_runs_say(runs):
     assert p.outlier_fraction == len(p.rejected) / (5 * WINDOWS)
     assert not p.inertia_corrected
     assert p.clearance == 1e-3
+
+
+def without_cells(run):
+    return replace(run, z=np.where(np.arange(4) > 1, np.nan, run.z))
+
+
+@pytest.fixture(scope="module")
+def complete_runs():
+    rng = np.random.default_rng(1)
+    return [run_at(f"{load:g}-{k}", k * math.pi / 5, load, 0.0, rng, noise=0.1) for load in LOADS for k in range(5)]
+
+
+def test_without_any_run_that_has_all_channels_every_point_says_so(complete_runs):
+    for point in found([without_cells(run) for run in complete_runs]).points:
+        assert np.isnan(point.stiffness.h).all()
+        assert {"fewer-than-two-directions", "run-without-data"} <= set(point.quality)
+
+
+def test_a_point_without_cells_leaves_the_other_alone(complete_runs):
+    first, second = found([*complete_runs[:5], *map(without_cells, complete_runs[5:])]).points
+    true = law(LOADS[0], 0.0)
+    np.testing.assert_allclose(first.stiffness.h, true, atol=1e-4 * np.abs(true).max())
+    assert first.quality == ("inertia-not-corrected",)
+    assert np.isnan(second.stiffness.h).all()
+
+
+def test_a_run_without_cells_costs_itself_only(complete_runs):
+    point, other = found([without_cells(complete_runs[0]), *complete_runs[1:]]).points
+    true = law(LOADS[0], 0.0)
+    np.testing.assert_allclose(point.stiffness.h, true, atol=1e-4 * np.abs(true).max())
+    assert "run-without-data" in point.quality
+    assert other.quality == ("inertia-not-corrected",)
