@@ -280,6 +280,7 @@ def test_cells_ten_times_off_in_all_runs_make_every_point_doubtful(campaign_of):
     assert "cells-contradict-set-points" in point.quality
 
 
+@pytest.mark.slow
 def test_where_the_iteration_runs_away_a_point_is_what_its_windows_say_and_not_trusted(small_campaign, monkeypatch):
     campaign = load_campaign(small_campaign)
     solved = identify(campaign)

@@ -252,6 +252,7 @@ def test_raw_data_is_not_touched(folder):
     assert sorted(p for p in folder.rglob("*") if p.is_file()) == paths
 
 
+@pytest.mark.slow
 @given(st.text(max_size=40))
 @settings(max_examples=80, deadline=None)
 def test_no_name_ever_leaves_the_folder(tmp_path_factory, name):

@@ -172,6 +172,7 @@ def test_what_the_record_contradicts_is_not_exported(tmp_path, damage):
         export(path, "csv", tmp_path / "o")
 
 
+@pytest.mark.slow
 def test_others_name_it_and_go_on_and_a_table_alone_has_no_record_to_contradict(tmp_path, rocker_file):
     path = coefficients(tmp_path)
     rewrite(path)
