@@ -1,5 +1,7 @@
 """CSV records: every seed of trouble of the export format, taken or refused with file, line and column."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -193,13 +195,23 @@ def test_empty_files_and_lines_of_megabytes_are_refused(tmp_path, data):
     refused(make(tmp_path, data))
 
 
+@pytest.mark.slow
+def test_a_program_that_ends_right_after_a_record_ends_well(tmp_path):
+    """Threads that let go of a stream of Python's while the interpreter ends aborted one program in ten."""
+    run = make(tmp_path, table())
+    script = "import sys, rigdata; rigdata.load_campaign(sys.argv[1]).runs[0].record('X1A')"
+    for _ in range(20):
+        assert subprocess.run([sys.executable, "-c", script, str(tmp_path)], check=False).returncode == 0
+    assert len(run.record("X1A").values)
+
+
 def test_vanished_and_unreadable_files_and_a_directory_in_their_place(tmp_path, monkeypatch):
     def no_rights(*_):
         raise PermissionError(13, "Permission denied")
 
     run = make(tmp_path, table())
     with monkeypatch.context() as patch:
-        patch.setattr("rigdata.readers.text.csv.open_numbers", no_rights)
+        patch.setattr("rigdata.readers.text.csv.number_blocks", no_rights)
         refused(run, "Permission denied")
     (tmp_path / "runs" / "c-1.csv").unlink()
     refused(run, "not there")

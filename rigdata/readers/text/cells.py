@@ -8,7 +8,6 @@ import datetime
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +17,8 @@ from rigdata.arrays import FloatArray
 HEAD = 2**18
 #: Longer lines come in pieces [characters].
 _PIECE = 2**20
+#: Text that is parsed at a time, and the longest line [bytes].
+BLOCK = 2**22
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -71,31 +72,35 @@ def is_ascii_based(encoding: str) -> bool:
     return sample.encode(encoding) == sample.encode("ascii")
 
 
-def open_numbers(path: Path, encoding: str, delimiter: str) -> Any:
-    """Open a text file for pyarrow: every character beyond ASCII has become DEL, runs of blanks that part cells a tab.
+def number_blocks(path: Path, encoding: str, delimiter: str) -> Iterator[bytes]:
+    """Whole lines of a text file in blocks for pyarrow: ASCII, runs of blanks that part cells a tab.
 
-    Numbers, delimiters and line ends are ASCII; pyarrow takes all text for UTF-8 and must not meet other bytes.
+    Numbers, delimiters and line ends are ASCII; every other character has become DEL, since pyarrow takes all text
+    for UTF-8. It is given bytes, not a stream of Python's: its threads hold a stream beyond the last line, and let go
+    of it while the interpreter ends, which aborts the program.
     """
     import pyarrow as pa
 
     decoder = None if is_ascii_based(encoding) else codecs.getincrementaldecoder(encoding)("replace")
     begun_line = b""
-
-    def plain(buffer: Any) -> bytes:
-        nonlocal begun_line
-        block, is_end = buffer.to_pybytes(), not buffer.size
-        if decoder is not None:
-            block = decoder.decode(block, final=is_end).encode("utf-8", "replace")
-        block = block.translate(_ASCII)
-        if delimiter != " ":
-            return block
-        text = begun_line + block
-        end = len(text) if is_end else text.rfind(b"\n") + 1
-        begun_line = text[end:]
-        trimmed = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", text[:end])
-        return re.sub(rb"[ \t]+", b"\t", trimmed)
-
-    return pa.TransformInputStream(pa.PythonFile(path.open("rb"), "r"), plain)
+    with path.open("rb") as stream:
+        while True:
+            block = stream.read(BLOCK)
+            is_end = not block
+            if decoder is not None:
+                block = decoder.decode(block, final=is_end).encode("utf-8", "replace")
+            text = begun_line + block.translate(_ASCII)
+            end = len(text) if is_end else (text.rfind(b"\n") + 1 or text.rfind(b"\r") + 1)
+            lines, begun_line = text[:end], text[end:]
+            if delimiter == " ":
+                trimmed = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", lines)
+                lines = re.sub(rb"[ \t]+", b"\t", trimmed)
+            if lines:
+                yield lines
+            if is_end:
+                return
+            if len(begun_line) > BLOCK:
+                raise pa.ArrowInvalid(f"a line is longer than {BLOCK >> 20} MB")
 
 
 _CLOCK = r"(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9}))?"

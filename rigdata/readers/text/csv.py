@@ -15,18 +15,17 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_SAMPLES, RecordFile
 from rigdata.readers.series import Contents, GrowingChannel, Series, is_time, time_columns
 from rigdata.readers.text.cells import (
+    BLOCK,
     MISSING,
     is_ascii_based,
     is_number,
     is_stamp,
+    number_blocks,
     number_pattern,
-    open_numbers,
     stamp_seconds,
 )
 from rigdata.readers.text.head import Head, find_head, plain_name, split_line
 
-#: Lines longer than this are rejected [bytes].
-_BLOCK = 2**22
 #: Lines of a wrong number of cells that are listed.
 _LISTED = 5
 
@@ -108,7 +107,7 @@ def _options(head: Head, places: Sequence[int], numbers: bool, skip: Any) -> dic
     delimiter = "\t" if head.delimiter == " " else head.delimiter
     return {
         "read_options": pv.ReadOptions(
-            use_threads=numbers, block_size=_BLOCK, column_names=labels, skip_rows=head.data_line - 1
+            use_threads=False, block_size=4 * BLOCK, column_names=labels, skip_rows=head.data_line - 1
         ),
         "parse_options": pv.ParseOptions(delimiter=delimiter, invalid_row_handler=skip),
         "convert_options": pv.ConvertOptions(
@@ -138,14 +137,19 @@ def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, 
         return "skip"
 
     with ExitStack() as files:
-        stream = files.enter_context(open_numbers(record.path, head.encoding, head.delimiter))
         numeric = {i: files.enter_context(GrowingChannel()) for i in places if i not in head.stamps}
         try:
-            for batch in pv.open_csv(stream, **_options(head, places, numbers, skip)):
-                length += batch.num_rows
+            options = _options(head, places, numbers, skip)
+            for block in number_blocks(record.path, head.encoding, head.delimiter):
+                copied = pa.BufferOutputStream()  # the library's own memory: none of Python's is left to its threads
+                copied.write(block)
+                rows = pv.read_csv(pa.BufferReader(copied.getvalue()), **options)
+                options["read_options"].skip_rows = 0
+                length += rows.num_rows
                 if length > MAX_SAMPLES:
                     raise record.refuse("", "has too many lines", "Split the run")
-                for i, column in zip(places, batch.columns, strict=True):
+                for i, cells in zip(places, rows.columns, strict=True):
+                    column = cells.combine_chunks()
                     if i in head.stamps:
                         stamps[i] += pc.ascii_trim_whitespace(column).to_pylist()
                         continue
