@@ -22,7 +22,7 @@ from rigdata.run import Run
 from rigdata.safe_path import inside
 
 MANIFEST_NAME = "campaign.toml"
-_HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
+HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
 _MAX_BEARING = 2**20
 
 
@@ -149,7 +149,7 @@ def load_campaign(path: str | Path) -> Campaign:
     Parameters
     ----------
     path : str or Path
-        A folder with ``campaign.toml``, that file, or one HDF5 file.
+        A folder with ``campaign.toml``, that file, one HDF5 file, or a folder with one of these in it.
 
     Returns
     -------
@@ -165,8 +165,8 @@ def load_campaign(path: str | Path) -> Campaign:
     >>> load_campaign(demo).housing_mass
     30.0
     """
-    source = Path(path)
     try:
+        source = campaign_place(Path(path))
         if source.is_dir() and (source / MANIFEST_NAME).exists():
             inside(source, MANIFEST_NAME, str(source), "")  # a stranger's folder may link it elsewhere
             return _load_folder(source, source / MANIFEST_NAME)
@@ -179,12 +179,23 @@ def load_campaign(path: str | Path) -> Campaign:
     return _load_folder(source.parent, source) if source.suffix.lower() == ".toml" else _load_hdf5(source)
 
 
+def campaign_place(path: Path) -> Path:
+    """`path`, or the one campaign that is in it, as in the output folder of `tpjb simulate`."""
+    campaigns = _campaigns_in(path) if path.is_dir() and not (path / MANIFEST_NAME).exists() else []
+    return campaigns[0] if len(campaigns) == 1 else path
+
+
+def _campaigns_in(folder: Path) -> list[Path]:
+    members = sorted(itertools.islice(folder.iterdir(), 1000))
+    return [p for p in members if p.suffix.lower() in HDF5_SUFFIXES or (p / MANIFEST_NAME).is_file()]
+
+
 def _refuse_other(source: Path) -> None:
     """Refuse what is neither a manifest nor may be an HDF5 file."""
     cure, fault = f"Give the folder that holds {MANIFEST_NAME}, or an HDF5 file", ""
     if source.is_dir():
         fault = f"the folder has no {MANIFEST_NAME}"
-        stored = [p.name for p in itertools.islice(source.iterdir(), 1000) if p.suffix.lower() in _HDF5_SUFFIXES]
+        stored = [p.name for p in _campaigns_in(source)]
         hint = f" ({', '.join(stored[:3])})" if stored else ""
         cure += f"{hint}; `tpjb init FOLDER` drafts one for records"
     elif not source.exists():

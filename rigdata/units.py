@@ -157,7 +157,7 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
         raise UnitError(f'expected a number with a unit in quotes, like "1 {example}", got {shown(value)}')
     if not isinstance(value, str):
         if dimension != "ratio":
-            raise UnitError(f'{shown(value)} has no unit; write it with one, like "{shown(value)} {example}"')
+            raise UnitError(f"{shown(value)} has no unit, such as {example}")
         return _finite(value), ""
     if len(value) > LONGEST:
         raise UnitError(f"a text of {len(value)} characters is not a quantity")
@@ -168,7 +168,7 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
         raise UnitError(f"{shown(value)} is not a number with a unit{hint}")
     unit = text[match.end() :].strip()
     if not unit and dimension != "ratio":
-        raise UnitError(f'{shown(value)} has no unit; write it with one, like "{match[0]} {example}"')
+        raise UnitError(f"{shown(value)} has no unit, such as {example}")
     return _finite(match[0]), unit
 
 

@@ -213,7 +213,7 @@ class Table:
         try:
             return field.read(value)
         except UnitError as error:
-            self.error(key, f"{key}: {error}", field.advice(value))
+            self.error(key, str(error), field.advice(value))
             return field.default
 
     @contextmanager
@@ -222,7 +222,7 @@ class Table:
         try:
             yield
         except UnitError as error:
-            self.error(key, f"{key}: {error}", remedy)
+            self.error(key, str(error), remedy)
 
 
 def key_lines(text: str) -> dict[Path, int]:

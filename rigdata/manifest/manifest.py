@@ -168,6 +168,10 @@ class Manifest(Description):
 def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:
     """Read and check the text of a manifest."""
     data = _load_toml(text, file)
+    schema = str(data.get("schema"))
+    if schema.startswith("tpjb-") and not schema.startswith("tpjb-rig/"):
+        fault = f"is of the schema {shown(schema)}, not the manifest of a campaign"
+        raise refuse(file, "", fault, "Give the folder that holds campaign.toml")
     findings = Findings(file, key_lines(text), files)
     findings.note_open(open_paths(data))
     top = Table(data, (), findings)

@@ -93,18 +93,17 @@ def with_axes(channels: Guesses, frame: Frame, source: str = "") -> None:
         if channels[name].typed:
             continue
         angle = math.degrees(frame.angle) + (90.0 * frame.sense if number else 0.0)
-        round_angle = _MOUNTED * round(angle / _MOUNTED)
+        mounted = _MOUNTED * round(angle / _MOUNTED)
+        if abs(mounted - angle) > max(_NEAR, 2.0 * frame.error):
+            mounted = angle
+        polarity = channels[name].sign or (-1 if mounted % 360.0 >= 180.0 else 1)
+        turn = 180.0 if polarity < 0 else 0.0
         mark, reason = frame.source, frame.reason
         if mark == "records":
-            reason = f"{folded(angle):g} deg by {reason}"
+            reason = f"{folded(angle + turn):g} deg by {reason}"
             if source == "guess":
                 mark, reason = source, f"{reason}, if the cells' axes hold"
-        if abs(round_angle - angle) <= max(_NEAR, 2.0 * frame.error):
-            angle = round_angle
-        turned = angle % 360.0
-        polarity = channels[name].sign or (-1 if turned >= 180.0 else 1)
-        pointed = turned + (180.0 if polarity < 0 else 0.0)
-        axis = Entry(folded(pointed), mark, reason)
+        axis = Entry(folded(mounted + turn), mark, reason)
         channels[name] = replace(channels[name], axis=axis, polarity=polarity)
 
 

@@ -141,6 +141,10 @@ def test_a_stator_heavier_than_its_loads_and_another_rate_are_named(campaign_of)
         ("weight", "warning")
     }
     slow = replace(campaign.runs[0], reader=replace(campaign.runs[0].reader, stated_rate=4000.0))
-    off = replace(observations[0], run=slow)
+    of_campaign = replace(observations[0], run=slow)
+    before = len(of_campaign.report.findings)
+    check_magnitudes([of_campaign], 30.0)
+    assert len(of_campaign.report.findings) == before  # the file's own rate wins over [acquisition]
+    off = replace(observations[0], run=replace(slow, stated=slow.stated | {"sample_rate"}))
     check_magnitudes([off], 30.0)
     assert off.report.findings[-1].problem.what.startswith("the file shows 1000 Hz, the manifest states 4000 Hz")

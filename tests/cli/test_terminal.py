@@ -1,6 +1,7 @@
 """Tables fit the terminal; progress without one is a line now and then, with the remaining time once it is known."""
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import pandas as pd
@@ -90,8 +91,11 @@ def test_a_verdict_leads_to_a_command():
 
     named = SimpleNamespace(effects=("x",), verdict="named")
     consistent = SimpleNamespace(effects=(), verdict="consistent")
-    assert next_command("k.h5", "", named, "o") == "tpjb compare k.h5 --effects o/updated.effects.toml"
-    assert next_command("k.h5", "b.toml", consistent, "o") == "tpjb export o --to ross"
+    folder, terminal = Path("my rig/o"), Terminal(silent=True)
+    terminal.next(*next_command(["k.h5"], named, folder))
+    assert terminal.following == "tpjb compare k.h5 --effects 'my rig/o/updated.effects.toml'"
+    terminal.next(*next_command(["k.h5", "--bearing", "b.toml"], consistent, folder))
+    assert terminal.following == "tpjb export 'my rig/o' --to ross"
 
 
 @pytest.mark.parametrize("file", ["", "coefficients.csv"])

@@ -119,6 +119,21 @@ def test_pivots_and_clearances_come_from_folders_of_results(tmp_path):
     assert texts[-1] == "No calibration is known to be common to both: the intervals hold that of each."
 
 
+def test_campaigns_of_static_tests_alone_are_compared_by_these(tmp_path):
+    without = side("a", TRUE).coefficients.iloc[:0]
+    clearance = pd.DataFrame({"pad": [1], "clearance_m": [1e-4], "clearance_m_se": [2e-7]})
+    sides = [Side(name, without, clearance=clearance) for name in "ab"]
+    difference = difference_of(*sides)
+    assert list(difference.tables) == ["clearance_difference"]
+    texts = difference_sentences(difference)
+    assert texts[-1] == "Neither has dynamic runs: there are no coefficients to compare."
+    assert "Clearance: no pad changed beyond its interval." in texts
+    page = write_difference_report(tmp_path, difference, {}, {}, "").read_text(encoding="utf-8")
+    assert "0 points" not in page
+    with_points = difference_of(sides[0], side("b", TRUE))
+    assert len(with_points.unmatched) == 1
+
+
 def test_the_first_screen_says_what_was_tested_and_each_value_with_its_interval(tmp_path):
     moved = TRUE.copy()
     moved[7] *= 0.5

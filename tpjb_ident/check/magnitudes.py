@@ -112,12 +112,17 @@ def check_weight(report: Reporter, measured: Sequence[Sizes], mass: float, large
 
 
 def _check_rate(report: Reporter, run: Run) -> None:
-    """The rate that the file shows against the one that the manifest states, where that is meant for this run."""
-    stated_rate = getattr(run.reader, "stated_rate", None)
-    if stated_rate is None or not (run.kind == "dynamic" or "sample_rate" in run.stated):
+    """The rate that the file shows against the one that the manifest states, where that is meant for this run.
+
+    The campaign's rate is meant for dynamic runs, and not where the file states another one: that wins.
+    """
+    stated_rate = run.reader.stated_rate
+    if stated_rate is None:
         return
     try:
-        rate = run.sample_rate
+        rate, is_timed = run.sample_rate, not run.devices[0].counted
     except RigDataError:  # said by whoever read the run
+        return
+    if not ("sample_rate" in run.stated or (run.kind == "dynamic" and is_timed)):
         return
     report.ask("rate", abs(math.log(rate / stated_rate)), rate=rate, stated=stated_rate)

@@ -49,7 +49,6 @@ _BUG, _BAD_INPUT, _NOT_TRUSTED, _INTERRUPTED, _TERMINATED = 1, 2, 3, 130, 143
 _ARITHMETIC = re.compile(r"encountered in|empty slice|All-NaN|[Dd]egrees of freedom|poorly conditioned")
 #: A result table of more rows is named in the document of ``--json``, not repeated in it.
 _MOST_ROWS = 5000
-HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
 REPORT = "report.html"
 #: Every command by its name, as its file is imported.
 COMMANDS: dict[str, Callable[..., None]] = {}
@@ -76,11 +75,12 @@ class Command(Terminal):
         self._outputs: dict[str, None] = {}
 
     def open(self, path: Path) -> Campaign:
-        """Open a campaign; a folder with one campaign in it stands for that."""
+        """Open a campaign."""
         from rigdata import load_campaign
 
+        refuse_special(path)
         self._sources.append(path)
-        campaign = load_campaign(campaign_place(path))
+        campaign = load_campaign(path)
         self._opened.append(campaign)
         return campaign
 
@@ -325,15 +325,6 @@ def _bug_report(error: BaseException) -> str:
         f"{type(error).__name__}: {str(error)[:300]}. This is a fault of tpjb-ident, not of your data; nothing was "
         f"written. Please report it with the traceback in {file.name}"
     )
-
-
-def campaign_place(path: Path) -> Path:
-    """Return `path`, or the one campaign that is in it, as in the output folder of `tpjb simulate`."""
-    refuse_special(path)
-    if not path.is_dir() or (path / "campaign.toml").exists():
-        return path
-    inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in HDF5 or (p / "campaign.toml").is_file()]
-    return inside[0] if len(inside) == 1 else path
 
 
 def refuse_special(path: Path) -> None:

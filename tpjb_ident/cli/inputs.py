@@ -172,6 +172,12 @@ def model_settings(
     return ModelSettings(pivots, thermal, effects)
 
 
+def source_words(campaign: Path | None, table: Path | None, bearing: Path | None) -> list[object]:
+    """What `open_source` takes, as words of a command."""
+    words: list[object] = [campaign] if table is None else ["--coefficients", table]
+    return words if bearing is None else [*words, "--bearing", bearing]
+
+
 def open_source(
     c: Command, campaign: Path | None, table: Path | None, bearing: Path | None, predicted: bool = False
 ) -> tuple[Any, Any]:

@@ -77,9 +77,8 @@ class Terminal:
             print(_fitted(text) if fitted else printable(text), flush=True)
 
     def next(self, *words: object) -> None:
-        """Note the command that comes next, by its words after `tpjb` or as typed; it is the last line of all."""
-        texts = [str(word) for word in words]
-        self.following = texts[0] if len(texts) == 1 else shlex.join(["tpjb", *texts])
+        """Note the command that comes next, by its words after `tpjb`; it is the last line of all."""
+        self.following = shlex.join(["tpjb", *map(str, words)])
 
     def close(self) -> None:
         """Print the command that comes next, unbroken, so that it can be copied."""
@@ -145,11 +144,10 @@ class Terminal:
         self.show(": ".join(filter(None, (name, table.caption))), columns, table.rows)
 
     @contextlib.contextmanager
-    def conclusion(self, sentences: Sequence[str], following: str) -> Iterator[None]:
-        """Print the answer, what the block shows, and all else; the command that comes next is noted."""
+    def conclusion(self, sentences: Sequence[str]) -> Iterator[None]:
+        """Print the answer, what the block shows, and all else."""
         answer, *more = sentences
         self.print(answer)
-        self.following = following or self.following
         yield
         for line in more:
             self.print(line)

@@ -116,5 +116,5 @@ def partners(rows: pd.DataFrame, others: pd.DataFrame, within: tuple[float, floa
     with np.errstate(invalid="ignore", divide="ignore"):  # a load or speed of zero has no share: equal or apart
         distance = np.nan_to_num(apart / most[:, None], nan=0.0, posinf=np.inf).max(axis=2)
     senses = [frame["rotation"].to_numpy(str) if "rotation" in frame else ROTATIONS[0] for frame in (rows, others)]
-    distance[np.reshape(senses[0], (-1, 1)) != senses[1]] = np.inf
+    distance = np.where(np.reshape(senses[0], (-1, 1)) != senses[1], np.inf, distance)
     return np.where(distance.min(axis=1) <= 1.0, distance.argmin(axis=1), -1)

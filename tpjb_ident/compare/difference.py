@@ -42,6 +42,10 @@ _CLEARANCE = "clearance_m"
 _LEVEL = 0.95
 #: Columns of a value and its interval.
 _ENDS = ("", "_lo", "_hi")
+#: Coefficients of a campaign without dynamic runs.
+_NO_COEFFICIENTS = pd.DataFrame(
+    columns=[*POINT_COLUMNS, *(name + end for name in COEFFICIENT_COLUMNS for end in _ENDS)], dtype=float
+)
 #: Degrees of freedom, by which the quantile that a table's interval was made with is read back.
 _FREEDOM = np.geomspace(1.0, 1e6, 400)
 
@@ -59,13 +63,16 @@ class Side:
     sensors: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
-def measured_side(campaign: Campaign, identification: Identification, static: StaticTests | None) -> Side:
-    """A side from records."""
+def measured_side(campaign: Campaign, identification: Identification | None, static: StaticTests | None) -> Side:
+    """A side from records, with an identification where some are dynamic."""
     from tpjb_ident.pivot.tables import pivot_table
 
-    changes = identification.calibration_changes / np.sqrt(max(len(identification.calibration_changes), 1))
-    named = dict(zip(identification.calibration_names, changes.reshape(len(changes), -1, 8), strict=False))
-    sensors = {name: moved for name, moved in named.items() if name.partition(":")[0] in _OF_INSTRUMENTS}
+    coefficients, sensors = _NO_COEFFICIENTS, {}
+    if identification is not None:
+        coefficients = identification.to_frame()
+        changes = identification.calibration_changes / np.sqrt(max(len(identification.calibration_changes), 1))
+        named = dict(zip(identification.calibration_names, changes.reshape(len(changes), -1, 8), strict=False))
+        sensors = {name: moved for name, moved in named.items() if name.partition(":")[0] in _OF_INSTRUMENTS}
     pivots = clearance = None
     if static is not None and static.curves:
         pivots = pivot_table(static.curves)
@@ -73,7 +80,7 @@ def measured_side(campaign: Campaign, identification: Identification, static: St
         pivots["relative_calibration"] = pivots["pad"].map(scales)
     if static is not None and static.clearance is not None:
         clearance = static.clearance.to_frame()
-    return Side(campaign.id, identification.to_frame(), pivots, clearance, campaign, sensors)
+    return Side(campaign.id, coefficients, pivots, clearance, campaign, sensors)
 
 
 def recorded_side(folder: Path) -> Side:
@@ -272,7 +279,10 @@ def difference_sentences(difference: Difference) -> tuple[str, ...]:
     judged = points.filter(like="_changed").to_numpy()
     number, yes, no = judged.size, (judged == "yes").sum(), (judged == "no").sum()
     if not number:
-        return (f"{a} and {b} have no operating point in common.", *_sentences_beside(difference))
+        sentences = _sentences_beside(difference)
+        if difference.a.coefficients.empty and difference.b.coefficients.empty:
+            return (*sentences, "Neither has dynamic runs: there are no coefficients to compare.")
+        return (f"{a} and {b} have no operating point in common.", *sentences)
     head = f"From {a} to {b} {yes} of {number} coefficients changed beyond what both intervals allow"
     rest = f"{no} are the same within {100 * _NO_CHANGE:g} %"
     rest += f", of {number - yes - no} the records cannot tell." if number > yes + no else "."
@@ -326,7 +336,7 @@ def _sentences_beside(difference: Difference) -> tuple[str, ...]:
     names = ", ".join(name.partition(": ")[2] for name in difference.shared if name.startswith("calibration"))
     if names:
         sentences.append(f"Both state the same calibration of {names}: its errors cancel in the differences.")
-    else:
+    elif len(difference.points):
         sentences.append("No calibration is known to be common to both: the intervals hold that of each.")
     if difference.unmatched:
         sentences.append(f"Without a partner: {'; '.join(difference.unmatched)}.")

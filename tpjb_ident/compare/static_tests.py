@@ -58,13 +58,16 @@ def measure_static(
 
 
 def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Problem] = ()) -> list[Problem]:
-    """Problems that show in the clearance sweeps of a campaign whose bearing is known."""
-    sound = [
-        run
-        for run in campaign.of_kind("clearance")
-        if not any(p.run == run.id and p.severity == "error" for p in former)
-    ]
-    return [problem for run in sound for problem in _of_sweep(run, bearing)]
+    """Problems of a campaign whose bearing is known: pads that it has not, and what clearance sweeps show."""
+    problems = []
+    for run in campaign.runs:
+        if (run.pad or 0) > len(bearing.pads):
+            fault = f"loads pad #{run.pad}, the bearing has {len(bearing.pads)}"
+            problems.append(Problem("error", run.file, "pad", fault, "Correct pad in the manifest", run.id))
+    refused = {problem.run for problem in former if problem.severity == "error"}
+    for run in campaign.of_kind("clearance"):
+        problems += [] if run.id in refused else _of_sweep(run, bearing)
+    return problems
 
 
 def _of_sweep(run: Run, bearing: Bearing) -> list[Problem]:

@@ -133,14 +133,13 @@ def _read(number: re.Match[str]) -> str:
     return f"{significant(float(number[1]) / scale)} {unit}".replace("-", MINUS)
 
 
-def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> str:
-    """How to use what was found, as a command to type."""
-    drawn = f" --bearing {bearing}" if bearing else ""
+def next_command(source: Sequence[object], verdict: Verdict, folder: Path) -> list[object]:
+    """How to use what was found, as words of a command; those of `source` say what was diagnosed."""
     if verdict.effects:
-        return f"tpjb compare {campaign}{drawn} --effects {folder}/updated.effects.toml"
+        return ["compare", *source, "--effects", folder / "updated.effects.toml"]
     if verdict.verdict == "consistent":
-        return f"tpjb export {folder} --to ross"
-    return f"tpjb compare {campaign}{drawn} --pivots measured"
+        return ["export", folder, "--to", "ross"]
+    return ["compare", *source, "--pivots", "measured"]
 
 
 def parameter_rows(verdict: Verdict) -> list[list[str]]:

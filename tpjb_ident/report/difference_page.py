@@ -51,7 +51,7 @@ def write_difference_report(
         subtitle="Second less first, with 95 % intervals",
         facts=_facts(difference) | set_points(list(points[list(POINT_KEY)].itertuples(index=False, name=None))),
         values=_values_table(difference) if len(points) else None,
-        flags=flags_line([flags], len(points)),
+        flags=flags_line([flags], len(points)) if len(points) else "",
         lead="difference",
         answer=answer,
         more=more,

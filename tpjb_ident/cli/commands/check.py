@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.cli.command import Command, campaign_place, command
+from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import Column, words
 from tpjb_ident.conditions import SEVERITIES
@@ -43,6 +43,7 @@ def check(c: Command, campaign: Path) -> None:
     Reads all records. Writes check.json. Exit code 2 if there is an error that makes a run unusable.
     """
     from rigdata import RigDataError
+    from rigdata.campaign import campaign_place
     from tpjb_ident.check.campaign import check_campaign
 
     if not campaign.exists():
@@ -69,6 +70,8 @@ def check(c: Command, campaign: Path) -> None:
         _show_coverage(c, source)
     if any("open (??)" in p.what for p in problems):
         c.next("init", path if path.is_dir() else path.parent, "--update")
+    elif path.is_dir() and not (path / "campaign.toml").exists():
+        c.next("init", path)
     else:
         dynamic = source is not None and source.of_kind("dynamic")
         c.next("check" if errors else "identify" if dynamic else "pivot", campaign)
@@ -109,8 +112,8 @@ def problem_lines(problems: Sequence[Problem]) -> list[str]:
 
 
 def _drawing_problems(c: Command, campaign: Campaign, problems: list[Problem]) -> list[Problem]:
-    """What the clearance sweeps say of the probes, where the campaign carries its bearing."""
-    if not campaign.bearing_text or not campaign.of_kind("clearance"):
+    """What contradicts the drawing, where the campaign carries its bearing."""
+    if not campaign.bearing_text:
         return []
     from model.bearing import BearingError
     from rigdata.problem import Problem

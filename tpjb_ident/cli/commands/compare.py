@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import identified, identify_settings, refuse_untrusted, write_identification
-from tpjb_ident.cli.inputs import model_settings, open_source, parse_share
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, source_words
 from tpjb_ident.cli.options import DEMO, known_names, named
 from tpjb_ident.columns import amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
@@ -77,9 +78,9 @@ def compare(
                 share = parse_share(reading_error, "--reading-error")
                 result = compare_table(coefficients, drawing, settings, share, show)
             result = with_predictions(result, tables)
-            following = _next_command(result, str(campaign or f"--coefficients {coefficients}"), bearing)
-            write_comparison(c, result, show, following)
-    show_comparison(c, result, following)
+            _note_next(c, result, campaign, source_words(campaign, coefficients, bearing))
+            write_comparison(c, result, show)
+    show_comparison(c, result)
     refuse_comparison(result)
 
 
@@ -93,15 +94,17 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
 
         for name, frame in difference.tables.items():
             c.table(name, frame)
-        on_records = difference.b.campaign is not None
-        following = f"tpjb diagnose {paths[1]}" if on_records else f"tpjb view {c.target}"
-        write_difference_report(c.folder, difference, named(c.options), c.inputs, following)
+        is_diagnosable = difference.b.campaign is not None and len(difference.b.coefficients)
+        c.next(*(("diagnose", paths[1]) if is_diagnosable else ("view", c.target)))
+        write_difference_report(c.folder, difference, named(c.options), c.inputs, c.following)
     points = difference.points
-    with c.conclusion(difference_sentences(difference), following):
+    with c.conclusion(difference_sentences(difference)):
         title = f"{difference.a.name} and {difference.b.name}: changed?"
         names = " ".join(f"{name}_changed" for name in DIRECT)
         c.show_frame(title, points, f"static_load_N excitation_Hz {names}", "difference.csv")
-    if points.empty:
+    if not difference.tables:
+        raise NotTrustedError("the two have no test in common. What each of them has is in the message above.")
+    if points.empty and len(difference.a.coefficients) and len(difference.b.coefficients):
         raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")
     if bad := difference.untrusted_points():
         raise NotTrustedError(f"{len(bad)} points have a flag that forbids trust: {'; '.join(bad[:5])}.")
@@ -117,12 +120,12 @@ def _side(c: Command, path: Path, bearing: Path | None, method: str, norm: str |
     from tpjb_ident.compare.static_tests import measure_static
 
     campaign = c.open(path)
-    identification = identified(c, campaign, method, norm)
+    identification = identified(c, campaign, method, norm) if campaign.of_kind("dynamic") else None
     drawing = c.bearing_of(campaign, bearing) if bearing is not None or campaign.bearing_text else None
     return measured_side(campaign, identification, None if drawing is None else measure_static(campaign, drawing))
 
 
-def write_comparison(c: Command, result: Comparison, show: Progress, following: str, note: str = "") -> None:
+def write_comparison(c: Command, result: Comparison, show: Progress, note: str = "") -> None:
     """Write every table, pivots.toml and the report."""
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.pivot import pivot_table, write_pivots
@@ -141,30 +144,31 @@ def write_comparison(c: Command, result: Comparison, show: Progress, following: 
         c.table("locus", result.locus.to_frame())
         c.table("locus_comparison", result.loci)
     show("drawing figures", 1, 2)
-    write_report(c.folder, result, named(c.options), c.inputs, following, note)
+    write_report(c.folder, result, named(c.options), c.inputs, c.following, note)
 
 
-def show_comparison(c: Command, result: Comparison, following: str = "") -> None:
-    """Print what to conclude, the command that comes next, and how far each pivot model is off."""
+def show_comparison(c: Command, result: Comparison) -> None:
+    """Print what to conclude, and how far each pivot model is off."""
     from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
 
     rows = []
     for name, agreement in agreements(result.table).iterrows():
         rows.append([str(name), *map(percent, agreement["median"]), number_inside(agreement)])
     columns = [*words("pivots"), *DIRECT, "inside"]
-    with c.conclusion(summary_sentences(result), following):
+    with c.conclusion(summary_sentences(result)):
         c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, rows)
 
 
-def _next_command(result: Comparison, source: str, bearing: Path | None) -> str:
-    """Command that comes next: a diagnosis where the model is off, an export where it is not."""
+def _note_next(c: Command, result: Comparison, campaign: Path | None, source: Sequence[object]) -> None:
+    """Note the command that comes next: a diagnosis where the model is off, an export where it is not."""
     from tpjb_ident.compare.summary import agreements, closest, is_off
 
     best = closest(agreements(result.table))
-    if best is None or not is_off(best):
-        return "" if source.startswith("--") else f"tpjb export {source} --to ross"
-    given = f" --bearing {bearing}" if bearing else ""
-    return "" if result.bearing is None else f"tpjb diagnose {source}{given}"
+    if best is not None and is_off(best):
+        if result.bearing is not None:
+            c.next("diagnose", *source)
+    elif campaign is not None:
+        c.next("export", campaign, "--to", "ross")
 
 
 def refuse_comparison(result: Comparison) -> None:

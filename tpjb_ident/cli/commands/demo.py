@@ -15,8 +15,6 @@ from tpjb_ident.rounding import counted
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
 
-_NEXT = "tpjb init FOLDER-OF-YOUR-RECORDS"
-
 
 @command("tpjb demo", "tpjb demo --out /tmp/look")
 def demo(c: Command) -> None:
@@ -46,7 +44,8 @@ def demo(c: Command) -> None:
             truth = json.loads(path.with_name("demo.truth.json").read_text(encoding="utf-8"))
             error = 100 * _largest_error(result, truth)
             note = f"The records are computed: identified direct coefficients are within {error:.2f} % of the truth."
-            write_comparison(c, result, show, _NEXT, note)
+            c.next("init", "FOLDER-OF-YOUR-RECORDS")
+            write_comparison(c, result, show, note)
     show_comparison(c, result)
     counts = ", ".join(counted(summary["counts"][severity], severity) for severity in ("error", "warning"))
     c.print(f"Read {len(campaign.runs)} records of {path.name}: {counts}.")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import refuse_untrusted, write_identification
-from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, pivot_choice
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, pivot_choice, source_words
 from tpjb_ident.cli.options import DEMO, named
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
@@ -69,11 +69,10 @@ def diagnose(
         _write_verdict(c.folder, baseline, verdict)
         from tpjb_ident.report import diagnosis_page as page
 
-        typed = str(campaign or f"--coefficients {coefficients}")
-        following = page.next_command(typed, str(bearing or ""), verdict, str(c.target))
-        page.write_diagnosis_report(c.folder, source, result, named(c.options), c.inputs, following)
+        c.next(*page.next_command(source_words(campaign, coefficients, bearing), verdict, c.target))
+        page.write_diagnosis_report(c.folder, source, result, named(c.options), c.inputs, c.following)
     deviations = median_deviations(before_and_after(result.diagnosis, result.identification))
-    with c.conclusion(page.verdict_sentences(source.id, verdict, deviations), following):
+    with c.conclusion(page.verdict_sentences(source.id, verdict, deviations)):
         if verdict.effects:
             columns = [*words("effect", "parameter"), "value"]
             c.show("Effects, with 95 % intervals", columns, page.parameter_rows(verdict))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigdata.units import ZERO_CELSIUS
-from tpjb_ident.cli.command import HDF5, Command, campaign_place, command
+from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.options import DEMO
 from tpjb_ident.cli.terminal import PRINTED
 from tpjb_ident.columns import Column, channel_unit, in_us_units, size, symbol, words
@@ -46,13 +46,14 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
     .parquet, and the picture. Values of a campaign are shown in µm, N, m/s^2, degC, Hz (in mil, lbf, degF, rpm with
     --units us) and written in SI; those of a record file have the units of the file.
     """
+    from rigdata.campaign import HDF5_SUFFIXES, campaign_place
     from rigdata.survey.exports import read_export
     from rigdata.survey.spectrum import look_at
 
     place = campaign_place(source)
     if not place.exists():
         raise BadInputError(f"{source}: there is no such file or folder. Check the path.")
-    if place.is_dir() or place.suffix.lower() in (*HDF5, ".toml"):
+    if place.is_dir() or place.suffix.lower() in (*HDF5_SUFFIXES, ".toml"):
         campaign = c.open(source)
         c.next("check", source)
         if run is None:

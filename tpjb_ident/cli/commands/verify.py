@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tpjb_ident.cli.command import Command, campaign_place, command, refuse_special
+from tpjb_ident.cli.command import Command, command, refuse_special
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import listed
 from tpjb_ident.runtime.output_folder import READY, RECORD, former_runs, outputs_of, texts_of
@@ -75,6 +75,8 @@ def recorded(results: Path) -> dict[str, dict[str, Any]]:
 
 def files_of(results: Path, name: str, entry: Mapping[str, Any], given: Sequence[Path]) -> Iterator[dict[str, str]]:
     """Compare the files of one command with its entry: as verify.json lists them."""
+    from rigdata.campaign import campaign_place
+
     hashes = texts_of(entry, "outputs_sha256")
     for file in outputs_of(entry):
         yield {"command": name, "role": "result", "file": file, "state": _state([results], file, hashes[file])}

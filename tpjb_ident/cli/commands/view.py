@@ -6,7 +6,7 @@ import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.cli.command import Command, campaign_place, command
+from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.options import DEMO
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.interrupts import heard
@@ -35,6 +35,7 @@ def view(
     The page is served on 127.0.0.1 only, under a random path that is printed, and loads nothing from anywhere else.
     Stop with Ctrl-C.
     """
+    from rigdata.campaign import campaign_place
     from tpjb_ident.view.server import Session, private_link, serve
 
     place = campaign_place(source)
