@@ -33,12 +33,9 @@ class CampaignTruth(dict[str, Any]):
     """What was really put into a campaign, by the keys of the samples' truth files."""
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write as JSON, whole or not at all; never into the campaign itself. What is infinite becomes null."""
-        target = Path(path)
-        spare = target.with_name(f".{target.name}.part")
+        """Write as JSON, never into the campaign itself; what is infinite becomes null."""
         finite = json.loads(json.dumps(self), parse_constant=lambda infinite: None)
-        spare.write_text(json.dumps(finite, indent=1), encoding="utf-8")
-        os.replace(spare, target)
+        Path(path).write_text(json.dumps(finite, indent=1), encoding="utf-8")
 
 
 def write_campaign(

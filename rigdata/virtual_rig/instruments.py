@@ -119,14 +119,12 @@ class Instruments:
         """Reading of every probe with the shaft in the bearing centre."""
         return {s.name: s.zero + s.polarity * s.scale * s.error.offset for s in self.of("displacement")}
 
-    def with_errors(self, housing_mass: float = 0.0, **effects: float) -> Instruments:
-        """Add measurement effects by their canonical names and meanings (physics.md)."""
-        errors: dict[str, dict[str, float]] = {}
+    def with_errors(self, number: int | None = None, housing_mass: float = 0.0, **effects: float) -> Instruments:
+        """Add measurement effects by their canonical names and meanings (physics.md), to one sensor of a quantity."""
+        sensors = list(self.sensors)
         for name, value in effects.items():
             quantity, entry = PAPER_RIG["effects"][name]
-            errors.setdefault(quantity, {})[entry] = value
-        return replace(
-            self,
-            sensors=tuple(s.with_error(**errors.get(s.quantity, {})) for s in self.sensors),
-            housing_mass_error=self.housing_mass_error + housing_mass,
-        )
+            places = [place for place, sensor in enumerate(sensors) if sensor.quantity == quantity]
+            for place in places if number is None else places[number - 1 : number]:
+                sensors[place] = sensors[place].with_error(**{entry: value})
+        return replace(self, sensors=tuple(sensors), housing_mass_error=self.housing_mass_error + housing_mass)

@@ -128,7 +128,7 @@ def test_campaigns_of_static_tests_alone_are_compared_by_these(tmp_path):
     texts = difference_sentences(difference)
     assert texts[-1] == "Neither has dynamic runs: there are no coefficients to compare."
     assert "Clearance: no pad changed beyond its interval." in texts
-    page = write_difference_report(tmp_path, difference, {}, {}, "").read_text(encoding="utf-8")
+    page = write_difference_report(tmp_path, difference, {}).read_text(encoding="utf-8")
     assert "0 points" not in page
     with_points = difference_of(sides[0], side("b", TRUE))
     assert len(with_points.unmatched) == 1
@@ -143,7 +143,7 @@ def test_the_first_screen_says_what_was_tested_and_each_value_with_its_interval(
         replace(s, campaign=None, coefficients=pd.concat(frames, ignore_index=True))
         for s, frames in zip(sides, both, strict=True)
     ]
-    page = write_difference_report(tmp_path, difference_of(*sides), {}, {}, "tpjb view o").read_text("utf-8")
+    page = write_difference_report(tmp_path, difference_of(*sides), {"then": "tpjb view o"}).read_text("utf-8")
     first = re.sub(r"<[^>]+>", " ", page[page.index("<main>") : page.index("<nav")])
     words = " ".join(first.split())
     assert "Static load: 5 kN at -90°" in words

@@ -57,8 +57,8 @@ def test_rows_meet_points_by_load_direction_speed_and_excitation_and_gaps_stay_g
     remark, tolerances = result.remarks
     assert "predicts 2 of 3 points;" in remark
     assert "load within 1 %, direction within 1 deg, speed and excitation within 0.5 %" in tolerances
-    assert "without a row: 2500 N at -90 deg, shaft 22 Hz, excited at 10 Hz" in remark
-    assert "rows that meet no point: line 4 (5000 N at -90 deg, shaft 22 Hz, excited at 40 Hz)" in remark
+    assert "without a row: 2.5 kN at -90°, shaft at 22 Hz (1320 rpm), 10 Hz" in remark
+    assert "rows that meet no point: line 4 (5 kN at -90°, shaft at 22 Hz (1320 rpm), 40 Hz)" in remark
 
 
 @pytest.mark.slow

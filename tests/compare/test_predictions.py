@@ -101,6 +101,21 @@ def test_effects_on_records_go_to_the_instruments_only(bearing):
     assert erring.true_mass == erring.housing_mass + 2.0
 
 
+def test_effects_on_one_channel_reach_that_channel_alone():
+    from rigdata.virtual_rig import Instruments
+
+    sizes = {"one_probe_gain": {"factor": 1.2, "probe": 2}, "one_cell_gain": {"cell": 1, "factor": 0.9}}
+    effects = [Effect(name, **size) for name, size in sizes.items()]
+    plain, erring = Instruments.like_paper(), Instruments.like_paper()
+    erring = erring_instruments(erring, [*effects, Effect("thermometer_offset", pad=3, offset=4.0)])
+    off = {s.name: s.error for s, before in zip(erring.sensors, plain.sensors, strict=True) if s != before}
+    assert {name: (error.gain, error.offset) for name, error in off.items()} == {
+        "X1B": (1.2, 0.0),
+        "L1H": (0.9, 0.0),
+        "T3": (1.0, 4.0),
+    }
+
+
 def test_thermal_growth_is_not_seen_by_the_cold_clearance(bearing):
     hot = rig_truth(bearing, ModelSettings("kirk", "isothermal", (Effect("thermal_growth", clearance_change=-5e-6),)))
     off = rig_truth(bearing, ModelSettings("kirk", "isothermal", (Effect("pad_offset", pad=2, radial_offset=3e-6),)))

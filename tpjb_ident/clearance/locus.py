@@ -113,13 +113,7 @@ class Locus(Presented):
         )
 
     def plot(self, **options: Any) -> Any:
-        """Draw the positions; see `tpjb_ident.report.plots.clearance_and_locus`.
-
-        Parameters
-        ----------
-        **options
-            ``polygons``, ``predicted``, ``drawing``, ``title``.
-        """
+        """Draw the positions; `tpjb_ident.report.plots.clearance_and_locus` takes the same options."""
         from tpjb_ident.report.plots import clearance_and_locus
 
         return clearance_and_locus(locus=self, **options)

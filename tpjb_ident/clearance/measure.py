@@ -119,13 +119,7 @@ class ClearancePolygon(Presented):
         )
 
     def plot(self, **options: Any) -> Any:
-        """Draw the polygon; see `tpjb_ident.report.plots.clearance_and_locus`.
-
-        Parameters
-        ----------
-        **options
-            ``locus``, ``predicted``, ``drawing``, ``title``.
-        """
+        """Draw the polygon; `tpjb_ident.report.plots.clearance_and_locus` takes the same options."""
         from tpjb_ident.report.plots import clearance_and_locus
 
         return clearance_and_locus(self, **options)
@@ -244,7 +238,7 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
         pivot_scale=fit.scale,
         pivot_scale_se=fit.scale_se,
         noise=fit.noise,
-        temperature=_mean_temperature(run),
+        temperature=run.mean_temperature() or np.nan,
     )
 
 
@@ -272,15 +266,9 @@ def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Con
     return holding((outside, "give-extrapolated", detail))
 
 
-def _mean_temperature(run: Run) -> float:
-    """Temperature of a run [K]; NaN where it is neither stated nor measured."""
-    temperature = run.mean_temperature()
-    return float("nan") if temperature is None else temperature
-
-
 def coldest_first(runs: Sequence[Run]) -> list[Run]:
     """Sweeps in order of speed, the cold ones of a speed before the warm ones, and those by their push."""
-    temperature = {run.id: _mean_temperature(run) for run in runs}
+    temperature = {run.id: run.mean_temperature() or np.nan for run in runs}
     speeds = {run.id: run.point.shaft_speed for run in runs}
     slowest = [t for run, t in temperature.items() if speeds[run] == min(speeds.values()) and np.isfinite(t)]
     warm = min(slowest, default=np.nan) + _SAME_TEMPERATURE

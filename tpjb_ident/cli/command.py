@@ -129,6 +129,11 @@ class Command(Terminal):
             hashes |= {prefix + name: digest for name, digest in files.items()}
         return hashes
 
+    @property
+    def origin(self) -> dict[str, Any]:
+        """How a page came about, by the fields of `Page`: settings, inputs, and the command that comes next."""
+        return {"settings": _plain(self.options), "inputs": self.inputs, "then": self.following}
+
     @contextlib.contextmanager
     def results(self, activity: str = "", entry: str = "") -> Iterator[Progress]:
         """Fill a temporary folder; when the block ends well it gets a run.json and moves to the output folder.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -43,11 +43,6 @@ def option(command: str, parameter: str) -> ParameterInfo:
     if known:
         about["autocompletion"] = lambda incomplete: [name for name in known if name.startswith(incomplete)]
     return Option(*row["names"].split(), **about)
-
-
-def named(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as a report shows them: files by their names."""
-    return {name: getattr(value, "name", value) for name, value in options.items()}
 
 
 def refuse_unknown(value: str, known: Iterable[str], option: str) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from rigdata.arrays import IntArray
 from rigdata.operating_point import ROTATIONS, OperatingPoint
+from tpjb_ident.columns import amount, spinning
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY
@@ -100,6 +101,16 @@ def points_of(rows: pd.DataFrame) -> list[OperatingPoint]:
     return points
 
 
+def described(rows: pd.DataFrame) -> list[str]:
+    """Operating points of the rows of a table in words, in the units that people read."""
+    texts = []
+    for row in rows.to_dict("records"):
+        load = f"{amount(row['static_load_N'], 'load')} at {row['static_load_direction_deg']:g}°"
+        shaft = spinning(row["shaft_speed_Hz"], row.get("rotation", ROTATIONS[0]))
+        texts.append(f"{load}, shaft at {shaft}, {row['excitation_Hz']:g} Hz")
+    return texts
+
+
 def partners(rows: pd.DataFrame, others: pd.DataFrame, within: tuple[float, float, float]) -> IntArray:
     """The nearest of other rows that is of the same operating point, for every row (n,); -1 where none is.
 
@@ -107,7 +118,7 @@ def partners(rows: pd.DataFrame, others: pd.DataFrame, within: tuple[float, floa
     frequencies of shaft and excitation.
     """
     load, direction, frequency = within
-    if not len(others):
+    if rows.empty or others.empty:
         return np.full(len(rows), -1)
     left, right = (frame[list(POINT_COLUMNS)].to_numpy(float) for frame in (rows, others))
     apart = np.abs(right[None] - left[:, None])

@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 Predictions = dict[str, "pd.DataFrame"]
 #: Pivot models that are compared, in the order of the tables.
 VARIANTS = ("rigid", "kirk", "kirk-secant", "measured")
-_DEFAULT_VARIANTS = ("rigid", "kirk", "measured")
 
 
 class ComparisonError(TpjbError):
@@ -70,7 +69,7 @@ class CompareSettings:
     'isothermal'
     """
 
-    variants: tuple[str, ...] = _DEFAULT_VARIANTS
+    variants: tuple[str, ...] = ("rigid", "kirk", "measured")
     thermal: str = "adiabatic"
     effects: tuple[Effect, ...] = ()
     identify: IdentifySettings | None = None
@@ -80,13 +79,7 @@ class CompareSettings:
         return changed(self)
 
     def effects_with(self, pivots: str) -> tuple[Effect, ...]:
-        """Effects switched on with a pivot model.
-
-        Parameters
-        ----------
-        pivots : str
-            Name of the pivot model.
-        """
+        """Effects switched on with the pivot model of a name."""
         twice = counted_twice(self.effects) if pivots == "measured" and not self.from_measured else ()
         return tuple(effect for effect in self.effects if effect.name not in twice)
 
@@ -146,27 +139,17 @@ class Comparison(Presented):
         """``comparison.csv``."""
         return self.table
 
-    def summary(self) -> str:
-        """What to conclude, and what it rests on."""
-        from tpjb_ident.compare.summary import summary_sentences
-
-        return "\n".join(summary_sentences(self))
-
     def plot(self, **options: Any) -> Any:
-        """Draw kxx over load, measured and predicted; see `tpjb_ident.report.plots.coefficient`.
-
-        Parameters
-        ----------
-        **options
-            ``name``, ``over``, ``title``.
-        """
+        """Draw kxx over load, measured and predicted; `tpjb_ident.report.plots.coefficient` takes the same options."""
         from tpjb_ident.report import plots
 
         return plots.coefficient(self, **{"name": "kxx", **options})
 
     def __str__(self) -> str:
-        names = ", ".join(self.predictions)
-        return f"Comparison of {self.campaign.id}: {len(self.identification.points)} points with {names} pivots"
+        """What to conclude, and what it rests on."""
+        from tpjb_ident.compare.summary import summary_sentences
+
+        return "\n".join(summary_sentences(self))
 
 
 def joined(measured: pd.DataFrame, predictions: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -210,7 +193,9 @@ def compare_campaign(
     Raises
     ------
     ComparisonError
-        No dynamic runs, or an unknown pivot model.
+        An unknown pivot model.
+    BadInputError
+        No dynamic runs.
     rigdata.problem.RigDataError
         Records that are not what they claim to be.
 
@@ -224,11 +209,11 @@ def compare_campaign(
     from tpjb_ident.identification.settings import IdentifySettings
 
     settings = settings or CompareSettings()
-    _check(campaign, settings)
+    _check(settings)
     report = progress or (lambda text, done, total: None)
-    least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = settings.identify or IdentifySettings()
-    chosen = replace(chosen, clearance=chosen.clearance or least)
+    if chosen.clearance is None:
+        chosen = replace(chosen, clearance=min(pad.assembled_clearance for pad in bearing.pads))
     identification = identify(campaign, chosen, _labelled(report, "identifying"))
     points = [p.point for p in identification.points]
     report("waiting for the model", 0, 1)
@@ -310,12 +295,10 @@ def _remarks(settings: CompareSettings, static: StaticTests, bearing: Bearing) -
     return tuple(remarks)
 
 
-def _check(campaign: Campaign, settings: CompareSettings) -> None:
+def _check(settings: CompareSettings) -> None:
     unknown = [name for name in settings.variants if name not in VARIANTS]
     if unknown or not settings.variants:
         raise ComparisonError(f"pivot model {unknown[:1]} is not known; use some of {', '.join(VARIANTS)}")
-    if not campaign.of_kind("dynamic"):
-        raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to compare")
 
 
 def _labelled(progress: Progress, label: str) -> Progress:

@@ -15,8 +15,8 @@ from scipy.special import stdtrit
 
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.operating_point import ROTATIONS
-from tpjb_ident.columns import amount, place_of, size, spinning, symbol
-from tpjb_ident.compare.coefficient_table import HALF, partners
+from tpjb_ident.columns import amount, place_of, size, symbol
+from tpjb_ident.compare.coefficient_table import HALF, described, partners
 from tpjb_ident.conditions import errors_in
 from tpjb_ident.rounding import counted, percent, with_interval
 from tpjb_ident.runtime.table_reader import read_table
@@ -42,10 +42,6 @@ _CLEARANCE = "clearance_m"
 _LEVEL = 0.95
 #: Columns of a value and its interval.
 _ENDS = ("", "_lo", "_hi")
-#: Coefficients of a campaign without dynamic runs.
-_NO_COEFFICIENTS = pd.DataFrame(
-    columns=[*POINT_COLUMNS, *(name + end for name in COEFFICIENT_COLUMNS for end in _ENDS)], dtype=float
-)
 #: Degrees of freedom, by which the quantile that a table's interval was made with is read back.
 _FREEDOM = np.geomspace(1.0, 1e6, 400)
 
@@ -67,7 +63,7 @@ def measured_side(campaign: Campaign, identification: Identification | None, sta
     """A side from records, with an identification where some are dynamic."""
     from tpjb_ident.pivot.tables import pivot_table
 
-    coefficients, sensors = _NO_COEFFICIENTS, {}
+    coefficients, sensors = pd.DataFrame(), {}
     if identification is not None:
         coefficients = identification.to_frame()
         changes = identification.calibration_changes / np.sqrt(max(len(identification.calibration_changes), 1))
@@ -142,18 +138,13 @@ def _same_instrument(name: str, a: Side, b: Side) -> bool:
 
 
 def _alone(side: Side, used: IntArray) -> list[str]:
-    rest = side.coefficients.drop(index=side.coefficients.index[used])
-    points = []
-    for row in rest.to_dict("records"):
-        sense = " clockwise" if row.get("rotation") == ROTATIONS[1] else ""
-        points.append(
-            f"{side.name}: {amount(row['static_load_N'], 'load')} at {row['static_load_direction_deg']:g}°, "
-            f"shaft at {spinning(row['shaft_speed_Hz'])}{sense}, {row['excitation_Hz']:g} Hz"
-        )
-    return points
+    alone = side.coefficients.drop(index=side.coefficients.index[used])
+    return [f"{side.name}: {point}" for point in described(alone)]
 
 
 def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.DataFrame:
+    if not len(pairs):
+        return pd.DataFrame()
     left, right = (s.coefficients.iloc[pairs[:, k]].reset_index(drop=True) for k, s in enumerate((a, b)))
     columns: dict[str, Any] = {name: left[name] for name in POINT_COLUMNS}
     columns["rotation"] = left.get("rotation", ROTATIONS[0])  # a table that does not say means the usual one

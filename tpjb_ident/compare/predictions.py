@@ -30,16 +30,11 @@ def measured_laws(curves: Sequence[PivotCurve], n_pads: int, source: str = "") -
     """Turn measured curves into pivot laws, pad #1 first."""
     from tpjb_ident.pivot.tables import pad_table
 
-    if not curves:
-        raise ValueError("curves must hold at least one PivotCurve")
     return measured_pivots([pad_table(curve) for curve in curves], source or "the dry tests", n_pads)
 
 
 #: Effects that say how far pivots give way under load: a dry test measures just that.
 _PIVOT_EFFECTS = frozenset({"pivot_flexibility", "soft_pivot"})
-#: Key of an effects file whose pivot effects are sizes beside measured pivots, as a diagnosis that began there writes.
-_COUNTED_FROM = "counted_from"
-_MEASURED = "measured pivots"
 
 
 def counted_twice(effects: Sequence[Effect]) -> tuple[str, ...]:
@@ -48,10 +43,9 @@ def counted_twice(effects: Sequence[Effect]) -> tuple[str, ...]:
 
 
 def counts_from_measured(path: Path | None) -> bool:
-    """Whether an effects file says that its sizes are meant beside measured pivots."""
-    if path is None:
-        return False
-    return bool(parse_toml(path.read_text(encoding="utf-8-sig")).get(_COUNTED_FROM) == _MEASURED)
+    """Whether an effects file says that its sizes are meant beside measured pivots, as a diagnosis from there does."""
+    entries = {} if path is None else parse_toml(path.read_text(encoding="utf-8-sig"))
+    return entries.get("counted_from") == "measured pivots"
 
 
 def refuse_counted_twice(pivots: Any, effects: Sequence[Effect], path: Path | None) -> None:
@@ -163,7 +157,7 @@ def pressed_beyond(pivots: Sequence[PivotLaw], loads: Iterable[float]) -> bool:
 
 def _pad_columns(p: Prediction, number: int) -> dict[str, float]:
     i, pad = number - 1, f"pad{number}"
-    idle = number in p.idle_pads
+    idle, flow = number in p.idle_pads, p.pad_flow[number - 1]
     return {
         f"{pad}_load_N": p.pad_load[i],
         f"{pad}_tilt_rad": p.tilt[i],
@@ -171,11 +165,11 @@ def _pad_columns(p: Prediction, number: int) -> dict[str, float]:
         f"{pad}_max_pressure_Pa": 0.0 if idle else float(p.pressure[i].max()),
         f"{pad}_max_temperature_degC": math.nan if idle else float(p.temperature[i].max()),
         f"{pad}_min_film_m": math.nan if idle else float(p.film[i].min()),
-        f"{pad}_inflow_m3_per_s": p.pad_flow[i].inflow,
-        f"{pad}_outflow_m3_per_s": p.pad_flow[i].outflow,
-        f"{pad}_leakage_m3_per_s": p.pad_flow[i].leakage,
-        f"{pad}_inlet_temperature_degC": p.pad_flow[i].inlet,
-        f"{pad}_outlet_temperature_degC": p.pad_flow[i].outlet,
+        f"{pad}_inflow_m3_per_s": flow.inflow,
+        f"{pad}_outflow_m3_per_s": flow.outflow,
+        f"{pad}_leakage_m3_per_s": flow.leakage,
+        f"{pad}_inlet_temperature_degC": flow.inlet,
+        f"{pad}_outlet_temperature_degC": flow.outlet,
     }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from model.bearing import Bearing
 from model.dynamics import bearing_impedance
-from model.effects import Effect, apply_effects
+from model.effects import Effect, apply_effects, kind_of
 from model.mirror import runs_backward, seen_by_shaft
 from model.pivots import pivot_laws
 from model.predict import predict_setup
@@ -25,15 +25,6 @@ from rigdata.virtual_rig.truth import load_vector
 from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.errors import TpjbError
 
-#: Effects that act on the records, as errors of the virtual instruments, and the parameter of each.
-INSTRUMENT_ERRORS = {
-    "probe_gain": "factor",
-    "probe_rotation": "angle",
-    "loadcell_gain": "factor",
-    "loadcell_crosstalk": "fraction",
-    "channel_delay": "delay",
-    "housing_mass": "mass_error",
-}
 #: Where the rig's temperature sensors sit, as a fraction of the arc.
 _SENSOR_POSITION = 0.75
 
@@ -44,7 +35,7 @@ class ModelConvergenceError(TpjbError):
 
 def rig_truth(bearing: Bearing, settings: ModelSettings, bearing_text: str = "") -> RigTruth:
     """Give a bearing's physics to the virtual rig."""
-    physical = [effect for effect in settings.effects if effect.name not in INSTRUMENT_ERRORS]
+    physical = [effect for effect in settings.effects if not is_of_records(effect)]
     return truth_of(
         apply_effects(Setup(bearing, pivot_laws(settings.pivots, bearing), settings.thermal), physical), bearing_text
     )
@@ -98,8 +89,13 @@ def _solved(setup: Setup, static: OperatingPoint) -> Prediction:
 
 def erring_instruments(instruments: Instruments, effects: Iterable[Effect]) -> Instruments:
     """Add the effects that act on the records to a rig's instruments; other effects do nothing here."""
-    for effect in effects:
-        if effect.name in INSTRUMENT_ERRORS:
-            size = effect.parameters[INSTRUMENT_ERRORS[effect.name]]
-            instruments = instruments.with_errors(**{effect.name: size})
+    for effect in filter(is_of_records, effects):
+        # which probe, cell or pad, where it is one
+        *place, size = (effect.parameters[parameter.name] for parameter in kind_of(effect.name).parameters)
+        instruments = instruments.with_errors(int(place[0]) if place else None, **{effect.name: size})
     return instruments
+
+
+def is_of_records(effect: Effect) -> bool:
+    """Whether an effect acts on the records, as an error of the instruments, and not on the bearing."""
+    return kind_of(effect.name).side == "measurement"

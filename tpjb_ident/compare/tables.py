@@ -16,6 +16,7 @@ from tpjb_ident.compare.coefficient_table import (
     ERRORS,
     VALUES,
     TableSource,
+    described,
     partners,
     points_of,
     read_coefficients,
@@ -33,6 +34,7 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.results.point_result import PointResult
+from tpjb_ident.rounding import listed
 
 _METHOD = "table"
 
@@ -100,7 +102,7 @@ def read_predictions(paths: Sequence[Path]) -> dict[str, pd.DataFrame]:
 def with_predictions(comparison: Comparison, tables: Mapping[str, pd.DataFrame]) -> Comparison:
     """Put tables beside the predictions of a comparison, and say which points and rows have no partner."""
     measured = comparison.identification.to_frame()
-    points = [p.point for p in comparison.identification.points]
+    points = described(measured)
     predictions, remarks = dict(comparison.predictions), list(comparison.remarks)
     for name, rows in tables.items():
         nearest = partners(measured, rows, _ROUNDED)
@@ -108,7 +110,7 @@ def with_predictions(comparison: Comparison, tables: Mapping[str, pd.DataFrame])
         if len(unmet) == len(rows):
             raise BadInputError(
                 f"--prediction {rows.attrs['file']}: no row meets an operating point ({_TOLERANCES}). Its first row is "
-                f"{points_of(rows)[0]}; the first measured point is {points[0]}. Check units and signs of its columns."
+                f"{described(rows)[0]}; the first measured point is {points[0]}. Check units and signs of its columns."
             )
         met = rows.reindex(nearest).reset_index(drop=True)  # no row has the number -1
         predictions[name] = met.assign(
@@ -116,17 +118,13 @@ def with_predictions(comparison: Comparison, tables: Mapping[str, pd.DataFrame])
             pivot_extrapolated=False,
             status=met["status"].fillna("no row of the table"),
         )
-        alone = [str(point) for point, index in zip(points, nearest, strict=True) if index < 0]
-        lines = [f"line {line} ({point})" for line, point in zip(unmet["line"], points_of(unmet), strict=True)]
+        alone = described(measured[nearest < 0])
+        lines = [f"line {line} ({point})" for line, point in zip(unmet["line"], described(unmet), strict=True)]
         head = f"{rows.attrs['file']} predicts {len(points) - len(alone)} of {len(points)} points"
-        parts = [head, *_listed("without a row", alone), *_listed("rows that meet no point", lines)]
+        parts = [head]
+        for words, places in (("without a row", alone), ("rows that meet no point", lines)):
+            parts += [f"{words}: {listed(places, _MOST, '; ')}"] if places else []
         remarks.append("; ".join(parts) + ".")
     if tables:
         remarks.append(f"A row of a table meets a point where it has {_TOLERANCES}; nothing is interpolated.")
     return replace(comparison, predictions=predictions, remarks=tuple(remarks))
-
-
-def _listed(words: str, texts: Sequence[str]) -> list[str]:
-    """The first of the texts, and how many more there are; nothing without any."""
-    more = f"; and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
-    return [f"{words}: {'; '.join(texts[:_MOST])}{more}"] if texts else []

@@ -172,9 +172,7 @@ def write_diagnosis_report(
     folder: Path,
     campaign: Campaign | TableSource,
     result: CampaignDiagnosis,
-    settings: Mapping[str, Any],
-    inputs: Mapping[str, str],
-    then: str = "",
+    origin: Mapping[str, Any],
 ) -> Path:
     """Write report.html and its figures into an existing folder."""
     verdict = result.diagnosis.verdict
@@ -191,11 +189,9 @@ def write_diagnosis_report(
         values=values_table(points),
         flags=flags_line([p.quality for p in points], len(points)),
         lead=worst,
-        then=then,
         key_table=_effect_table(verdict) if verdict.effects else _gap_table(verdict),
         sections=_sections(result, coefficient_sections(table) if len(table) else []),
-        settings=settings,
-        inputs=inputs,
+        **origin,
     )
     return write_page(folder, page)
 

@@ -39,9 +39,7 @@ _BEYOND = 5.0
 _SIDES = {"a": "first", "b": "second", "difference": "difference"}
 
 
-def write_difference_report(
-    folder: Path, difference: Difference, settings: Mapping[str, Any], inputs: Mapping[str, str], then: str
-) -> Path:
+def write_difference_report(folder: Path, difference: Difference, origin: Mapping[str, Any]) -> Path:
     """Write report.html and its figure into an existing folder."""
     answer, *more = difference_sentences(difference)
     a, b, points = difference.a, difference.b, difference.points
@@ -49,16 +47,15 @@ def write_difference_report(
     page = Page(
         title=f"{a.name} and {b.name}: what changed",
         subtitle="Second less first, with 95 % intervals",
-        facts=_facts(difference) | set_points(list(points[list(POINT_KEY)].itertuples(index=False, name=None))),
+        facts=_facts(difference)
+        | set_points(list(points.reindex(columns=POINT_KEY).itertuples(index=False, name=None))),
         values=_values_table(difference) if len(points) else None,
-        flags=flags_line([flags], len(points)) if len(points) else "",
+        flags=flags_line([flags], len(points)),
         lead="difference",
         answer=answer,
         more=more,
-        then=then,
         sections=_sections(difference),
-        settings=settings,
-        inputs=inputs,
+        **origin,
     )
     return write_page(folder, page)
 

@@ -132,14 +132,15 @@ def coefficient_cells(frame: pd.DataFrame, kinds: Sequence[Coefficient], side: s
 
 
 def flags_line(flags: Iterable[Iterable[Condition]], points: int) -> str:
-    """The flags of a result with how often each is there, gravest first."""
+    """The flags of a result with how often each is there, gravest first; "" where it has no points."""
     counts = Counter((str(c), c.severity) for conditions in flags for c in conditions)
     texts = []
     for grave in SEVERITIES:
         texts += [f"{name} ({n})" if n > 1 else name for (name, severity), n in counts.items() if severity == grave]
     bad = sum(n for (_, severity), n in counts.items() if severity == "error")
     head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"
-    return f"{head}: {', '.join(texts)}." if texts else f"No flags on {counted(points, 'point')}."
+    none = f"No flags on {counted(points, 'point')}." if points else ""
+    return f"{head}: {', '.join(texts)}." if texts else none
 
 
 def set_up_section(comparison: Comparison) -> Section:

@@ -37,9 +37,9 @@ _WAITING = ("to run", "being written")
 
 
 def write_watch_page(
-    folder: Path, snapshot: Snapshot, refresh: int, settings: Mapping[str, str], then: str = "", bearing: Any = None
+    folder: Path, snapshot: Snapshot, refresh: int, origin: Mapping[str, Any], bearing: Any = None
 ) -> Path:
-    """Write ``watch.html``, whole or not at all, with its figures inside; `then` comes after the last run."""
+    """Write ``watch.html``, whole or not at all, with its figures inside; the next command comes after the last run."""
     answer, *more = [step.text for step in snapshot.steps] or ["Nothing to do: records are being written."]
     landed = snapshot.count("good", "look", "repeat", "replaced")
     points = [p for p in snapshot.measured.points if not lacking(p)]
@@ -52,14 +52,12 @@ def write_watch_page(
         facts=tested_facts(snapshot.campaign, bearing, points),
         key_table=coverage_table(snapshot),
         values=values_table(points),
-        flags=flags_line([p.quality for p in points], len(points)) if points else "",
+        flags=flags_line([p.quality for p in points], len(points)),
         lead="k-over-",
-        then="" if snapshot.count(*_WAITING) else then,
         sections=_sections(snapshot, bearing),
-        settings=settings,
-        inputs=snapshot.hashes,
         refresh=refresh,
         beside="coefficients.csv and watch.json are beside this file.",
+        **{**origin, "then": "" if snapshot.count(*_WAITING) else origin["then"]},
     )
     path = folder / "watch.html"
     write_text(path, render_page(page, {p.name: svg_text(p.figure, p.name) for p in page.panels}))

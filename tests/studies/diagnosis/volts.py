@@ -36,16 +36,15 @@ from tests.studies.diagnosis.bench import Bench, Drawn, hidden, said
 from tests.studies.diagnosis.strangers import KINDS, draw, stranger
 from tests.studies.diagnosis.tables import tables
 from tests.studies.results import Rows, report, study_parser
-from tpjb_ident.compare.rig_from_model import INSTRUMENT_ERRORS, erring_instruments, truth_of
+from tpjb_ident.compare.rig_from_model import erring_instruments, is_of_records, truth_of
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Nuisance, Shift
+from tpjb_ident.diagnosis.forward.nuisance import Nuisance, Shift
 from tpjb_ident.diagnosis.from_python import diagnose
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.errors import TpjbError
 
-#: Tolerances of the instruments, and the effects of single channels.
+#: Tolerances of the instruments.
 READ = {"probe_gain", "cell_gain", "thermometer"}
-CHANNELS = {name: own for name, own in OWN_NUMBERS.items() if own.tolerance in READ}
 NAMES = {"probe 1": "X1A", "probe 2": "X1B", "cell 1": "L1H", "cell 2": "L1V"}
 
 
@@ -92,7 +91,7 @@ def rig_of(case: Case, seed: int) -> VirtualRig:
     known = list(zip(problem.nuisances, map(float, drawn.size), strict=True))
     physical = [(n, s) for n, s in known if n.change is not None and n.name not in READ]
     shift = Shift(tuple(n for n, _ in physical), tuple(s for _, s in physical))
-    inside = [e for e in drawn.hidden if e.name not in {*INSTRUMENT_ERRORS, *CHANNELS}]
+    inside = [e for e in drawn.hidden if not is_of_records(e)]
     plain = Setup(bearing, pivot_laws("kirk", bearing))
 
     def setup(growth: float) -> Setup:
@@ -102,7 +101,7 @@ def rig_of(case: Case, seed: int) -> VirtualRig:
     layout = problem.observations.layout
     top = max(test.load for test in layout.dynamic)
     instruments = erring_instruments(Instruments.like_paper(len(bearing.pads), seed, top), drawn.hidden)
-    instruments = _off(instruments, known, drawn.hidden)
+    instruments = _off(instruments, known)
     if not any(test.pads for test in layout.dynamic):
         sensors = tuple(sensor for sensor in instruments.sensors if sensor.quantity != "temperature")
         instruments = replace(instruments, sensors=sensors)
@@ -126,13 +125,9 @@ def _truth(setup: Any, growth: float, text: str) -> RigTruth:
     )
 
 
-def _off(instruments: Instruments, known: Sequence[tuple[Nuisance, float]], effects: Sequence[Effect]) -> Instruments:
+def _off(instruments: Instruments, known: Sequence[tuple[Nuisance, float]]) -> Instruments:
     """Sensors whose gains and zeros are off as drawn."""
     changes = [(n.name, n.place, size * n.sigma) for n, size in known if n.name in READ]
-    for effect in effects:
-        if effect.name in CHANNELS:
-            own, (number, value) = CHANNELS[effect.name], effect.parameters.values()
-            changes.append((own.tolerance, f"{own.place} {number:.0f}", own.change(value)))
     sensors = {sensor.name: sensor for sensor in instruments.sensors}
     for name, place, change in changes:
         at = f"T{place.split()[-1]}" if name == "thermometer" else NAMES[place]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import identified, identify_settings, refuse_untrusted, write_identification
 from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, source_words
-from tpjb_ident.cli.options import DEMO, known_names, named
+from tpjb_ident.cli.options import DEMO, known_names
 from tpjb_ident.columns import amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import listed, percent
@@ -94,17 +94,16 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
 
         for name, frame in difference.tables.items():
             c.table(name, frame)
-        is_diagnosable = difference.b.campaign is not None and len(difference.b.coefficients)
-        c.next(*(("diagnose", paths[1]) if is_diagnosable else ("view", c.target)))
-        write_difference_report(c.folder, difference, named(c.options), c.inputs, c.following)
+        on_records = difference.b.campaign is not None and not difference.b.coefficients.empty
+        c.next(*(("diagnose", paths[1]) if on_records else ("view", c.target)))
+        write_difference_report(c.folder, difference, c.origin)
     points = difference.points
     with c.conclusion(difference_sentences(difference)):
         title = f"{difference.a.name} and {difference.b.name}: changed?"
         names = " ".join(f"{name}_changed" for name in DIRECT)
         c.show_frame(title, points, f"static_load_N excitation_Hz {names}", "difference.csv")
-    if not difference.tables:
-        raise NotTrustedError("the two have no test in common. What each of them has is in the message above.")
-    if points.empty and len(difference.a.coefficients) and len(difference.b.coefficients):
+    is_static = difference.a.coefficients.empty or difference.b.coefficients.empty
+    if points.empty and not (is_static and difference.tables):
         raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")
     if bad := difference.untrusted_points():
         raise NotTrustedError(f"{len(bad)} points have a flag that forbids trust: {'; '.join(bad[:5])}.")
@@ -144,7 +143,7 @@ def write_comparison(c: Command, result: Comparison, show: Progress, note: str =
         c.table("locus", result.locus.to_frame())
         c.table("locus_comparison", result.loci)
     show("drawing figures", 1, 2)
-    write_report(c.folder, result, named(c.options), c.inputs, c.following, note)
+    write_report(c.folder, result, **c.origin, note=note)
 
 
 def show_comparison(c: Command, result: Comparison) -> None:

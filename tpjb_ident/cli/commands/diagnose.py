@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import refuse_untrusted, write_identification
 from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, pivot_choice, source_words
-from tpjb_ident.cli.options import DEMO, named
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
@@ -70,7 +70,7 @@ def diagnose(
         from tpjb_ident.report import diagnosis_page as page
 
         c.next(*page.next_command(source_words(campaign, coefficients, bearing), verdict, c.target))
-        page.write_diagnosis_report(c.folder, source, result, named(c.options), c.inputs, c.following)
+        page.write_diagnosis_report(c.folder, source, result, c.origin)
     deviations = median_deviations(before_and_after(result.diagnosis, result.identification))
     with c.conclusion(page.verdict_sentences(source.id, verdict, deviations)):
         if verdict.effects:

@@ -103,8 +103,7 @@ def _write_results(c: Command, snapshot: Snapshot, watcher: Watcher, refresh: in
 
     c.inputs = dict(snapshot.hashes)
     with c.results():
-        settings = {name: str(value) for name, value in c.options.items()}
-        write_watch_page(c.folder, snapshot, refresh, settings, c.following, watcher.bearing)
+        write_watch_page(c.folder, snapshot, refresh, c.origin, watcher.bearing)
         if snapshot.measured.identification is not None:
             c.table("coefficients", snapshot.measured.identification.to_frame())
         c.json("watch.json", _state_document(snapshot))
