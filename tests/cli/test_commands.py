@@ -80,7 +80,7 @@ def test_check_writes_its_findings(small_campaign, tmp_path):
     found = json.loads((tmp_path / "out" / "check.json").read_text(encoding="utf-8"))
     assert result.exit_code == 0, result.output
     assert found["ok"] is True
-    assert found["runs"] == {"dynamic": 6, "dry_pivot": 0, "locus": 3, "clearance": 1}
+    assert found["runs"] == {"dynamic": 6, "dry_pivot": 0, "locus": 3, "clearance": 1, "baseline": 0}
     assert found["counts"]["error"] == 0
 
 

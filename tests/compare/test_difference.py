@@ -126,8 +126,7 @@ def test_campaigns_of_static_tests_alone_are_compared_by_these(tmp_path):
     difference = difference_of(*sides)
     assert list(difference.tables) == ["clearance_difference"]
     texts = difference_sentences(difference)
-    assert texts[-1] == "Neither has dynamic runs: there are no coefficients to compare."
-    assert "Clearance: no pad changed beyond its interval." in texts
+    assert texts[1:] == ("Clearance: no pad changed beyond its interval.",)
     page = write_difference_report(tmp_path, difference, {}).read_text(encoding="utf-8")
     assert "0 points" not in page
     with_points = difference_of(sides[0], side("b", TRUE))

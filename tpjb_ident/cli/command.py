@@ -232,9 +232,10 @@ class Command(Terminal):
             if ending == ".parquet":
                 frame = self.frames.get(stem)
                 if frame is None:  # of an export
-                    import pandas as pd
+                    from pyarrow.parquet import ParquetFile
 
-                    frame = pd.read_parquet(io.BytesIO((self.target / name).read_bytes()))
+                    content = io.BytesIO((self.target / name).read_bytes())  # no thread of the library's holds it
+                    frame = ParquetFile(content).read(use_threads=False).to_pandas()
                 few = len(frame) <= _MOST_ROWS
                 data[stem] = frame.to_dict("records") if few else {"rows": len(frame), "file": name}
             elif ending == ".json" and name != RECORD:

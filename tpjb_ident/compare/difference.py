@@ -271,9 +271,8 @@ def difference_sentences(difference: Difference) -> tuple[str, ...]:
     number, yes, no = judged.size, (judged == "yes").sum(), (judged == "no").sum()
     if not number:
         sentences = _sentences_beside(difference)
-        if difference.a.coefficients.empty and difference.b.coefficients.empty:
-            return (*sentences, "Neither has dynamic runs: there are no coefficients to compare.")
-        return (f"{a} and {b} have no operating point in common.", *sentences)
+        is_static = difference.a.coefficients.empty and difference.b.coefficients.empty
+        return sentences if is_static else (f"{a} and {b} have no operating point in common.", *sentences)
     head = f"From {a} to {b} {yes} of {number} coefficients changed beyond what both intervals allow"
     rest = f"{no} are the same within {100 * _NO_CHANGE:g} %"
     rest += f", of {number - yes - no} the records cannot tell." if number > yes + no else "."

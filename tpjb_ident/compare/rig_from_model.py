@@ -29,10 +29,6 @@ from tpjb_ident.errors import TpjbError
 _SENSOR_POSITION = 0.75
 
 
-class ModelConvergenceError(TpjbError):
-    """The model finds no equilibrium at a point of the plan."""
-
-
 def rig_truth(bearing: Bearing, settings: ModelSettings, bearing_text: str = "") -> RigTruth:
     """Give a bearing's physics to the virtual rig."""
     physical = [effect for effect in settings.effects if not is_of_records(effect)]
@@ -83,7 +79,7 @@ def _solved(setup: Setup, static: OperatingPoint) -> Prediction:
     prediction = predict_setup(setup, *point)
     if not prediction.converged:
         reasons = "; ".join(prediction.status)
-        raise ModelConvergenceError(f"the model finds no equilibrium at {static} ({reasons}). Leave that point out.")
+        raise TpjbError(f"the model finds no equilibrium at {static} ({reasons}). Leave that point out.")
     return prediction
 
 

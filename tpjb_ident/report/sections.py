@@ -59,8 +59,8 @@ if TYPE_CHECKING:
     from tpjb_ident.results.identification import Identification
     from tpjb_ident.results.point_result import PointResult
 
-_KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "clearance sweep",
-                  "dry_pivot": "dry pivot test"}  # fmt: skip
+#: Kinds of runs, where people do not call them by their names.
+KINDS_IN_WORDS = {"locus": "shaft locus", "clearance": "clearance sweep", "dry_pivot": "dry pivot test"}
 
 
 def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequence[PointResult]) -> dict[str, str]:
@@ -75,7 +75,7 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
         facts["Excitation"] += f", vibration up to {amount(amplitude, 'length', '.2g')} (0-peak)"
     if isinstance(campaign, TableSource):
         return facts | {"Source": campaign.description}
-    counts = Counter(_KINDS_IN_WORDS.get(run.kind, run.kind) for run in campaign.runs)
+    counts = Counter(KINDS_IN_WORDS.get(run.kind, run.kind) for run in campaign.runs)
     kinds = ", ".join(f"{count} {kind}" for kind, count in counts.items())
     measured = ", ".join(text for text in (campaign.date, campaign.by) if text)
     return facts | {
@@ -200,7 +200,7 @@ def _run_matrix(runs: Sequence[Run]) -> Table:
         direction = "several" if several else f"{p.static_load_direction_deg:g}"
         shaft = f"{p.shaft_speed_hz:g} ({60 * p.shaft_speed_hz:.6g})"
         excitation = f"{p.excitation_hz:g}" if p.excitation else "–"
-        kind = _KINDS_IN_WORDS.get(run.kind, run.kind)
+        kind = KINDS_IN_WORDS.get(run.kind, run.kind)
         counts[kind, load, direction, shaft, excitation, f"{run.sample_rate:g}"] += 1
     columns = ["kind", f"load, {symbol('load')}", "load direction, °", "shaft speed, Hz (rpm)", "excitation, Hz"]
     return Table("Runs", [*columns, "rate, Hz", "runs"], [[*key, str(n)] for key, n in counts.items()])

@@ -14,11 +14,7 @@ from tpjb_ident.report.drawing.picture import DIRECT, longest_series
 from tpjb_ident.report.figure import Panel, panel, svg_text
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.plots.coefficients import direct_coefficients
-from tpjb_ident.report.sections import (
-    flags_line,
-    tested_facts,
-    values_table,
-)
+from tpjb_ident.report.sections import KINDS_IN_WORDS, flags_line, tested_facts, values_table
 from tpjb_ident.runtime.tables import write_text
 from tpjb_ident.schema import STIFFNESS
 from tpjb_ident.watch.next_steps import described, lacking, located
@@ -30,8 +26,6 @@ if TYPE_CHECKING:
 
 #: Words of the page for the states of a run, where they are not the state's name.
 _WORDS = {"look": "good, with a remark", "replaced": "replaced by a repeat"}
-_KINDS = {"dynamic": "dynamic runs", "locus": "locus runs", "clearance": "clearance sweeps", "dry_pivot": "dry tests",
-         "baseline": "baseline runs"}  # fmt: skip
 #: States of a run that has not landed.
 _WAITING = ("to run", "being written")
 
@@ -81,7 +75,7 @@ def coverage_table(snapshot: Snapshot) -> Table:
 def _group(status: RunStatus) -> str:
     run, p = status.run, status.run.point
     if run.kind != "dynamic":
-        return _KINDS[run.kind]
+        return KINDS_IN_WORDS.get(run.kind, run.kind)
     shaft = spinning(p.shaft_speed_hz, p.rotation)
     set_point = f"{amount(p.static_load, 'load')}, {p.static_load_direction_deg:g} deg, shaft {shaft}"
     return f"{set_point}, excited at {p.excitation_hz:g} Hz"

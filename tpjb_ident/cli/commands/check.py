@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from rigdata.problem import Problem
     from rigdata.run import Run
 
-#: Kinds of run in the order of the summary.
-KINDS = ("dynamic", "locus", "clearance", "dry_pivot")
 #: From as many problems of one sort on they are counted, not listed.
 ALIKE = 4
 
@@ -82,6 +80,8 @@ def check(c: Command, campaign: Path) -> None:
 
 def check_summary(c: Command, name: str, problems: Sequence[Problem], campaign: Campaign | None) -> dict[str, Any]:
     """Gather the content of check.json; without a campaign, where it could not even be opened."""
+    from rigdata.manifest.fields import KINDS
+
     counts = {severity: sum(p.severity == severity for p in problems) for severity in SEVERITIES}
     return {
         "schema": "tpjb-check/1",
@@ -129,11 +129,11 @@ def _drawing_problems(c: Command, campaign: Campaign, problems: list[Problem]) -
 def _show_coverage(c: Command, campaign: Campaign) -> None:
     """Print what the campaign holds: runs, points, rates and the range that they cover."""
     rows = []
-    for kind in KINDS:
+    for kind in dict.fromkeys(run.kind for run in campaign.runs):
         runs = campaign.of_kind(kind)
         places = {run.pad if kind == "dry_pivot" else run.point.key for run in runs}
         figures = [_figures(run) for run in runs]
-        rows += [[kind, len(runs), len(places), *zip(*figures, strict=True)]] if runs else []
+        rows.append([kind, len(runs), len(places), *zip(*figures, strict=True)])
     columns = [*words("kind"), "runs", "points, pads", *(Column(title, span) for title in RANGES)]
     c.show(f"{campaign.id}: what it covers", columns, rows)
 

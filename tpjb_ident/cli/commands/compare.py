@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.difference import Side
     from tpjb_ident.compare.predictions import Progress
 
-#: Coefficients that are shown.
-DIRECT = ("kxx", "kyy", "cxx", "cyy")
-
 
 @command(
     f"tpjb compare {DEMO}",
@@ -87,6 +84,7 @@ def compare(
 def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, method: str, norm: str | None) -> None:
     """Hold two campaigns against each other."""
     from tpjb_ident.compare.difference import difference_of, difference_sentences
+    from tpjb_ident.compare.summary import DIRECT
 
     with c.results():
         difference = difference_of(*(_side(c, path, bearing, method, norm) for path in paths))
@@ -148,7 +146,7 @@ def write_comparison(c: Command, result: Comparison, show: Progress, note: str =
 
 def show_comparison(c: Command, result: Comparison) -> None:
     """Print what to conclude, and how far each pivot model is off."""
-    from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
+    from tpjb_ident.compare.summary import DIRECT, agreements, number_inside, summary_sentences
 
     rows = []
     for name, agreement in agreements(result.table).iterrows():
