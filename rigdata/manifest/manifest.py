@@ -240,9 +240,5 @@ def _read_csv(table: Table) -> CsvSpec:
         except (LookupError, TypeError, ValueError, AttributeError):
             is_text = False
         if not is_text:
-            fault, remedy = (
-                f"encoding {encoding!r} is not known as a text encoding",
-                'Give e.g. "cp1252", or leave it out',
-            )
-            table.error("encoding", fault, remedy)
+            table.error("encoding", f"{encoding!r} is no encoding of texts", 'Give e.g. "cp1252", or leave it out')
     return CsvSpec(**values)

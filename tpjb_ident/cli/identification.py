@@ -42,10 +42,7 @@ def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | N
         if method != "rlm":
             raise BadInputError(f"--norm: belongs to --method rlm, not to {method}.")
     if not campaign.of_kind("dynamic"):
-        raise BadInputError(
-            f"campaign {campaign.id}: has no dynamic runs; there is nothing to identify. "
-            "What it has of static tests, `tpjb pivot` and `tpjb locus` read, and `tpjb compare A B` compares."
-        )
+        raise BadInputError(f"campaign {campaign.id}: has no dynamic runs. Use `tpjb pivot` or `tpjb locus`.")
     estimator = f"rlm:{norm or 'huber'}" if method == "rlm" else method
     return IdentifySettings(method=estimator, clearance=least_clearance(campaign, c.warn))
 

@@ -141,9 +141,9 @@ class Comparison(Presented):
 
     def plot(self, **options: Any) -> Any:
         """Draw kxx over load, measured and predicted; `tpjb_ident.report.plots.coefficient` takes the same options."""
-        from tpjb_ident.report import plots
+        from tpjb_ident.report.plots import coefficient
 
-        return plots.coefficient(self, **{"name": "kxx", **options})
+        return coefficient(self, **{"name": "kxx", **options})
 
     def __str__(self) -> str:
         """What to conclude, and what it rests on."""
@@ -209,7 +209,9 @@ def compare_campaign(
     from tpjb_ident.identification.settings import IdentifySettings
 
     settings = settings or CompareSettings()
-    _check(settings)
+    unknown = [name for name in settings.variants if name not in VARIANTS]
+    if unknown or not settings.variants:
+        raise ComparisonError(f"pivot model {unknown[:1]} is not known; use some of {', '.join(VARIANTS)}")
     report = progress or (lambda text, done, total: None)
     chosen = settings.identify or IdentifySettings()
     if chosen.clearance is None:
@@ -295,12 +297,6 @@ def _remarks(settings: CompareSettings, static: StaticTests, bearing: Bearing) -
     return tuple(remarks)
 
 
-def _check(settings: CompareSettings) -> None:
-    unknown = [name for name in settings.variants if name not in VARIANTS]
-    if unknown or not settings.variants:
-        raise ComparisonError(f"pivot model {unknown[:1]} is not known; use some of {', '.join(VARIANTS)}")
-
-
 def _labelled(progress: Progress, label: str) -> Progress:
     return lambda text, done, total: progress(f"{label}, {text}", done, total)
 
@@ -340,5 +336,4 @@ def locus_distances(loci: pd.DataFrame | None) -> dict[Any, float]:
     if loci is None:
         return {}
     squares = (loci["x_m_predicted"] - loci["x_m"]) ** 2 + (loci["y_m_predicted"] - loci["y_m"]) ** 2
-    distances = np.sqrt(squares.groupby(loci["pivots"], sort=False).mean())
-    return dict(distances.items())
+    return dict(np.sqrt(squares.groupby(loci["pivots"], sort=False).mean()))

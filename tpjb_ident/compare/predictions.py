@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
 
 
-def measured_laws(curves: Sequence[PivotCurve], n_pads: int, source: str = "") -> tuple[PivotLaw, ...]:
+def measured_laws(curves: Sequence[PivotCurve], n_pads: int, source: str) -> tuple[PivotLaw, ...]:
     """Turn measured curves into pivot laws, pad #1 first."""
     from tpjb_ident.pivot.tables import pad_table
 
-    return measured_pivots([pad_table(curve) for curve in curves], source or "the dry tests", n_pads)
+    return measured_pivots([pad_table(curve) for curve in curves], source, n_pads)
 
 
 #: Effects that say how far pivots give way under load: a dry test measures just that.
@@ -76,11 +76,10 @@ class ModelSettings:
 def predict_points(
     bearing: Bearing,
     points: Iterable[OperatingPoint],
-    settings: ModelSettings | None = None,
+    settings: ModelSettings,
     progress: Progress | None = None,
 ) -> list[dict[str, Any]]:
     """Predict every operating point: rows of ``prediction.csv``, and whether a pivot is pressed beyond its dry test."""
-    settings = settings or ModelSettings()
     wanted = tuple(points)
     bearing = as_it_turns(bearing, {point.rotation for point in wanted})
     groups: dict[OperatingPoint, list[float]] = {}

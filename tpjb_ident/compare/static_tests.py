@@ -75,7 +75,7 @@ def _of_sweep(run: Run, bearing: Bearing) -> list[Problem]:
         polygon = measure_run(run, [pad.pivot_angle for pad in bearing.pads])
     except RigDataError as error:
         return [Problem("warning", p.file, p.place, p.what, p.cure, run.id) for p in error.problems]
-    names = " and ".join(c.name for c in run.channels.values() if c.quantity == "displacement")
+    names = " and ".join(channel.name for channel in run.of("displacement"))
     drawn = float(np.mean([pad.assembled_clearance for pad in bearing.pads]))
     measured = float(np.nanmean(polygon.clearance))
     problems = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,7 +28,7 @@ from tpjb_ident.compare.comparison import (
     Comparison,
     possible_variants,
 )
-from tpjb_ident.compare.predictions import ModelSettings, predict_points
+from tpjb_ident.compare.predictions import ModelSettings, Progress, predict_points
 from tpjb_ident.conditions import KINDS, Condition
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.estimators.stiffness import DynamicStiffness
@@ -44,7 +44,7 @@ def compare_table(
     bearing: Bearing | None,
     settings: CompareSettings | None = None,
     reading_error: float | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Comparison:
     """Predict the operating points of a table of coefficients with every pivot model but measured ones.
 

@@ -85,11 +85,10 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
     """Hold two campaigns against each other."""
     from tpjb_ident.compare.difference import difference_of, difference_sentences
     from tpjb_ident.compare.summary import DIRECT
+    from tpjb_ident.report.difference_page import write_difference_report
 
     with c.results():
         difference = difference_of(*(_side(c, path, bearing, method, norm) for path in paths))
-        from tpjb_ident.report.difference_page import write_difference_report
-
         for name, frame in difference.tables.items():
             c.table(name, frame)
         on_records = difference.b.campaign is not None and not difference.b.coefficients.empty
