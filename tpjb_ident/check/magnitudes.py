@@ -112,17 +112,10 @@ def check_weight(report: Reporter, measured: Sequence[Sizes], mass: float, large
 
 
 def _check_rate(report: Reporter, run: Run) -> None:
-    """The rate that the file shows against the one that the manifest states, where that is meant for this run.
-
-    The campaign's rate is meant for dynamic runs, and not where the file states another one: that wins.
-    """
-    stated_rate = run.reader.stated_rate
-    if stated_rate is None:
-        return
+    """The rate of the file against the manifest's: the run's, or of a dynamic run with times the campaign's."""
+    stated = run.reader.stated_rate
     try:
-        rate, is_timed = run.sample_rate, not run.devices[0].counted
+        if stated and ("sample_rate" in run.stated or (run.kind == "dynamic" and not run.devices[0].counted)):
+            report.ask("rate", abs(math.log(run.sample_rate / stated)), rate=run.sample_rate, stated=stated)
     except RigDataError:  # said by whoever read the run
         return
-    if not ("sample_rate" in run.stated or (run.kind == "dynamic" and is_timed)):
-        return
-    report.ask("rate", abs(math.log(rate / stated_rate)), rate=rate, stated=stated_rate)
