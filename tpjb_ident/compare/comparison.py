@@ -141,11 +141,11 @@ class Comparison(Presented):
 
     def plot(self, **options: Any) -> Any:
         """Draw kxx over load, measured and predicted; `tpjb_ident.report.plots.coefficient` takes the same options."""
-        from tpjb_ident.report.plots import coefficient
+        from tpjb_ident.report import plots
 
-        return coefficient(self, **{"name": "kxx", **options})
+        return plots.coefficient(self, **{"name": "kxx", **options})
 
-    def __str__(self) -> str:
+    def summary(self) -> str:
         """What to conclude, and what it rests on."""
         from tpjb_ident.compare.summary import summary_sentences
 

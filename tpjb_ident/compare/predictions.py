@@ -126,7 +126,7 @@ def point_columns(point: OperatingPoint) -> dict[str, float | str]:
 
 def _row(point: OperatingPoint, p: Prediction, index: int) -> dict[str, Any]:
     """Row of one point, of whose frequencies in a prediction it is the one of this index."""
-    row: dict[str, Any] = dict(point_columns(point))
+    row: dict[str, Any] = {**point_columns(point)}
     row.update(zip(COEFFICIENT_COLUMNS, np.stack([p.k[index], p.c[index]]).ravel(), strict=True))
     row.update(x_m=p.position[0], y_m=p.position[1])
     for number in range(1, len(p.pad_load) + 1):
