@@ -28,6 +28,7 @@ _LISTED: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("uni
 #: SI unit of every dimension.
 SI_UNITS: dict[str, str] = _LISTED["si"]
 _SPELLINGS = str.maketrans(_LISTED["spellings"])
+_DASHES = str.maketrans("\u2212\u2013", "--")  # a minus as word processors write it
 
 
 class UnitError(RigError):
@@ -161,7 +162,7 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
         return _finite(value), ""
     if len(value) > LONGEST:
         raise UnitError(f"a text of {len(value)} characters is not a quantity")
-    text = value.strip()
+    text = value.strip().translate(_DASHES)
     match = _NUMBER.match(text)
     if match is None or (match.end() < len(text) and text[match.end()] in "0123456789.,"):
         hint = "; write a decimal point, not a comma" if re.match(r"[+-]?[0-9]*,[0-9]", text) else ""

@@ -132,7 +132,6 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
             restless.append(film.number)
     edge = [f.number for f in films if abs(above[f.number - 1]) < _EDGE and f.number not in even]
     another = search.other.any() and not restless
-    across = search.case.hold.flexure == 0.0 and conditions.held_along_one_line(films)
     names = (
         (bool(restless), named("pads {pads} can neither carry nor idle", restless)),
         (bool(restless), named("not converged")),
@@ -140,7 +139,6 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
         (bool(even) and not restless, named("pads {pads} stand concentric", even)),
         (bool(edge), named("pads {pads} on the edge of carrying", edge)),
         (another, named("another equilibrium exists", (np.flatnonzero(~search.other) + 1).tolist())),
-        (across, named("nothing holds the journal across its load")),
     )
     return replace(result, status=(*(name for holds, name in names if holds), *result.status))
 

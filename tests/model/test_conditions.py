@@ -33,6 +33,7 @@ CASES = {
     "thin film": (lambda b: run(b, 5e4), ("overloaded pads 1",)),
     "high pressure": (lambda b: run(b, 1e6, thermal="isothermal", pivots="rigid"), ("overloaded pads 1",)),
     "flow back": (lambda b: run(b, 5e4), ("flow back at a leading edge",)),
+    "one pad under the load": (lambda b: run(b.with_pads(b.pads[:1])), ("nothing holds the journal across its load",)),
     "nothing to push against": (
         lambda b: run(b.with_pads(b.pads[:1]), direction=1.5),
         ("no pads against the load", "not converged"),

@@ -378,6 +378,7 @@ class Run:
     def __init__(self, n=4000, rate=500.0, pad=1, seed=1):
         rng = np.random.default_rng(seed)
         self.id, self.file, self.pad, self.sample_rate, self.channels = "p-1-up", "p.csv", pad, rate, CHANNELS
+        self.reader = SimpleNamespace(problems=lambda: ())
         self.time = np.arange(n) / rate
         load = np.interp(self.time, *np.array([[0, 0.5, 2.5, 3, 5, 5.5, 8], [100, 1000, 1000, 2000, 2000, 3000, 3000]]))
         self.force = vectors(ANGLES[0], load) + rng.standard_normal((n, 2))
@@ -502,6 +503,8 @@ def test_after_a_reversal_the_pivot_sticks_for_eight_per_cent(top):
     stuck = np.flatnonzero(sticking(load, branch))
     # within 0.08 of the top, and on the way up again within 0.04 of where it turned at half of it
     np.testing.assert_array_equal(stuck, [3, 4, 9])
+    # a record that begins on the way down: its load had come up before
+    np.testing.assert_array_equal(np.flatnonzero(sticking(load[2:8], np.full(6, -1))), [0, 1, 2])
 
 
 def pressed(compliance, mirror=None, pads=range(1, 6)):

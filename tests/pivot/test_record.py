@@ -105,14 +105,13 @@ def samples(load, start=0.0, rate=RATE, keep=slice(None)):
 
 
 @pytest.mark.parametrize("start", [0.0, 500.0])
-def test_a_ramp_is_cut_into_halves_of_the_length(start):
-    """Ten seconds in pieces of a twentieth, each with its exact mean, whenever the clock started."""
+def test_a_ramp_is_cut_into_pieces_of_the_length(start):
+    """Ten seconds in pieces of a tenth, each with its exact mean, whenever the clock started."""
     load = 100.0 + 0.8 * np.arange(5001)
     blocks = cut_blocks(*samples(load, start), (), 0.1)
-    assert len(blocks) == 200
-    np.testing.assert_allclose(np.diff(blocks.time), 0.05, atol=2e-3)
-    np.testing.assert_allclose(blocks.duration, 0.05, atol=2.1e-3)
-    assert blocks.duration.sum() == pytest.approx(10.0, abs=3e-3)
+    assert len(blocks) == 100
+    np.testing.assert_allclose(np.diff(blocks.time), 0.1, atol=1e-9)
+    np.testing.assert_allclose(blocks.duration, 0.1, atol=1e-9)
     np.testing.assert_allclose(blocks.load, 100.0 + 400.0 * (blocks.time - start), rtol=1e-9)
     np.testing.assert_allclose(blocks.across_load, 0.5 * blocks.load, rtol=1e-12)
     np.testing.assert_allclose(blocks.deflection, 1e-9 * blocks.load, rtol=1e-12)
@@ -122,28 +121,29 @@ def test_a_ramp_is_cut_into_halves_of_the_length(start):
     assert set(blocks.hold) == {-1}
     assert set(blocks.branch) == {1}
     assert set(cut_blocks(*samples(load[::-1], start), (), 0.1).branch) == {-1}
-    some = blocks.take(np.arange(200) % 3 == 0)
-    assert len(some) == 67
+    some = blocks.take(np.arange(100) % 3 == 0)
+    assert len(some) == 34
     np.testing.assert_array_equal(some.load, blocks.load[::3])
 
 
 @pytest.mark.parametrize(
     ("length", "hold", "pieces"),
-    [(0.1, 1.0, 10), (0.1, 0.05, 1), (0.5, 0.19, 0), (0.5, 0.21, 1), (0.5, 0.74, 1), (0.5, 0.76, 2), (0.5, 1.24, 2)],
+    [(0.1, 1.0, 10), (0.1, 0.05, 1), (0.5, 0.19, 0), (0.5, 0.21, 1), (0.5, 0.98, 1), (0.5, 1.0, 2), (0.5, 1.24, 2)],
 )
-def test_holds_have_pieces_of_their_own_about_as_long_as_asked(length, hold, pieces):
+def test_holds_have_pieces_of_their_own_as_long_as_asked_or_one_that_is_shorter(length, hold, pieces):
     time = np.arange(3001) / RATE
     load = np.interp(time, [0, 2, 2 + hold, 6], [0, 1000, 1000, 0])
     blocks = cut_blocks(*samples(load), (Hold(2.0, 2.0 + hold, 1000.0),), length)
     held = blocks.hold == 0
     assert held.sum() == pieces
     if pieces:
-        np.testing.assert_allclose(blocks.duration[held], hold / pieces, atol=2.1e-3)
-        np.testing.assert_allclose(blocks.time[held], 2.0 + hold / pieces * (np.arange(pieces) + 0.5), atol=2.1e-3)
+        piece = min(length, hold)
+        np.testing.assert_allclose(blocks.duration[held], piece, atol=2.1e-3)
+        np.testing.assert_allclose(blocks.time[held], 2.0 + piece * (np.arange(pieces) + 0.5), atol=2.1e-3)
     assert (blocks.rate[held] == 0).all()
     assert (blocks.branch[blocks.time < 2.0 + hold] == 1).all()
     assert (blocks.branch[blocks.time > 2.0 + hold + 0.5 * length] == -1).all()
-    np.testing.assert_allclose(blocks.duration[~held], 0.5 * length, rtol=0.1)
+    np.testing.assert_allclose(blocks.duration[~held], length, rtol=0.1)
 
 
 def test_a_level_in_noise_has_the_spread_of_its_mean():
@@ -161,10 +161,24 @@ def test_a_piece_with_half_of_its_samples_stays(lost, kept):
     assert len(blocks) == (100 if kept else 99)
 
 
-def test_three_samples_make_a_piece_and_two_do_not():
-    hold = (Hold(0.0, 10.0, 500.0),)
-    assert len(cut_blocks(*samples(np.full(401, 500.0), rate=40.0), hold, 0.1)) == 100
-    assert len(cut_blocks(*samples(np.full(151, 500.0), rate=15.0), hold, 0.1)) == 0
+@pytest.mark.parametrize(("rate", "length"), [(40.0, 0.1), (15.0, 0.2), (10.0, 0.3), (1.0, 3.0)])
+def test_the_pieces_of_a_slow_logger_are_multiples_of_the_length_with_three_samples(rate, length):
+    """A logger of 1 Hz that watches holds of half a minute is a good one: it gave not a single average."""
+    load = np.full(int(21 * rate) + 1, 500.0)
+    blocks = cut_blocks(*samples(load, rate=rate), (Hold(0.0, 21.0, 500.0),), 0.1)
+    assert len(blocks) == int(21.0 / length + 1e-9)
+    np.testing.assert_allclose(blocks.duration, length, atol=1.01 / rate)
+
+
+def test_pieces_hold_whole_periods_of_the_mains():
+    """Half a micrometre of pick-up stood in averages of holds that are no multiples of 0.1 s, at thirty times noise."""
+    time = np.arange(3001) / RATE
+    holds = tuple(Hold(start, start + 0.96, 500.0) for start in np.arange(0.0, 5.0, 1.2))
+    for mains in (50.0, 60.0):
+        pickup = 5e-7 * np.sin(2 * np.pi * mains * time)
+        vectors = np.column_stack([np.full_like(time, 500.0), np.zeros_like(time), pickup, pickup])
+        blocks = cut_blocks(time, vectors, holds, 0.1)
+        assert np.max(np.abs(blocks.deflection[blocks.hold >= 0])) < 1e-9
 
 
 @pytest.mark.parametrize(("held", "seconds"), [(0.0, 440.0), (440.0, 440.0), (220.0, 440.0), (30.0, 40.0)])
@@ -172,7 +186,9 @@ def test_long_records_have_as_many_pieces_as_can_be_borne(held, seconds):
     n = int(seconds * 100)
     load = np.interp(np.arange(n + 1) / 100.0, [0, held, seconds], [100.0, 100.0, 5000.0])
     blocks = cut_blocks(*samples(load, rate=100.0), (Hold(0.0, held, 100.0),) if held else (), 0.2)
-    assert len(blocks) == pytest.approx(min(MOST_BLOCKS, held / 0.2 + (seconds - held) / 0.1), abs=2)
+    length = 0.2 * np.ceil(seconds / MOST_BLOCKS / 0.2 - 1e-6)
+    assert len(blocks) == pytest.approx(seconds / length, abs=2)
+    assert len(blocks) <= MOST_BLOCKS
 
 
 def test_the_load_turns_where_it_was_farthest():
@@ -189,7 +205,7 @@ def test_the_load_turns_where_it_was_farthest():
         *samples(300.0 + np.interp(time, *np.array([[0, 3, 6, 9, 12], [0, 900, 100, 1000, 0]]))), (), 0.1
     )
     turns = again.time[1:][np.diff(again.branch) != 0]
-    np.testing.assert_allclose(turns, [3.025, 6.025, 9.025], atol=0.06)
+    np.testing.assert_allclose(turns, [3.05, 6.05, 9.05], atol=0.11)
     assert again.branch[0] == 1
 
 

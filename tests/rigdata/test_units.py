@@ -27,7 +27,8 @@ TWO_PI = 2 * math.pi
 #: Quantities by dimension, as text, with their value in SI.
 VALUES = {
     "angle": {
-        "54 deg": math.radians(54), "-90 deg": -math.pi / 2, "-90°": -math.pi / 2, "1.5 rad": 1.5, "0.2 mm/m": 2e-4,
+        "54 deg": math.radians(54), "-90 deg": -math.pi / 2, "-90°": -math.pi / 2, "\u221290 deg": -math.pi / 2,
+        "\u201390 deg": -math.pi / 2, "1.5 rad": 1.5, "0.2 mm/m": 2e-4,
     },
     "speed": {
         **dict.fromkeys(["22 Hz", "1320 rpm", "1320 1/min", "22 1/s"], 22 * TWO_PI), "138.23 rad/s": 138.23,

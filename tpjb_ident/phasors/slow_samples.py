@@ -30,6 +30,7 @@ T = TypeVar("T")
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
 _SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch
 _NOTHING = 1e-15  # [m] or [N]: below what any sensor knows
+_LONGEST_GLITCH, _FEWEST = 0.25, 3  # [s], samples
 _THRESHOLD = 7.0  # noise standard deviations beyond both medians
 _SHORTEST = 50  # samples
 _TIMES_EXPECTED = 10.0
@@ -51,6 +52,8 @@ def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, F
     force, displacement = run.vector("force"), run.vector("displacement")
     slower = force if len(force) < len(displacement) else displacement
     load, place = force.at(slower.time), displacement.at(slower.time)
+    # a slow logger's glitches are a few samples long, and so may be its holds
+    longest = min(longest, max(_FEWEST, int(_LONGEST_GLITCH * slower.rate)))
     return slower.time, load, place, good_samples(np.hstack([load, place]), longest), slower.rate
 
 
@@ -93,6 +96,9 @@ def usable_runs(
     for run in runs:
         try:
             if len(records) != most:
+                contradicted = [problem for problem in run.reader.problems() if problem.severity == "error"]
+                if contradicted:  # units in the file other than the manifest's
+                    raise RigDataError(contradicted)
                 records.append((run, read(run)))
         except RigDataError as error:
             problems += error.problems

@@ -1,8 +1,7 @@
 """Short averages of a dry-pivot record on the axes of its pad: what the curve is fitted to.
 
-Averaging 0.1 s keeps all that a slow test can tell, takes the mains out, and leaves some hundred numbers
-whose covariance can be written down in full. Averages on ramps are shorter, so that the curve is straight
-within each.
+Averaging 0.1 s keeps all that a slow test can tell, takes the mains out (5 or 6 whole periods), and leaves some hundred
+numbers whose covariance can be written down in full.
 
 No set points are needed for holds: they are where the load changes much more slowly than it does on average over
 the record. A record without holds (one continuous ramp) simply has none.
@@ -11,6 +10,7 @@ the record. A record without holds (one continuous ramp) simply has none.
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -28,6 +28,7 @@ _STILL = 0.2  # share of the mean rate of change below which the load counts as 
 _SETTLED = 4.0  # noise standard deviations within which the load must lie of the hold's own level
 _ALIKE = 6.0  # noise standard deviations between two runs of one hold
 _FEWEST = 4  # bins of a hold: 0.16 s, longer in long records
+_FEWEST_SAMPLES = 3  # of a piece
 _MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
 _TURN = 0.02  # of the load range: a smaller way back is noise
 
@@ -125,18 +126,17 @@ def _settled(level: FloatArray, noise: float, start: int, stop: int) -> tuple[in
 
 
 def cut_blocks(time: FloatArray, vectors: FloatArray, holds: tuple[Hold, ...], length: float = BLOCK) -> Blocks:
-    """Average a record piece by piece of `length` [s], half of it on ramps.
+    """Average a record piece by piece of `length` [s], or of a multiple where it is long or its samples are few.
 
     `vectors` (n, 4): load along and across the pad [N], displacement along and across [m].
     """
     span = float(time[-1] - time[0])
-    held = sum(hold.duration for hold in holds)
-    length *= max(1.0, (held + 2.0 * (span - held)) / length / MOST_BLOCKS)
-    edges, number = _edges(time, holds, length)
-    first, last = np.searchsorted(time, edges.T)
-    # a piece that lost most of its samples to a glitch or a gap would carry a false weight
     period = span / max(len(time) - 1, 1)
-    whole = last - first >= np.maximum(3, 0.5 * np.diff(edges)[:, 0] / period)
+    length *= math.ceil(max(span / MOST_BLOCKS, _FEWEST_SAMPLES * period) / length - 1e-6)
+    edges, number = _edges(time, holds, length)
+    first, last = np.searchsorted(time, edges.T - 0.5 * period)
+    # a piece that lost most of its samples to a glitch or a gap would carry a false weight
+    whole = last - first >= np.maximum(_FEWEST_SAMPLES, 0.5 * np.diff(edges)[:, 0] / period)
     first, last, number = first[whole], last[whole], number[whole]
     moment, load, across_load, deflection, across = piece_means(np.column_stack([time, vectors]), first, last).T
     count = last - first
@@ -152,9 +152,9 @@ def _edges(time: FloatArray, holds: tuple[Hold, ...], length: float) -> tuple[Fl
     bounds = np.r_[time[0], np.ravel([hold[:2] for hold in holds]), time[-1]]
     pieces: list[tuple[float, float, int]] = []
     for k, (start, stop) in enumerate(itertools.pairwise(bounds)):
-        number, usual = (k // 2, length) if k % 2 else (-1, 0.5 * length)
-        if stop - start >= 0.4 * usual:
-            cuts = np.linspace(start, stop, max(1, round((stop - start) / usual)) + 1)
+        if stop - start >= 0.4 * length:
+            number, count = k // 2 if k % 2 else -1, max(1, int((stop - start) / length + 1e-6))
+            cuts = start + min(length, stop - start) * np.arange(count + 1)
             pieces += [(a, b, number) for a, b in itertools.pairwise(cuts)]
     table = np.array(pieces, dtype=float).reshape(-1, 3)
     return table[:, :2], table[:, 2].astype(int)

@@ -77,8 +77,9 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
     good &= np.isfinite(time)
     lost = 1.0 - float(np.mean(good)) if len(good) else 1.0
     if len(good) < _FEWEST_SAMPLES or lost > _MOST_LOST:
-        what = f"has {len(good)} samples, of which {100 * lost:.0f} % are missing or glitches"
-        raise _refusal(run, "record", what, "Repeat the test")
+        what = f"has {len(good)} samples, of which {100 * lost:.0f} % are missing or glitches: fewer than it takes"
+        cure = "Export every sample, not one a step; state the sample_rate of a slower device; else repeat the test"
+        raise _refusal(run, "record", what, cure)
     pickup = _pickup(run, {"force": load, "displacement": place}, good, rate)
     # a logger may repeat or shuffle time stamps: order is what averages need
     order = np.flatnonzero(good)

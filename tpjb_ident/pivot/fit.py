@@ -97,11 +97,14 @@ def bad_blocks(record: DryRecord, noise: NoiseModel) -> BoolArray:
 
 
 def sticking(load: FloatArray, branch: IntArray) -> BoolArray:
-    """Blocks (m,) just after a reversal of the load, where friction holds the pivot and no law applies."""
+    """Blocks (m,) just after a reversal of the load, where friction holds the pivot and no law applies.
+
+    A record that begins with unloading begins at a reversal: the load had come up before.
+    """
     stuck = np.zeros(len(load), dtype=bool)
-    for turn in np.flatnonzero(np.diff(branch)):
-        near = np.abs(load[turn + 1 :] - load[turn]) < _STICKS_WITHIN * abs(load[turn])
-        stuck[turn + 1 :] |= np.logical_and.accumulate(near)
+    for start in np.flatnonzero(np.diff(branch, prepend=1)).tolist():
+        turn = load[max(start - 1, 0)]
+        stuck[start:] |= np.logical_and.accumulate(np.abs(load[start:] - turn) < _STICKS_WITHIN * abs(turn))
     return stuck
 
 
