@@ -91,6 +91,23 @@ def test_a_drift_that_cannot_be_learnt_is_the_one_to_be_expected(rate):
     assert found.drift == pytest.approx(expected, rel=0.05)
 
 
+def test_a_walk_is_told_from_flicker_that_looks_like_it_over_a_second():
+    """Over a quarter of a minute it goes three times as far: cycles of load had intervals of half the errors."""
+    rng = np.random.default_rng(11)
+    series = [
+        replace(s, values=s.values + 2e-8 * np.cumsum(rng.standard_normal(len(s.time))) * math.sqrt(BLOCK))
+        for s in white_series(10, 3, sigma=2e-9)
+    ]
+    noise = estimate_noise(series, 1e-8)
+    assert noise.walk == pytest.approx(2e-8, rel=0.3)
+    covariance = noise.covariance(series[0].time, series[0].duration)
+    way = np.zeros(len(covariance))
+    way[[0, -1]] = -1.0, 1.0
+    assert way @ covariance @ way == pytest.approx(4e-16 * np.ptp(series[0].time), rel=0.5)
+    none = estimate_noise(white_series(10, 3, sigma=2e-8), 1e-8)
+    assert none.walk < 2e-9
+
+
 def drifting(rates, seed=2, n=50, sigma=1e-9):
     rng = np.random.default_rng(seed)
     time = (np.arange(n) + 0.5) * BLOCK
@@ -222,7 +239,7 @@ def test_about_a_curve_any_smooth_law_is_free_and_blocks_left_out_say_nothing():
     knocked = [moved(r, 1e-6 * ~keep) for r in records]
     left_out = pooled_noise(without(knocked, keep), True)
     np.testing.assert_allclose(numbers(left_out), numbers(pooled_noise(without(records, keep), True)), rtol=1e-9)
-    assert pooled_noise(knocked, True).flicker > 10 * left_out.flicker
+    assert pooled_noise(knocked, True).mean_variance(1.0) > 10 * left_out.mean_variance(1.0)
 
 
 def test_a_loop_between_the_branches_is_no_noise():
@@ -249,7 +266,7 @@ def test_where_some_records_have_holds_ramps_are_not_asked():
     base = pooled_noise(curved, True)
     bent = pooled_noise(sphere, True)
     assert bent.white == pytest.approx(base.white, rel=0.1)
-    assert max(bent.flicker, base.flicker) < 0.05 * 1e-16
+    assert max(bent.flicker, base.flicker) < 0.07 * 1e-16
 
 
 RATE, N = 500.0, 3000

@@ -19,8 +19,9 @@ from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, holding, sentences
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
-from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples, usable_runs
+from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples
 from tpjb_ident.phasors.windows import line_design
+from tpjb_ident.pivot.refusals import usable_runs
 from tpjb_ident.presentation import Presented
 from tpjb_ident.rounding import listed
 

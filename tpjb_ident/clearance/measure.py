@@ -15,9 +15,10 @@ from tpjb_ident.clearance.polygon import SideFit, alike, corners, find_centre, f
 from tpjb_ident.clearance.sweep import ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
-from tpjb_ident.phasors.slow_samples import live_run, usable_runs
+from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.dry_record import axial_channels, relative_calibration
+from tpjb_ident.pivot.refusals import usable_runs
 from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import TANGENT
 
@@ -220,7 +221,8 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
                                      angles[fit.pads] + fit.tilt, fit.tilt_se])  # fmt: skip
     clearance, clearance_se, deflection, deflection_se, fitted, fitted_se = columns
     # another run meets the probes' zero elsewhere: by about what it drifts within this one
-    drift = (fit.noise.drift * float(np.ptp(contact.time))) ** 2 * np.eye(2)
+    span = float(np.ptp(contact.time))
+    drift = ((fit.noise.drift * span) ** 2 + fit.noise.walk**2 * span) * np.eye(2)
     return ClearancePolygon(
         run=run.id,
         point=run.point,

@@ -35,7 +35,7 @@ from tpjb_ident.clearance.sweep import ContactIntervals
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.phasors.bad_samples import robust_deviation
-from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
+from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.pivot.curve import PivotCurve
 
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
@@ -273,13 +273,8 @@ def _whitener(contact: ContactIntervals, angles: FloatArray, noise: NoiseModel, 
     `unsure` (m,) is a standard deviation of each average by itself [m].
     """
     n = directions(angles)[contact.pad]
-    centred = contact.time - contact.time.mean()
     same = contact.time[:, None] == contact.time[None, :]
-    covariance = (n @ n.T) * (
-        noise.white * same / contact.duration
-        + noise.flicker * flicker_kernel(contact.time)
-        + noise.drift**2 * np.outer(centred, centred)
-    )
+    covariance = (n @ n.T) * (noise.white * same / contact.duration + noise.slow_covariance(contact.time))
     covariance += np.diag(1e-9 * np.diag(covariance) + unsure**2)
     return np.linalg.inv(np.linalg.cholesky(covariance))
 

@@ -1,4 +1,4 @@
-"""Noise of a displacement channel over seconds: white, 1/f, and drift; learnt from the records themselves.
+"""Noise of a displacement channel over seconds: white, 1/f, walk and drift; learnt from the records themselves.
 
 A staircase test lasts some ten seconds, in which a probe drifts by a tenth of a micrometre or more. Drift
 grows with time and so does the load: taken for deflection it makes a stiff pivot several per cent softer or
@@ -6,7 +6,10 @@ stiffer. What tells them apart is that drift goes on during the holds. A covaria
 exactly that, and widens the interval by what is left; averages with a standard deviation over the square
 root of n would be blind to it.
 
-The three levels are estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58,
+A drift is straight, with a bend; a walk has a rate that changes all the time, as in a draught: over ten seconds it
+goes further than the 1/f noise that looks like it over one.
+
+The four levels are estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58,
 1971, 545-554), pooled over all series of a campaign: the probes are the same in each.
 """
 
@@ -23,6 +26,8 @@ from tpjb_ident.errors import BadInputError
 
 DRIFT_OVER_FLICKER = 0.7  # [1/sqrt(s)], drift rate to be expected over the square root of the 1/f power density
 _BEND = 0.5  # of a drift: half of what its rate at either end differs by from that in the middle, standard deviation
+_WAVES = 8  # half cosines over a record that stand for a walk: its slowest part, 97 % of its variance
+_WALK_OVER_FLICKER = 0.2  # [1/sqrt(s)], walk to be expected over the square root of the 1/f power density
 _PINNED = 0.01  # of ln(drift rate): as good as given
 # time constants [s] of the exponentially correlated processes whose sum has a 1/f spectrum from some 5 mHz
 # to 5 Hz
@@ -33,29 +38,35 @@ _FLICKER_GAIN = float(np.sum(4.0 * _FLICKER_TIMES / (1.0 + (2.0 * np.pi * _FLICK
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Levels of the three kinds of noise."""
+    """Levels of the four kinds of noise."""
 
-    white: float
-    flicker: float
-    drift: float
+    white: float  #: [m^2 s]
+    flicker: float  #: [m^2]
+    drift: float  #: [m/s]
+    walk: float = 0.0  #: [m/sqrt(s)]
 
     def covariance(self, time: FloatArray, duration: FloatArray) -> FloatArray:
         """Covariance of block averages, (m, m); `time`, `duration` (m,) [s]."""
+        return np.diag(self.white / duration) + self.slow_covariance(time, duration)
+
+    def slow_covariance(self, time: FloatArray, duration: FloatArray | None = None) -> FloatArray:
+        """All but the white noise, (m, m); `time` (m,) [s]; of averages where `duration` (m,) [s] is given."""
         centred = time - np.mean(time)
-        span = max(float(np.ptp(time)), 1e-300)
-        bent = _BEND * (centred**2 - np.mean(centred**2)) / span * 2.0
-        return np.asarray(
-            np.diag(self.white / duration)
-            + self.flicker * flicker_kernel(time, duration)
-            + self.drift**2 * (np.outer(centred, centred) + np.outer(bent, bent))
-        )
+        bent = 2.0 * _BEND * (centred**2 - np.mean(centred**2)) / max(float(np.ptp(time)), 1e-300)
+        columns = np.column_stack([self.drift * centred, self.drift * bent, self.walk * _walk_columns(time)])
+        return np.asarray(self.flicker * flicker_kernel(time, duration) + columns @ columns.T)
 
     def mean_variance(self, duration: float) -> float:
         """Variance of one average over `duration` seconds about the run's own level [m^2]."""
-        m = 40
-        time = (np.arange(m) + 0.5) * duration / m
-        total = NoiseModel(self.white, self.flicker, 0.0).covariance(time, np.full(m, duration / m))
-        return float(np.mean(total))
+        time = (np.arange(40) + 0.5) * duration / 40
+        return self.white / duration + self.flicker * float(np.mean(flicker_kernel(time)))
+
+
+def _walk_columns(time: FloatArray) -> FloatArray:
+    """Columns (m, k) that sum up, with random factors, to a walk of one metre per square root of a second at `time`."""
+    span = max(float(np.ptp(time)), 1e-300)
+    waves = np.pi * np.arange(1, _WAVES + 1)
+    return np.asarray(np.cos((time[:, None] - np.min(time)) / span * waves) * np.sqrt(2.0 * span) / waves)
 
 
 def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> FloatArray:
@@ -98,25 +109,27 @@ def _rotated(series: Sequence[NoiseSeries], unit: float) -> list[tuple[FloatArra
         spectrum, basis = np.linalg.eigh(kernel)
         scale = np.maximum(np.max(np.abs(samples.mean), axis=0), 1e-300)
         mean, _ = np.linalg.qr((samples.mean / scale) * root[:, None])
-        drift = (samples.time - np.mean(samples.time)) * root
-        columns = np.column_stack([mean, drift, samples.values / unit * root])
+        drift = samples.time - np.mean(samples.time)
+        slow = np.column_stack([drift, _walk_columns(samples.time)]) * root[:, None]
+        columns = np.column_stack([mean, slow, samples.values / unit * root])
         groups.setdefault(samples.mean.shape, []).append((np.maximum(spectrum, 0.0), basis.T @ columns))
     stacks = (zip(*alike) for alike in groups.values())
     return [(np.stack(spectra), np.stack(columns)) for spectra, columns in stacks]
 
 
 def _minus_log_likelihood(spectra: FloatArray, columns: FloatArray, levels: FloatArray) -> float:
-    """Sum over series of one shape; white, 1/f and drift `levels` (3,) in the unit of `_rotated`."""
-    white, flicker, drift = levels
+    """Sum over series of one shape; white, 1/f, drift and walk `levels` (4,) in the unit of `_rotated`."""
+    white, flicker, drift, walk = levels
     variance = white + flicker * spectra
-    p = columns.shape[2] - 2
-    gram = np.swapaxes(columns, 1, 2) @ (columns / variance[..., None])
-    # the drift is a random column: Woodbury takes it out of every product at once
-    u = gram[:, p]
-    inflation = 1.0 + drift**2 * u[:, p]
-    gram = gram - drift**2 * u[:, :, None] * u[:, None, :] / inflation[:, None, None]
-    xx, xy, yy = gram[:, :p, :p], gram[:, :p, p + 1], gram[:, p + 1, p + 1]
-    log_det = np.log(variance).sum() + np.log(inflation).sum() + np.linalg.slogdet(xx)[1].sum()
+    p = columns.shape[2] - _WAVES - 2
+    scale = np.r_[np.ones(p), drift, np.full(_WAVES, walk), 1.0]
+    gram = np.swapaxes(columns, 1, 2) @ (columns / variance[..., None]) * np.outer(scale, scale)
+    # drift and walk are random columns: Woodbury takes them out of every product at once
+    u = gram[:, p:-1]
+    inner = np.eye(_WAVES + 1) + u[:, :, p:-1]
+    gram = gram - np.swapaxes(u, 1, 2) @ np.linalg.solve(inner, u)
+    xx, xy, yy = gram[:, :p, :p], gram[:, :p, -1], gram[:, -1, -1]
+    log_det = np.log(variance).sum() + np.linalg.slogdet(inner)[1].sum() + np.linalg.slogdet(xx)[1].sum()
     explained = np.sum(xy * np.linalg.solve(xx, xy[..., None])[..., 0])
     return 0.5 * float(log_det + yy.sum() - explained)
 
@@ -130,34 +143,27 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift
     unit = np.sqrt(white)
     rotated = _rotated(usable, unit)
     prior = np.log(drift_rate / unit)
-    spread = 1.0 if learn_drift else _PINNED
+    spread = np.r_[5.0, 5.0, np.full(2, 1.0 if learn_drift else _PINNED)]
 
     def objective(logs: FloatArray) -> float:
         levels = np.exp(np.clip(logs, -30.0, 30.0))
-        total = sum(_minus_log_likelihood(*alike, levels) for alike in rotated)
-        # probes that flicker more drift more; beyond that, a level that the data do not feel (no 1/f at all) must
-        # not run away to minus infinity
-        expected = 0.5 * np.log(np.exp(2.0 * prior) + DRIFT_OVER_FLICKER**2 * levels[1])
-        total += 0.5 * ((logs[2] - expected) / spread) ** 2
-        return total + 0.5 * (logs[1] / 5.0) ** 2 + 0.5 * (logs[0] / 5.0) ** 2
+        # probes that flicker more drift and walk more; beyond that, a level that the data do not feel (no 1/f at all)
+        # must not run away to minus infinity
+        drift = 0.5 * np.log(np.exp(2.0 * prior) + DRIFT_OVER_FLICKER**2 * levels[1])
+        expected = np.array([0.0, 0.0, drift, np.log(_WALK_OVER_FLICKER) + 0.5 * logs[1]])
+        likelihood = sum(_minus_log_likelihood(*alike, levels) for alike in rotated)
+        return likelihood + 0.5 * float(np.sum(((logs - expected) / spread) ** 2))
 
-    corner = np.array([-0.5, -0.5, prior])
-    simplex = np.vstack([corner, corner + 1.4 * np.eye(3)])  # a factor of four in each level
-    solution = optimize.minimize(
-        objective,
-        np.array([0.0, 0.0, prior]),
-        method="Nelder-Mead",
-        options={"xatol": 0.05, "fatol": 0.05, "maxiter": 150, "initial_simplex": simplex},
-    )
-    w, f, d = np.exp(solution.x)
-    return NoiseModel(white=float(w * white), flicker=float(f * white), drift=float(d * unit))
+    corner = np.array([-0.5, -0.5, prior, -2.0])
+    simplex = np.vstack([corner, corner + 1.4 * np.eye(4)])  # a factor of four in each level
+    options = {"xatol": 0.05, "fatol": 0.05, "maxiter": 250, "initial_simplex": simplex}
+    solution = optimize.minimize(objective, corner, method="Nelder-Mead", options=options)
+    return NoiseModel(*(np.exp(solution.x) * [white, white, unit, unit]).tolist())
 
 
 def _white_level(series: NoiseSeries) -> float:
     """Rough white level [m^2 s] from second differences of neighbouring blocks."""
     second = np.diff(series.values, 2) * np.sqrt(np.median(series.duration) / 6.0)
-    level = float(np.median(second**2)) / 0.455
-    if level > 0.0:
-        return level
     # a noise-free record (a simulation): anything far below the signal will do
-    return max(float(np.ptp(series.values)) * 1e-6, 1e-15) ** 2 * float(np.median(series.duration))
+    least = max(1e-6 * float(np.ptp(series.values)), 1e-15) ** 2 * np.median(series.duration)
+    return float(max(np.median(second**2) / 0.455, least))

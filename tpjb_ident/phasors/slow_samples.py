@@ -8,9 +8,9 @@ corners of every ramp.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage, special
@@ -26,11 +26,10 @@ if TYPE_CHECKING:
     from rigdata.calibration import Channel
     from rigdata.campaign import Run
 
-T = TypeVar("T")
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
 _SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch
 _NOTHING = 1e-15  # [m] or [N]: below what any sensor knows
-_LONGEST_GLITCH, _FEWEST = 0.25, 3  # [s], samples
+_LONGEST_GLITCH, _LONGEST = 0.25, 60  # [s], samples
 _THRESHOLD = 7.0  # noise standard deviations beyond both medians
 _SHORTEST = 50  # samples
 _TIMES_EXPECTED = 10.0
@@ -44,7 +43,7 @@ _PLANE = 0.1
 _GAIN, _CURVED, _BY_CHANCE = 0.005, 1e-3, 1e-4
 
 
-def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray, float]:
+def slow_samples(run: Run) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray, float]:
     """Both vectors of a slow record at the times of the slower one, and which samples are good.
 
     Gives time (n,) and force, displacement (n, 2), good (n,) and the rate [Hz]; `run` is a `live_run`.
@@ -53,7 +52,7 @@ def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, F
     slower = force if len(force) < len(displacement) else displacement
     load, place = force.at(slower.time), displacement.at(slower.time)
     # a slow logger's glitches are a few samples long, and so may be its holds
-    longest = min(longest, max(_FEWEST, int(_LONGEST_GLITCH * slower.rate)))
+    longest = int(np.clip(_LONGEST_GLITCH * slower.rate, 3, _LONGEST))
     return slower.time, load, place, good_samples(np.hstack([load, place]), longest), slower.rate
 
 
@@ -67,7 +66,7 @@ def _statistics(run: Run) -> dict[str, ChannelStatistics]:
     return statistics
 
 
-def spare_slopes(run: Run, along: FloatArray, longest: int = 60) -> dict[str, FloatArray]:
+def spare_slopes(run: Run, along: FloatArray) -> dict[str, FloatArray]:
     """By how much each live reading changes with the vector of its quantity along directions (k, 2), (k,) each.
 
     Of quantities alone that more than two channels tell.
@@ -80,29 +79,11 @@ def spare_slopes(run: Run, along: FloatArray, longest: int = 60) -> dict[str, Fl
         moved = run.vector(quantity).values @ along.T
         for name in names:
             reading = np.asarray(run.record(name).values)
-            used = good_samples(np.column_stack([moved, reading]), longest)
+            used = good_samples(np.column_stack([moved, reading]))
             if np.ptp(reading[used]) > 0.0:
                 design = np.column_stack([moved[used], np.ones(used.sum())])
                 slopes[name] = np.linalg.lstsq(design, reading[used], rcond=None)[0][:-1]
     return slopes
-
-
-def usable_runs(
-    runs: Sequence[Run], read: Callable[[Run], T], most: int | None = None
-) -> tuple[list[tuple[Run, T]], list[Problem]]:
-    """Runs with what is read of each, the first few where `most` is given, and why others cannot be used."""
-    records: list[tuple[Run, T]] = []
-    problems: list[Problem] = []
-    for run in runs:
-        try:
-            if len(records) != most:
-                contradicted = [problem for problem in run.reader.problems() if problem.severity == "error"]
-                if contradicted:  # units in the file other than the manifest's
-                    raise RigDataError(contradicted)
-                records.append((run, read(run)))
-        except RigDataError as error:
-            problems += error.problems
-    return records, problems
 
 
 def refused_runs(problems: Sequence[Problem]) -> tuple[Condition, ...]:
@@ -118,19 +99,14 @@ def piece_means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArr
     return np.asarray((total[last] - total[first]) / (last - first)[:, None] + values[0])
 
 
-def good_samples(values: FloatArray, longest: int = 60) -> BoolArray:
+def good_samples(values: FloatArray, longest: int = _LONGEST) -> BoolArray:
     """Samples that are neither missing nor part of a glitch, (n,); `values` (n, d)."""
-    finite = np.asarray(np.isfinite(values).all(axis=1))
-    good = finite.copy()
-    index = np.flatnonzero(finite)
-    if len(index) < 8:
-        return good
-    bad = np.zeros(len(index), dtype=bool)
-    for column in values[index].T:
-        bad |= _outside_both_medians(column, longest)
-    # the flanks of a glitch stay below the threshold
-    bad = np.asarray(ndimage.binary_dilation(bad, iterations=2))
-    good[index[bad]] = False
+    good = np.asarray(np.isfinite(values).all(axis=1))
+    index = np.flatnonzero(good)
+    if len(index) >= 8:
+        bad = np.any([_outside_both_medians(column, longest) for column in values[index].T], axis=0)
+        # the flanks of a glitch stay below the threshold
+        good[index[ndimage.binary_dilation(bad, iterations=2)]] = False
     return good
 
 
@@ -146,16 +122,15 @@ def _outside_both_medians(x: FloatArray, longest: int) -> BoolArray:
     centre = np.arange(n) + half
     before = median[np.clip(centre - half - 1, half, n + half - 1)]
     after = median[np.clip(centre + half + 1, half, n + half - 1)]
-    noise = _noise(x, median[centre])
-    low = np.minimum(before, after) - _THRESHOLD * noise
-    high = np.maximum(before, after) + _THRESHOLD * noise
-    return np.asarray((x < low) | (x > high))
-
-
-def _noise(x: FloatArray, median: FloatArray) -> float:
-    """Robust standard deviation about the running median, never below the recording's resolution."""
-    spread, resolution = robust_deviation(x - median), converter_step(x)[0]
-    return max(spread, resolution / 2.0, _SMALLEST * float(np.ptp(x)), _ROUNDING * float(np.max(np.abs(x))), _NOTHING)
+    noise = max(  # never below the recording's resolution
+        robust_deviation(x - median[centre]),
+        0.5 * converter_step(x)[0],
+        _SMALLEST * np.ptp(x),
+        _ROUNDING * np.max(np.abs(x)),
+        _NOTHING,
+    )
+    beyond = np.maximum(np.minimum(before, after) - x, x - np.maximum(before, after))
+    return np.asarray(beyond > _THRESHOLD * noise)
 
 
 def converter_step(x: FloatArray) -> tuple[float, float]:
@@ -178,11 +153,12 @@ def live_run(run: Run) -> Run:
     run = _without_dead_spares(run, statistics)
     problems = []
     for quantity in ("force", "displacement"):
-        alike = {name: statistics[name] for name, c in run.channels.items() if c.quantity == quantity}
-        if any(_repeated(s) > _NOISE_FREE for s in alike.values() if not s.constant):
-            # noise below the converter's step: standing still says nothing here
-            continue
-        problems += [_problem(run, name, s) for name, s in alike.items() if stands_still(s)]
+        alike = [name for name, c in run.channels.items() if c.quantity == quantity]
+        moving = [_repeated(statistics[name]) for name in alike if not statistics[name].constant]
+        if (
+            max(moving, default=0.0) <= _NOISE_FREE
+        ):  # else noise is below a converter's step, and standing still is usual
+            problems += [_problem(run, name, statistics[name]) for name in alike if stands_still(statistics[name])]
     if problems:
         raise RigDataError(problems)
     return run

@@ -20,7 +20,7 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError, refuse
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.slow_noise import NoiseModel
-from tpjb_ident.phasors.slow_samples import refused_runs, usable_runs
+from tpjb_ident.phasors.slow_samples import refused_runs
 from tpjb_ident.pivot.creep import without_creep
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop
 from tpjb_ident.pivot.dry_record import DryRecord, axial_channels, pooled_noise, read_dry_run, relative_calibration
@@ -35,7 +35,12 @@ from tpjb_ident.pivot.law_fit import (
     with_shared_shape,
 )
 from tpjb_ident.pivot.laws import LAWS
-from tpjb_ident.pivot.refusals import DISPLACEMENT_LIMIT, refused_records, structure_behind
+from tpjb_ident.pivot.refusals import (
+    DISPLACEMENT_LIMIT,
+    refused_records,
+    structure_behind,
+    usable_runs,
+)
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign, Run

@@ -253,7 +253,7 @@ def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> FloatArray:
 
 def keep_likely(fits: Sequence[LawFit], weights: FloatArray) -> tuple[tuple[LawFit, ...], FloatArray]:
     """The fits that count, most likely first, with shares (n,) that sum to one."""
-    order = [k for k in np.argsort(-weights, kind="stable") if weights[k] >= _SMALLEST_WEIGHT]
+    order = np.argsort(-weights, kind="stable")[: np.sum(weights >= _SMALLEST_WEIGHT)]
     return tuple(fits[k] for k in order), np.asarray(weights[order] / weights[order].sum())
 
 

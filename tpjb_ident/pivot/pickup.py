@@ -60,7 +60,7 @@ def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: floa
 
 
 def mistake(
-    signature: PickupSignature, others: Sequence[PickupSignature], pairs: Sequence[tuple[str, str]]
+    signature: PickupSignature, others: Sequence[PickupSignature], pairs: Sequence[Sequence[str]]
 ) -> tuple[str, int] | None:
     """The mistake that, undone, makes a signature that of most others it now differs from, and how many these are."""
     alike = [other for other in others if other.channels == signature.channels]
@@ -73,7 +73,7 @@ def mistake(
     return (likeliest, agree[likeliest]) if agree[likeliest] >= max(2, math.ceil(len(alike) / 2)) else None
 
 
-def _undone(signature: PickupSignature, pairs: Sequence[tuple[str, str]]) -> list[tuple[str, PickupSignature]]:
+def _undone(signature: PickupSignature, pairs: Sequence[Sequence[str]]) -> list[tuple[str, PickupSignature]]:
     """A run's signature with every simple mistake undone."""
     names, size, noise = signature.channels, signature.size, signature.noise
     variants = []

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.problem import Problem, Severity
+from rigdata.problem import Problem, RigDataError, Severity
 from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import REMEDY, contradictions
 from tpjb_ident.pivot.dry_record import DryRecord, axial_channels, displacement_direction, pooled_noise
 from tpjb_ident.pivot.pickup import mistake
 
+if TYPE_CHECKING:
+    from rigdata.campaign import Run
+
+T = TypeVar("T")
 LOAD_LIMIT, DISPLACEMENT_LIMIT = math.radians(8.0), math.radians(30.0)  # off the pad
 _FAR_OFF = math.radians(30.0)  # from where a pad leaves no doubt that it is another one's record
 _ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
@@ -27,6 +32,25 @@ _CURE = "Check the run's pad number, the channels' axes, polarities and order, p
 _FEWEST = 4
 #: Slack when the spring's own movement is compared with what was read, as a share of it.
 _SLACK = 0.1
+
+
+def usable_runs(
+    runs: Sequence[Run], read: Callable[[Run], T], most: int | None = None
+) -> tuple[list[tuple[Run, T]], list[Problem]]:
+    """Runs with what is read of each, the first few where `most` is given, and why others cannot be used."""
+    records: list[tuple[Run, T]] = []
+    problems: list[Problem] = []
+    for run in runs:
+        if len(records) == most:
+            break
+        try:  # units in the file other than the manifest's are errors
+            contradicted = [problem for problem in run.reader.problems() if problem.severity == "error"]
+            problems += contradicted
+            if not contradicted:
+                records.append((run, read(run)))
+        except RigDataError as error:
+            problems += error.problems
+    return records, problems
 
 
 def refused_records(
@@ -207,10 +231,8 @@ def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:
         others = [other.pickup for other in records if other is not record and other.pickup is not None]
         if record.pickup is None or not others:
             continue
-        pairs: dict[str, list[str]] = {}
-        for name in record.pickup.channels:
-            pairs.setdefault(str(record.run.channels[name].quantity), []).append(name)
-        named = mistake(record.pickup, others, [(first, second) for first, second in pairs.values()])
+        names = sorted(record.pickup.channels, key=lambda name: str(record.run.channels[name].quantity))
+        named = mistake(record.pickup, others, [names[:2], names[2:]])
         if named is not None:
             what = (
                 f"run {record.run.id}: {named[0]}: then its mains pick-up is that of {named[1]} other dry "
