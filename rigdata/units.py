@@ -21,7 +21,7 @@ from rigdata.problem import RigError, shown
 #: Characters of a quantity; more are a slip or a bomb.
 LONGEST = 200
 ZERO_CELSIUS = 273.15
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?(?![0-9.,])")
 _TOKEN = re.compile(r"\s*(?:([A-Za-z_Ω%]{1,24})(?:(?:\^|\*\*)?([+-]?[1-6]))?(?![0-9])|([*/()])|(1)(?![0-9]))")
 _MAX_UNIT = 48
 _LISTED: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
@@ -164,7 +164,7 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
         raise UnitError(f"a text of {len(value)} characters is not a quantity")
     text = value.strip().translate(_DASHES)
     match = _NUMBER.match(text)
-    if match is None or (match.end() < len(text) and text[match.end()] in "0123456789.,"):
+    if match is None:
         hint = "; write a decimal point, not a comma" if re.match(r"[+-]?[0-9]*,[0-9]", text) else ""
         raise UnitError(f"{shown(value)} is not a number with a unit{hint}")
     unit = text[match.end() :].strip()

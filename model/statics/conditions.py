@@ -44,12 +44,6 @@ def unsupported(setup: Setup, load: FloatArray) -> bool:
     return bool(missing > 1e-9)
 
 
-def held_along_one_line(films: Sequence[PadFilm]) -> bool:
-    """Whether nothing holds the journal across its load: all pads with films push along one line."""
-    x, y = np.array([f.normal for f in films if f.forces is not None]).reshape(-1, 2).T
-    return len(x) > 0 and bool(np.max(np.abs(x * y[0] - y * x[0])) < 1e-6)
-
-
 def overloaded_pads(films: Sequence[PadFilm]) -> list[int]:
     """Numbers of the pads whose film is too thin, whose pressure too high or whose oil too hot for a pad to live."""
     numbers = []
@@ -86,9 +80,11 @@ def status_of(
     warmth = [f.work.temperature for f in films if f.forces is not None] or [np.array(_OIL_DATA)]
     low, high = float(np.min(warmth)), float(np.max(warmth))
     cold = low < _OIL_DATA[0]
-    across = not failures and setup.rotational_stiffness == 0.0 and held_along_one_line(films)
+    x, y = np.array([f.normal for f in films if f.forces is not None]).reshape(-1, 2).T
+    is_free = not failures and setup.rotational_stiffness == 0.0
+    on_one_line = bool(np.all(np.abs(x * y[:1] - y * x[:1]) < 1e-6))
     conditions = (
-        (across, named("nothing holds the journal across its load")),
+        (is_free and on_one_line, named("nothing holds the journal across its load")),
         (bool(heavy), named("overloaded pads {pads}", heavy, limits)),
         (bool(idle), named("idle pads {pads}", idle)),
         (back > 0.0, named("flow back at a leading edge")),

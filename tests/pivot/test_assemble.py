@@ -13,7 +13,7 @@ from rigdata.record import VectorRecord
 from tpjb_ident.conditions import sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
-from tpjb_ident.pivot.blocks import Blocks, Hold
+from tpjb_ident.pivot.blocks import Blocks, Hold, sticking
 from tpjb_ident.pivot.dry_record import (
     DryRecord,
     PadDirection,
@@ -32,7 +32,6 @@ from tpjb_ident.pivot.fit import (
     assemble_curve,
     bad_blocks,
     fit_data,
-    sticking,
 )
 from tpjb_ident.pivot.law_fit import LawFit
 from tpjb_ident.pivot.laws import LAWS

@@ -59,7 +59,7 @@ def test_every_pad_has_its_curve_in_order(curves):
         assert abs(curve.displacement_direction.angle) < 0.05
         assert sum(curve.weights) == pytest.approx(1.0)
     np.testing.assert_allclose(curves[2].steps.load, LEVELS, rtol=5e-3)
-    assert len(curves[1].steps.load) == 16
+    assert len(curves[1].steps.load) == 15  # the hold at the top of the run that comes down is no point
     assert curves[1].hysteresis is not None
     assert curves[2].hysteresis is None
 

@@ -152,6 +152,7 @@ def test_a_run_that_begins_at_the_top_begins_where_friction_still_holds_the_load
         assert curve.runs == (f"p-{curve.pad}", f"p-{curve.pad}-down")
         np.testing.assert_allclose(curve.stiffness(AT), stiffness(curve.pad, AT), rtol=0.02)
         assert curve.valid_from < 100.0
+        assert "bad-steps" not in curve.status
 
 
 def test_a_file_of_another_unit_than_the_manifest_states_is_refused(tmp_path):

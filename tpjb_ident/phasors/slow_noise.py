@@ -54,7 +54,7 @@ class NoiseModel:
         centred = time - np.mean(time)
         bent = 2.0 * _BEND * (centred**2 - np.mean(centred**2)) / max(float(np.ptp(time)), 1e-300)
         columns = np.column_stack([self.drift * centred, self.drift * bent, self.walk * _walk_columns(time)])
-        return np.asarray(self.flicker * flicker_kernel(time, duration) + columns @ columns.T)
+        return self.flicker * flicker_kernel(time, duration) + columns @ columns.T
 
     def mean_variance(self, duration: float) -> float:
         """Variance of one average over `duration` seconds about the run's own level [m^2]."""

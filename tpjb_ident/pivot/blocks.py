@@ -30,6 +30,7 @@ _ALIKE = 6.0  # noise standard deviations between two runs of one hold
 _FEWEST = 4  # bins of a hold: 0.16 s, longer in long records
 _FEWEST_SAMPLES = 3  # of a piece
 _MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
+_STICKS_WITHIN = 0.08  # of the load at a reversal: twice the friction of a poor pivot
 _TURN = 0.02  # of the load range: a smaller way back is noise
 
 
@@ -153,9 +154,8 @@ def _edges(time: FloatArray, holds: tuple[Hold, ...], length: float) -> tuple[Fl
     pieces: list[tuple[float, float, int]] = []
     for k, (start, stop) in enumerate(itertools.pairwise(bounds)):
         if stop - start >= 0.4 * length:
-            number, count = k // 2 if k % 2 else -1, max(1, int((stop - start) / length + 1e-6))
-            cuts = start + min(length, stop - start) * np.arange(count + 1)
-            pieces += [(a, b, number) for a, b in itertools.pairwise(cuts)]
+            piece, count = min(length, stop - start), max(1, int((stop - start) / length + 1e-6))
+            pieces += [(start + i * piece, start + (i + 1) * piece, k // 2 if k % 2 else -1) for i in range(count)]
     table = np.array(pieces, dtype=float).reshape(-1, 3)
     return table[:, :2], table[:, 2].astype(int)
 
@@ -177,3 +177,15 @@ def _directions(load: FloatArray) -> IntArray:
         if back <= 0.0 or back > turn:
             farthest = k
     return sense
+
+
+def sticking(load: FloatArray, branch: IntArray) -> BoolArray:
+    """Blocks (m,) just after a reversal of the load, where friction holds the pivot and no law applies.
+
+    A record that begins with unloading begins at a reversal: the load had come up before.
+    """
+    stuck = np.zeros(len(load), dtype=bool)
+    for start in np.flatnonzero(np.diff(branch, prepend=1)).tolist():
+        turn = load[max(start - 1, 0)]
+        stuck[start:] |= np.logical_and.accumulate(np.abs(load[start:] - turn) < _STICKS_WITHIN * abs(turn))
+    return stuck

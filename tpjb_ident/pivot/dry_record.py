@@ -17,7 +17,7 @@ from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import RigDataError, refuse
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import converter_step, live_run, slow_samples, spare_slopes
-from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, cut_blocks, find_holds
+from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, cut_blocks, find_holds, sticking
 from tpjb_ident.pivot.pickup import PickupSignature, measure_pickup
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
     blocks = cut_blocks(time, vectors, holds)
     loose = before_contact(blocks)
     free_load = float(np.max(blocks.load[loose], initial=0.0))
-    blocks = blocks.take(~loose)
+    blocks = blocks.take(~loose & ~sticking(blocks.load, blocks.branch))
     if len(blocks) < _FEWEST_BLOCKS:
         what = f"gives only {len(blocks)} usable averages of {BLOCK:g} s"
         raise _refusal(run, "record", what, "Record for longer")

@@ -54,7 +54,6 @@ GROUPS_ON_RAMP = 15
 CONTACT_TOLERANCE = 0.05  # of the compliance: what incomplete contact may add where contact counts as complete
 _BAD_LIMIT = 5.0  # standard errors
 _MOST_BAD = 0.3  # share of the groups that may be dropped
-_STICKS_WITHIN = 0.08  # of the load at a reversal: twice the friction of a poor pivot
 _ANGLE_WARNING = math.radians(4.0)
 _MISFIT_PROBABILITY = 1e-4
 _CLEAR_CHOICE = 0.5  # posterior share below which the law counts as undecided
@@ -88,9 +87,9 @@ def fit_data(records: Sequence[DryRecord], noise: NoiseModel) -> FitData:
 
 
 def bad_blocks(record: DryRecord, noise: NoiseModel) -> BoolArray:
-    """Blocks (m,) that belong to bad steps, or to a reversal."""
+    """Blocks (m,) that belong to bad steps."""
     groups = _groups(record)
-    bad = sticking(record.blocks.load, record.blocks.branch)
+    bad = ~record.good
     for _ in range(int(_MOST_BAD * len(np.unique(groups)))):
         data = fit_data([replace(record, good=~bad)], noise)
         worst, size = _worst(fit_law(LAWS["spline"], True, data), data, groups[~bad])
@@ -99,18 +98,6 @@ def bad_blocks(record: DryRecord, noise: NoiseModel) -> BoolArray:
         # a hold goes with the ramps on either side: whatever spoilt it need not have kept to its limits
         bad |= np.abs(groups - worst) <= worst % 2
     return bad
-
-
-def sticking(load: FloatArray, branch: IntArray) -> BoolArray:
-    """Blocks (m,) just after a reversal of the load, where friction holds the pivot and no law applies.
-
-    A record that begins with unloading begins at a reversal: the load had come up before.
-    """
-    stuck = np.zeros(len(load), dtype=bool)
-    for start in np.flatnonzero(np.diff(branch, prepend=1)).tolist():
-        turn = load[max(start - 1, 0)]
-        stuck[start:] |= np.logical_and.accumulate(np.abs(load[start:] - turn) < _STICKS_WITHIN * abs(turn))
-    return stuck
 
 
 def _groups(record: DryRecord) -> IntArray:
