@@ -197,7 +197,7 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
         return (choice,) * n
     laws = tuple(choice)
     if len(laws) != n or not all(isinstance(law, PivotLaw) for law in laws):
-        raise BearingError(f"pivots: need one pivot law per pad ({n}), got {len(laws)} entries.")
+        raise BearingError(f"pivots: need {n} pivot laws, one per pad, such as constant_pivot(5e8); got {laws!r:.90}.")
     return laws
 
 
