@@ -128,22 +128,22 @@ def test_a_ramp_is_cut_into_pieces_of_the_length(start):
 
 @pytest.mark.parametrize(
     ("length", "hold", "pieces"),
-    [(0.1, 1.0, 10), (0.1, 0.05, 1), (0.5, 0.19, 0), (0.5, 0.21, 1), (0.5, 0.98, 1), (0.5, 1.0, 2), (0.5, 1.24, 2)],
+    [(0.1, 1.0, 10), (0.1, 0.05, 1), (0.5, 0.19, 0), (0.5, 0.21, 1), (0.5, 0.74, 1), (0.5, 0.76, 2), (0.5, 2.3, 4)],
 )
-def test_holds_have_pieces_of_their_own_as_long_as_asked_or_one_that_is_shorter(length, hold, pieces):
+def test_holds_have_pieces_of_their_own_as_long_as_asked_and_short_ones_lose_nothing(length, hold, pieces):
     time = np.arange(3001) / RATE
     load = np.interp(time, [0, 2, 2 + hold, 6], [0, 1000, 1000, 0])
     blocks = cut_blocks(*samples(load), (Hold(2.0, 2.0 + hold, 1000.0),), length)
     held = blocks.hold == 0
     assert held.sum() == pieces
     if pieces:
-        piece = min(length, hold)
+        piece = length if pieces >= 4 else hold / pieces
         np.testing.assert_allclose(blocks.duration[held], piece, atol=2.1e-3)
         np.testing.assert_allclose(blocks.time[held], 2.0 + piece * (np.arange(pieces) + 0.5), atol=2.1e-3)
     assert (blocks.rate[held] == 0).all()
     assert (blocks.branch[blocks.time < 2.0 + hold] == 1).all()
     assert (blocks.branch[blocks.time > 2.0 + hold + 0.5 * length] == -1).all()
-    np.testing.assert_allclose(blocks.duration[~held], length, rtol=0.1)
+    np.testing.assert_allclose(blocks.duration[~held], length, rtol=0.02)
 
 
 def test_a_level_in_noise_has_the_spread_of_its_mean():
@@ -178,7 +178,7 @@ def test_pieces_hold_whole_periods_of_the_mains():
         pickup = 5e-7 * np.sin(2 * np.pi * mains * time)
         vectors = np.column_stack([np.full_like(time, 500.0), np.zeros_like(time), pickup, pickup])
         blocks = cut_blocks(time, vectors, holds, 0.1)
-        assert np.max(np.abs(blocks.deflection[blocks.hold >= 0])) < 1e-9
+        assert np.max(np.abs(blocks.deflection)) < 1e-9
 
 
 @pytest.mark.parametrize(("held", "seconds"), [(0.0, 440.0), (440.0, 440.0), (220.0, 440.0), (30.0, 40.0)])

@@ -154,7 +154,10 @@ def _edges(time: FloatArray, holds: tuple[Hold, ...], length: float) -> tuple[Fl
     pieces: list[tuple[float, float, int]] = []
     for k, (start, stop) in enumerate(itertools.pairwise(bounds)):
         if stop - start >= 0.4 * length:
-            piece, count = min(length, stop - start), max(1, int((stop - start) / length + 1e-6))
+            count, piece = int((stop - start) / length + 1e-6), length
+            if k % 2 and count < 4:  # the rest of a short hold is too much to lose
+                count = max(1, round((stop - start) / length))
+                piece = (stop - start) / count
             pieces += [(start + i * piece, start + (i + 1) * piece, k // 2 if k % 2 else -1) for i in range(count)]
     table = np.array(pieces, dtype=float).reshape(-1, 3)
     return table[:, :2], table[:, 2].astype(int)
