@@ -1,4 +1,4 @@
-"""Tables: the row a value belongs to, the least and the largest; rising cubics.
+"""Tables: the row a value belongs to, the largest; rising cubics.
 
 numpy's and scipy's would load scipy: 0.3 s and 20 MB of a process that predicts.
 """
@@ -33,15 +33,6 @@ def largest(values: Any) -> float:
     for value in values:
         if not abs(value) <= found and found == found:
             found = abs(value)
-    return found
-
-
-@inner
-def least(values: FloatArray) -> float:
-    """Least of some values, (n,)."""
-    found = values[0]
-    for value in values:
-        found = min(found, value)
     return found
 
 

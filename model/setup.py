@@ -52,7 +52,7 @@ class Setup:
         One per pad.
     thermal : {"isothermal", "adiabatic", "tehd", "thd"}
         "tehd": pads deform. "thd": temperatures across the films, pads that conduct and deform, a journal that passes
-        heat on, grooves, clearances that grow with their temperatures; see `model.statics.cross_heat`.
+        heat on, grooves, clearances that grow with their temperatures; see `model.statics.compiled.cross_heat`.
     mesh : Mesh
     supply_change : float
         The oil enters this much hotter than the bearing file says [K].

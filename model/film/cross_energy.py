@@ -268,9 +268,9 @@ def _set_rows(space: _Space, factor: FloatArray, before: FloatArray) -> None:
                 if 0 <= line < lines and 0 <= cell < cells:  # beyond there is the journal, or nothing
                     share = max(share, theta[line, cell])
                     factor[k, cells + (step if side < 2 else cells * step)] -= share * exchange
+                    before[k, 1 + side] = (1.0 - share) * exchange
                 factor[k, cells] += share * exchange
-                before[k, 1 + side] = (1.0 - share) * exchange
-            before[k, 0] -= before[k, 1] + before[k, 2] + before[k, 3] + before[k, 4]
+                before[k, 0] -= (1.0 - share) * exchange
 
 
 @inner

@@ -55,7 +55,7 @@ class CrossOperator(NamedTuple):
     #: (nt, n, 2 cells + 1): L and U of the balances at the later station, with 1 / U on the diagonal [W/K].
     factor: FloatArray
     #: (nt, n, 5): What the earlier station adds: by the cell itself, the cells below and above, the lines before
-    #: and after.
+    #: and after; nothing beyond the film.
     before: FloatArray
     journal: FloatArray  #: (nt, nz + 1, 2): Exchange with the journal at the earlier and the later station [W/K].
     #: (nt, n): Dissipation [W], and what the balances take from it per kelvin, at the present temperature.
@@ -144,23 +144,22 @@ def _set_eddies(cross: CrossFilm, i: int, j: int, reynolds: float, by_heat: floa
 def _integrals(cross: CrossFilm, i: int, j: int, oil: OilConstants) -> tuple[float, float, float, float]:
     """Mean temperature, f0, e and f2 at a node; its cells' fluidity is set, at the eddies that there are."""
     edges = cross.edges
-    mean, f0, f1, f2 = 0.0, 0.0, 0.0, 0.0
+    mean, f0, f1 = 0.0, 0.0, 0.0
+    oil0, oil1, oil2 = 0.0, 0.0, 0.0  # moments of the oil's own fluidity, without eddies
     for m in range(len(edges) - 1):
-        wide = edges[m + 1] - edges[m]
+        wide, middle = edges[m + 1] - edges[m], 0.5 * (edges[m + 1] + edges[m])
         t = cross.temperature[i, j, m]
         light = np.exp(-oil[1] * (40.0 - t)) / oil[0]
-        light = light / (1.0 + light * cross.eddy[i, j, m])
-        cross.fluidity[i, j, m] = light
+        fluidity = light / (1.0 + light * cross.eddy[i, j, m])
+        cross.fluidity[i, j, m] = fluidity
         mean += wide * t
-        f0 += wide * light
-        f1 += wide * light * 0.5 * (edges[m + 1] + edges[m])
+        f0 += wide * fluidity
+        f1 += wide * fluidity * middle
+        oil0 += wide * light
+        oil1 += wide * light * middle
+        oil2 += wide * light * (middle * middle + wide * wide / 12.0)
     centre = f1 / f0
-    for m in range(len(edges) - 1):
-        wide = edges[m + 1] - edges[m]
-        away = 0.5 * (edges[m + 1] + edges[m]) - centre
-        light = cross.fluidity[i, j, m] / (1.0 - cross.fluidity[i, j, m] * cross.eddy[i, j, m])
-        f2 += wide * light * (away * away + wide * wide / 12.0)
-    return mean, f0, centre, f2
+    return mean, f0, centre, oil2 - centre * (2.0 * oil1 - centre * oil0)
 
 
 @compiled

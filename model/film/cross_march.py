@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.cross_film import CrossOperator
-from model.film.dense import nearest, product
+from model.film.dense import product, residual, times
 from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
@@ -16,54 +18,64 @@ _STEPS = 12
 _BOUNDLESS = 1e30
 
 
+def _marching(count: int) -> Any:
+    """`march_cross` for three fields, or one: numbers that do not wait for one another cost little more than one."""
+    one, other = 1 % count, 2 % count
+
+    @inner
+    def march_fields(operator: CrossOperator, fields: FloatArray, sources: FloatArray) -> FloatArray:
+        n, (lines, cells) = fields.shape[1], operator.carried.shape
+        heat_flow = np.zeros(count)
+        for i in range(operator.factor.shape[0]):
+            band, before, journal = operator.factor[i], operator.before[i], operator.journal[i]
+            old, new = fields[i], fields[i + 1]
+            for k in range(n):
+                weight = before[k, 0]
+                a, b, c = weight * old[k, 0] + sources[i, k], weight * old[k, one], weight * old[k, other]
+                for side in range(4):
+                    step = (1 if side < 2 else cells) * (2 * (side % 2) - 1)
+                    weight, r = before[k, 1 + side], min(max(k + step, 0), n - 1)
+                    a, b, c = a + weight * old[r, 0], b + weight * old[r, one], c + weight * old[r, other]
+                if (k + 1) % cells == 0:  # beside a journal that is a kelvin warm for the third field
+                    c += journal[k // cells, 0] + journal[k // cells, 1]
+                for s in range(min(cells, k), 0, -1):
+                    weight, r = band[k, cells - s], k - s
+                    a, b, c = a - weight * new[r, 0], b - weight * new[r, one], c - weight * new[r, other]
+                new[k, 0] = a
+                if count == 3:
+                    new[k, 1], new[k, 2] = b, c
+            for k in range(n - 1, -1, -1):
+                a, b, c = new[k, 0], new[k, one], new[k, other]
+                for s in range(min(cells, n - 1 - k), 0, -1):
+                    weight, r = band[k, cells + s], k + s
+                    a, b, c = a - weight * new[r, 0], b - weight * new[r, one], c - weight * new[r, other]
+                new[k, 0] = a * band[k, cells]
+                if count == 3:
+                    new[k, 1], new[k, 2] = b * band[k, cells], c * band[k, cells]
+            for j in range(lines):
+                k = j * cells + cells - 1
+                for q in range(count):
+                    heat_flow[q] += journal[j, 0] * old[k, q] + journal[j, 1] * new[k, q]
+                if count == 3:
+                    heat_flow[2] -= journal[j, 0] + journal[j, 1]
+        return heat_flow
+
+    return march_fields
+
+
+_march_one, _march_three = _marching(1), _marching(3)
+
+
 @compiled
 def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray) -> FloatArray:
     """March temperature fields: of oil that enters as `fields` say; the first with sources, the third beside a journal.
 
     The equation is linear: the three are the answers to sources, to a kelvin of the inlet, and of the journal. One
-    alone is that of the sources. What does not wait for one another costs little more than one.
+    alone is that of the sources.
 
     `fields` (nt + 1, n, 1 or 3) [degC], `sources` (nt, n) [W]; gives what the journal takes of each [W].
     """
-    n, count, cells = fields.shape[1], fields.shape[2], operator.carried.shape[1]
-    heat_flow = np.zeros(count)
-    for i in range(operator.factor.shape[0]):
-        band, before, journal = operator.factor[i], operator.before[i], operator.journal[i]
-        old, new = fields[i], fields[i + 1]
-        for k in range(n):
-            m, from_journal = k % cells, 0.0
-            if m == cells - 1 and count == 3:
-                from_journal = before[k, 2] + journal[k // cells, 1]
-            for q in range(count):
-                value = before[k, 0] * old[k, q]
-                if q == 0:
-                    value += sources[i, k]
-                if q == count - 1:
-                    value += from_journal
-                if m > 0:
-                    value += before[k, 1] * old[k - 1, q]
-                if m < cells - 1:
-                    value += before[k, 2] * old[k + 1, q]
-                if k >= cells:
-                    value += before[k, 3] * old[k - cells, q]
-                if k + cells < n:
-                    value += before[k, 4] * old[k + cells, q]
-                for s in range(max(0, cells - k), cells):
-                    value -= band[k, s] * new[k - cells + s, q]
-                new[k, q] = value
-        for k in range(n - 1, -1, -1):
-            for q in range(count):
-                value = new[k, q]
-                for s in range(cells + 1, cells + 1 + min(cells, n - 1 - k)):
-                    value -= band[k, s] * new[k - cells + s, q]
-                new[k, q] = value * band[k, cells]
-        for j in range(journal.shape[0]):
-            k = j * cells + cells - 1
-            for q in range(count):
-                heat_flow[q] += journal[j, 0] * old[k, q] + journal[j, 1] * new[k, q]
-            if count == 3:
-                heat_flow[2] -= journal[j, 0] + journal[j, 1]
-    return heat_flow
+    return _march_three(operator, fields, sources) if fields.shape[2] == 3 else _march_one(operator, fields, sources)
 
 
 @compiled
@@ -107,36 +119,30 @@ def conduct(
 ) -> float:
     """Change temperatures so that the pad takes what it conducts at its face's new temperature, not at its old one.
 
-    By how much the pad's coarser nodes change is found by GMRES: Y. Saad, SIAM J. Sci. Comput. 14 (1993) 461.
+    By how much the pad's coarser nodes change is found by GMRES.
 
     `missing` (nt + 1, nz + 1) [K].
     """
     flux, to_coarse, guess = pad
-    rhs = np.dot(to_coarse, missing.copy().ravel())
-    limit = tolerance * tolerance * np.dot(rhs, rhs)
-    size = rhs.size
-    shape = missing.shape
-    steps = np.empty((_STEPS, size))
-    images = np.empty((_STEPS, size))
-    faces = np.empty((_STEPS, *shape))
+    rhs = times(to_coarse, missing.reshape(-1))
+    limit = tolerance * np.sqrt(product(rhs, rhs))
+    steps = np.empty((_STEPS, rhs.size))
+    images = np.empty((_STEPS, rhs.size))
+    faces = np.empty((_STEPS, missing.shape[0], missing.shape[1]))
     fields = np.empty((_STEPS, *answer[0].shape))
     heat_flow = np.empty(_STEPS)
     weights = np.empty((_STEPS, 1))
-    residual = rhs.copy()
+    left = rhs.copy()
     count = 0
-    for k in range(_STEPS):
-        steps[k] = np.dot(guess, residual)
-        steps[k] /= np.sqrt(np.dot(steps[k], steps[k]))
-        heat_flow[k] = _conducted(film, operator, np.dot(flux, steps[k]), fields[k], faces[k])
-        images[k] = steps[k] - np.dot(to_coarse, faces[k].ravel())
-        if not product(images[k], images[k]) < _BOUNDLESS:
+    while count < _STEPS:
+        step = times(guess, left)
+        steps[count] = step / np.sqrt(product(step, step))
+        heat_flow[count] = _conducted(film, operator, times(flux, steps[count]), fields[count], faces[count])
+        images[count] = steps[count] - times(to_coarse, faces[count].reshape(-1))
+        if not product(images[count], images[count]) < _BOUNDLESS:
             return np.nan
-        count = k + 1
-        nearest(images, count, rhs, 1e-13, weights)
-        residual[:] = rhs
-        for r in range(count):
-            residual -= weights[r, 0] * images[r]
-        if np.dot(residual, residual) < limit:
+        count += 1
+        if residual(images, count, rhs, weights, left) < limit:
             break
     more = 0.0
     for k in range(count):
@@ -161,6 +167,6 @@ def _conducted(
     sources[:, :: len(edges) - 1] = -station_heat(grid, heat)
     fields = field.reshape((*field.shape, 1))
     field[0] = 0.0
-    heat_flow = march_cross(operator, fields, sources)
+    heat_flow = _march_one(operator, fields, sources)
     face_temperature(work, edges, conductivity, field, heat, face)
     return heat_flow[0]

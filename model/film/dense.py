@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from model.compilation import inner
@@ -59,12 +61,34 @@ def nearest(images: FloatArray, count: int, right: FloatArray, apart: float, wei
 
 
 @inner
+def residual(images: FloatArray, count: int, right: FloatArray, weights: FloatArray, left: FloatArray) -> float:
+    """What the first images leave of a vector (n,) with the weights nearest to it, into `left`; its size.
+
+    A step of GMRES: Y. Saad, SIAM J. Sci. Comput. 14 (1993) 461.
+    """
+    nearest(images, count, right, 1e-13, weights)
+    left[:] = right
+    for r in range(count):
+        left -= weights[r, 0] * images[r]
+    return math.sqrt(product(left, left))
+
+
+@inner
 def product(one: FloatArray, other: FloatArray) -> float:
     """Sum of products."""
     total = 0.0
     for q in range(len(one)):
         total += one[q] * other[q]
     return total
+
+
+@inner
+def times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
+    """Product with a vector; numpy's own would load scipy, 27 MB."""
+    out = np.empty(len(matrix))
+    for i in range(len(out)):
+        out[i] = product(matrix[i], vector)
+    return out
 
 
 @inner

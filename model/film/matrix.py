@@ -89,25 +89,26 @@ def _substitution_of_four(known: int | None) -> Any:
     """`substitute_four` for one width, see `_substitution`."""
 
     @inner
-    def substitute_four_bands(band: FloatArray, x: FloatArray) -> None:
+    def substitute_four_bands(band: FloatArray, x: Any, first: int) -> None:
         n, width = band.shape[0], band.shape[1] - 1 if known is None else known
+        second, third, fourth = first + 1, first + 2, first + 3
         for k in range(1, n):
-            a, b, c, d = x[k, 0], x[k, 1], x[k, 2], x[k, 3]
+            a, b, c, d = x[k, first], x[k, second], x[k, third], x[k, fourth]
             for r in range(width, 0, -1):
                 if r <= k:
                     f = band[k - r, r]
-                    a, b = a - f * x[k - r, 0], b - f * x[k - r, 1]
-                    c, d = c - f * x[k - r, 2], d - f * x[k - r, 3]
-            x[k, 0], x[k, 1], x[k, 2], x[k, 3] = a, b, c, d
+                    a, b = a - f * x[k - r, first], b - f * x[k - r, second]
+                    c, d = c - f * x[k - r, third], d - f * x[k - r, fourth]
+            x[k, first], x[k, second], x[k, third], x[k, fourth] = a, b, c, d
         for k in range(n - 1, -1, -1):
             inverse = 1.0 / band[k, 0]
-            a, b, c, d = x[k, 0] * inverse, x[k, 1] * inverse, x[k, 2] * inverse, x[k, 3] * inverse
+            a, b, c, d = x[k, first] * inverse, x[k, second] * inverse, x[k, third] * inverse, x[k, fourth] * inverse
             for r in range(width, 0, -1):
                 if k + r < n:
                     f = band[k, r]
-                    a, b = a - f * x[k + r, 0], b - f * x[k + r, 1]
-                    c, d = c - f * x[k + r, 2], d - f * x[k + r, 3]
-            x[k, 0], x[k, 1], x[k, 2], x[k, 3] = a, b, c, d
+                    a, b = a - f * x[k + r, first], b - f * x[k + r, second]
+                    c, d = c - f * x[k + r, third], d - f * x[k + r, fourth]
+            x[k, first], x[k, second], x[k, third], x[k, fourth] = a, b, c, d
 
     return substitute_four_bands
 
@@ -117,7 +118,7 @@ def _for_any_width(make: Any) -> Any:
     six, four, other = make(6), make(4), make(None)
 
     @inner
-    def for_any_width(band: FloatArray, *right: FloatArray) -> None:
+    def for_any_width(band: FloatArray, *right: Any) -> None:
         if band.shape[1] == 7:
             six(band, *right)
         elif band.shape[1] == 5:
@@ -132,27 +133,18 @@ def _for_any_width(make: Any) -> Any:
 factorise = _for_any_width(_factoriser)
 #: Solve for one right-hand side in place, with the factor from `factorise`: `band` (n, width + 1), `x` (n,).
 substitute = _for_any_width(_substitution)
-#: The same for the four derivatives side by side, `x` (n, 4): the inner loop fills a vector register.
+#: The same for four side by side, `x` (n, m) from one column on: the inner loop fills a vector register.
 substitute_four = _for_any_width(_substitution_of_four)
 
 
 @inner
-def substitute_many(band: FloatArray, x: FloatArray) -> None:
-    """`substitute` for any number of right-hand sides, (n, m): `band` (n, width + 1), `x` (n, m)."""
-    n, width, columns = band.shape[0], band.shape[1] - 1, x.shape[1]
-    for k in range(n):
-        for r in range(1, min(width, n - 1 - k) + 1):
-            factor = band[k, r]
-            for m in range(columns):
-                x[k + r, m] -= factor * x[k, m]
-    for k in range(n - 1, -1, -1):
-        pivot = 1.0 / band[k, 0]
-        for m in range(columns):
-            x[k, m] *= pivot
-        for r in range(1, min(width, n - 1 - k) + 1):
-            factor = band[k, r]
-            for m in range(columns):
-                x[k, m] -= factor * x[k + r, m]
+def substitute_many(band: FloatArray, x: Any) -> None:
+    """`substitute` for any number of right-hand sides: `band` (n, width + 1), `x` (n, m)."""
+    fours = x.shape[1] // 4 * 4
+    for m in range(0, fours, 4):
+        substitute_four(band, x, m)
+    for m in range(fours, x.shape[1]):
+        substitute(band, x[:, m])
 
 
 @inner

@@ -7,9 +7,9 @@ from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork, Wedge
 from model.film.reynolds import FilmForces, solve_film
 
-SWIFT_STIEBER, _JFO, _TURBULENT = range(3)
+SWIFT_STIEBER, _JFO, TURBULENT = range(3)
 #: Names, and by what compiled loops know them.
-FILM_MODELS = {"swift-stieber": SWIFT_STIEBER, "jfo": _JFO, "turbulent": _TURBULENT}
+FILM_MODELS = {"swift-stieber": SWIFT_STIEBER, "jfo": _JFO, "turbulent": TURBULENT}
 
 
 @inner
@@ -31,4 +31,4 @@ def solve_by(
         return solve_film(grid, work, wedge, speed, sharp, None, sharp)
     if model == _JFO:
         return solve_film_jfo(grid, work, wedge, speed, sharp, (1.0, supplied))
-    return solve_film(grid, work, wedge, speed, sharp, model == _TURBULENT, sharp)
+    return solve_film(grid, work, wedge, speed, sharp, model == TURBULENT, sharp)

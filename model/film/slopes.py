@@ -85,7 +85,7 @@ def derivatives(grid: FilmGrid, work: FilmWork, faces: Faces) -> None:
         rhs[k, 2] = squeeze * grid.cos_face[1, n]
         rhs[k, 3] = squeeze * grid.sin_face[1, n]
     keep_ruptured(grid, work, rhs)
-    substitute_four(work.band, rhs)
+    substitute_four(work.band, rhs, 0)
 
 
 @compiled
@@ -95,16 +95,22 @@ def shape_slopes(grid: FilmGrid, work: FilmWork, conductance: FloatArray, shapes
     `shapes` (nt + 1, nz + 1, m) [m], real or complex; gives (unknowns, m) [Pa per unit].
     """
     p, h, count = work.pressure.reshape(-1), work.thickness.reshape(-1), shapes.shape[2]
-    flow, shape = work.flow, shapes.reshape((len(p), count))
+    shape, line = shapes.reshape((len(p), count)), grid.steps[0]
     slopes = np.empty((len(work.unknown), count), dtype=shapes.dtype)
-    changes = np.empty(flow.shape, dtype=shapes.dtype)
-    for m in range(count):
-        for side in range(2):
-            step = grid.steps[side]
-            for n in range(len(p) - step):
-                slope = flow[side, n] - 2.0 * conductance[side, n] * (p[n + step] - p[n])
-                changes[side, n] = slope * (shape[n, m] + shape[n + step, m]) / (h[n] + h[n + step])
-        net_inflow(grid, changes, slopes[:, m])
+    thicker = np.empty(work.flow.shape)  # what flows through a face per metre that both its nodes grow thicker
+    for side in range(2):
+        step = grid.steps[side]
+        for n in range(len(p) - step):
+            driven = conductance[side, n] * (p[n + step] - p[n])
+            thicker[side, n] = (work.flow[side, n] - 2.0 * driven) / (h[n] + h[n + step])
+    along, beside = thicker
+    for k in range(len(slopes)):
+        n = grid.node[k]
+        for m in range(count):  # side by side in memory
+            inflow = along[n - line] * (shape[n - line, m] + shape[n, m])
+            inflow -= along[n] * (shape[n, m] + shape[n + line, m])
+            inflow += beside[n - 1] * (shape[n - 1, m] + shape[n, m])
+            slopes[k, m] = inflow - beside[n] * (shape[n, m] + shape[n + 1, m])
     keep_ruptured(grid, work, slopes)
     substitute_many(work.band, slopes)
     return slopes

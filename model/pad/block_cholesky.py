@@ -11,8 +11,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky
-from scipy.linalg.blas import dgemm, dsyrk, dtrsm
 
 from rigdata.arrays import BoolArray, FloatArray
 
@@ -44,6 +42,8 @@ class SlabMatrix:
 
 def factor(matrix: SlabMatrix) -> Iterator[ElementFactor]:
     """Factor a positive definite matrix K = L L^T."""
+    from scipy.linalg import blas, cholesky  # 27 MB that a process with stored solutions does without
+
     width, corner = matrix.held.shape[1], np.zeros((0, 0))
     for slabs in matrix.elements:
         block = matrix.block(slabs, slabs).T
@@ -51,8 +51,8 @@ def factor(matrix: SlabMatrix) -> Iterator[ElementFactor]:
         across = np.zeros((len(block), 0))
         if slabs.start:
             coupling = matrix.block(slabs, slice(slabs.start - 1, slabs.start))
-            across = dtrsm(1.0, corner, coupling, side=1, lower=1, trans_a=1)
-            block = dsyrk(-1.0, across, 1.0, block, lower=1, overwrite_c=1)
+            across = blas.dtrsm(1.0, corner, coupling, side=1, lower=1, trans_a=1)
+            block = blas.dsyrk(-1.0, across, 1.0, block, lower=1, overwrite_c=1)
         lower = cholesky(block, lower=True, overwrite_a=True, check_finite=False)
         corner = lower[-width:, -width:]
         yield lower, across
@@ -60,25 +60,29 @@ def factor(matrix: SlabMatrix) -> Iterator[ElementFactor]:
 
 def forward(factors: Iterable[ElementFactor], rhs: Iterable[FloatArray]) -> Iterator[FloatArray]:
     """Solve L Y = B, element by element; later blocks of B, in columns and taken over, may be wider."""
+    from scipy.linalg import blas
+
     solution = np.zeros((0, 0))
     for (lower, across), block in zip(factors, rhs, strict=True):
         width = solution.shape[1]
         if width:
             last = solution[-across.shape[1] :]
-            block[:, :width] = dgemm(-1.0, across, last, 1.0, block[:, :width], overwrite_c=1)
-        solution = dtrsm(1.0, lower, block, lower=1, overwrite_b=1)
+            block[:, :width] = blas.dgemm(-1.0, across, last, 1.0, block[:, :width], overwrite_c=1)
+        solution = blas.dtrsm(1.0, lower, block, lower=1, overwrite_b=1)
         yield solution
 
 
 def solve(matrix: SlabMatrix, rhs: FloatArray) -> FloatArray:
     """Solve K X = B: `rhs` (n, m, n_columns); here the whole factor is held."""
+    from scipy.linalg import blas
+
     factors = list(factor(matrix))
     width, n_columns = rhs.shape[1:]
     columns = (np.array(rhs[slabs].reshape(-1, n_columns), order="F") for slabs in matrix.elements)
     blocks = list(forward(factors, columns))
     for i in reversed(range(len(factors))):
         lower, across = factors[i]
-        blocks[i] = dtrsm(1.0, lower, blocks[i], lower=1, trans_a=1)
+        blocks[i] = blas.dtrsm(1.0, lower, blocks[i], lower=1, trans_a=1)
         if i:
             blocks[i - 1][-width:] -= across.T @ blocks[i]
     return np.concatenate(blocks).reshape(rhs.shape)

@@ -72,5 +72,5 @@ def bodies_of(setup: Setup, case: Case, films: Sequence[PadFilm]) -> BodyStack |
         return None
     bodies = tuple(f.deformation for f in films if f.deformation is not None)
     factor = setup.bending_factor if setup.flexible_pads else 0.0
-    conducting = case.thermal == COUPLED and setup.options.conduction
+    conducting = case.thermal == ACROSS or (case.thermal == COUPLED and setup.options.conduction)
     return stacked_bodies(bodies, films[0].grid.first, factor, conducting)

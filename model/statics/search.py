@@ -11,41 +11,21 @@ import numpy as np
 
 from model.conditions import named
 from model.film.attitudes import BETWEEN, attitudes
-from model.film.cross_film import CrossOperator, set_cross_viscosity
 from model.film.following_heat import heat_impedance
 from model.film.oil_state import set_viscosity
 from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces, solve_film
 from model.growth import grown
-from model.pad.bending import SHAPES
 from model.pad.pivot import OTHER
 from model.pivots import ask_laws, encoded
 from model.setup import Setup
+from model.statics.compiled import iteration
 from model.statics.compiled.case import ALONE, COUPLED, ISOTHERMAL, Problem
-from model.statics.compiled.iteration import (
-    ASKS_HEAT,
-    ASKS_LAWS,
-    ASKS_OIL,
-    ASKS_STABLE,
-    BOUNDLESS_HEAT,
-    FILM_LOST,
-    HEAT,
-    ITERATION,
-    RELAXED,
-    RESIDUAL,
-    SETTLED,
-    SINGULAR,
-    STABLE,
-    Memory,
-    fresh_memory,
-    iterate,
-    vector_size,
-)
-from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place, rescue
-from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState
+from model.statics.compiled.cross_heat import across_of, set_cross_viscosities, settle_cross_temperatures
+from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place_pads, rescue
+from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PAD, PadStack, SearchState
 from model.statics.compiled.start import first_position, pivot_curve
 from model.statics.conditions import status_of
-from model.statics.cross_heat import settle_cross_temperatures
 from model.statics.equilibrium import Begun, Equilibrium
 from model.statics.pad_film import axial_shape, pad_films
 from model.statics.pad_flow import through_flow
@@ -53,15 +33,17 @@ from model.statics.physics import bodies_of, case_of, couples_heat, running_of
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Condition
 
-_FAILURES = {FILM_LOST: "film lost", BOUNDLESS_HEAT: "heat without bounds", SINGULAR: "singular"}
+_FAILURES = {
+    iteration.FILM_LOST: "film lost",
+    iteration.BOUNDLESS_HEAT: "heat without bounds",
+    iteration.SINGULAR: "singular",
+}
 #: A pad that tilts by this share of the largest tilt in the last step swings, too.
 _SWINGING = 0.3
 #: Share of the clearance that tells a place from a fold.
 _EVEN = 1e-6
 #: Share to which a film whose heat follows is known, where only the sign of a determinant is asked for.
 _TOLD = 1e-4
-#: Rows of a pad's loaded attitudes at most.
-_ROWS = 400
 
 
 class Search:
@@ -80,58 +62,54 @@ class Search:
         self.running = running_of(setup, speed * setup.bearing.journal_radius, heat)
         self.case = case_of(setup, self.load, self.running, heat)
         self.bodies = bodies_of(setup, self.case, self.films)
-        self.pads = self._pads()
+        self.stack = self._pads()
+        self.pads = self.stack.each
+        self.across = None
+        if self.crosses is not None:
+            bodies = [f.deformation for f in self.films if f.deformation is not None]
+            self.across = across_of(self.crosses, bodies, self.pads["clearance"], setup.bearing.oil.conductivity)
         self.state = self._state()
 
     def _pads(self) -> PadStack:
-        films, count = self.films, len(self.films)
-        frame = np.array([(f.normal, f.tangent) for f in films])
-        numbers = [(f.preload_distance, f.pivot_radius, f.pad.pad_clearance) for f in films]
-        preload, radius, clearance = np.array(numbers, dtype=float).T.copy()
-        angles = [f.pad.pivot_angle % (2.0 * math.pi) for f in films]
-        flattest = np.array([-math.inf if f.pad.leading_edge_pressure else 0.0 for f in films])
+        films, supply = self.films, self.case.supply
+        each = np.zeros(len(films), PAD)
         laws, curves = encoded(self.setup.pivots)
-        return PadStack(
-            frame, preload, radius, clearance, np.argsort(angles, kind="stable"), laws, curves,
-            np.zeros((count, 4, _ROWS)), flattest, np.zeros(count, dtype=np.int64),
-        )  # fmt: skip
+        numbers: dict[str, Any] = {
+            "frame": [(f.normal, f.tangent) for f in films],
+            "preload": [f.preload_distance for f in films],
+            "pivot_radius": [f.pivot_radius for f in films],
+            "clearance": [f.pad.pad_clearance for f in films],
+            "law": laws,
+            "flattest": [-math.inf if f.pad.leading_edge_pressure else 0.0 for f in films],
+            "supplied": math.inf,
+            "inlet": supply,
+            "resting": math.nan,
+            "heating": math.inf,
+        }
+        for name, values in numbers.items():
+            each[name] = values
+        angles = [f.pad.pivot_angle % (2.0 * math.pi) for f in films]
+        return PadStack(each, np.argsort(angles, kind="stable"), curves)
 
-    def _state(self) -> PadState:
-        n = len(self.films)
+    def _state(self) -> SearchState:
         works, crosses = self.works, self.crosses
-        bends = self.setup.flexible_pads or self.case.axial
-        shape = works.extra.shape
         faces, warmth = (works.temperature,) * 2 if crosses is None else (crosses.face, crosses.temperature)
-        bent = np.zeros(shape if bends else (n, 0, 0))
-        axial = np.zeros(n)
+        bends = self.setup.flexible_pads or self.case.axial
+        bent = np.zeros(works.extra.shape if bends else (len(self.films), 0, 0))
         if self.case.axial:
             if not any(self.case.hold):  # nothing holds it: that is nearly there
                 lean, toward = self.setup.misalignment
-                axial[:] = [lean * math.cos(f.pad.pivot_angle - toward) for f in self.films]  # along the shaft
-            for film, tilt in zip(self.films, axial.tolist(), strict=True):
+                # along the shaft
+                self.pads["axial"] = [lean * math.cos(f.pad.pivot_angle - toward) for f in self.films]
+            for film, tilt in zip(self.films, self.pads["axial"].tolist(), strict=True):
                 film.work.extra[:] += tilt * axial_shape(film.grid)
-        zeros: dict[str, Any] = {name: np.zeros(n) for name in ("tilt", "deflection", "passed", "least")}
-        zeros |= {name: np.zeros((n, 2)) for name in ("wedge", "force", "corrected", "felt", "moves")}
-        zeros |= {name: np.zeros((n, 2, 2)) for name in ("stiffness", "damping", "felt_stiffness")}
-        return PadState(
-            **zeros,
+        return SearchState(
             position=np.zeros(2),
-            axial=axial,
-            supplied=np.full(n, math.inf),
-            idle=np.zeros(n, dtype=np.bool_),
-            solved=np.zeros(n, dtype=np.bool_),
-            rescues=np.zeros(n, dtype=np.int64),
-            inlet=np.full(n, self.case.supply),
-            resting=np.full((n, 4), math.nan),
-            steps=np.zeros(n, dtype=np.int64),
-            heating=np.full(n, math.inf),
             shift=np.zeros_like(works.unknown),
             bent=bent,
             mismatch=np.zeros_like(bent),
-            amplitude=np.zeros((n, SHAPES, 3)),
-            axial_step=np.zeros((n, 3)),
             faces=faces,
-            warmth=warmth.reshape(n, -1),
+            warmth=warmth.reshape(len(self.films), -1),
             figures=np.array([math.nan, self.case.supply, 0.0, 0.0]),
         )
 
@@ -143,47 +121,46 @@ class Search:
         viscosity = float(bearing.oil.viscosity(supply))
         pads, alike = self.pads, dict[tuple[int, float, int], int]()
         for m, film in enumerate(self.films):
-            clearance, law = float(pads.clearance[m]), self.setup.pivots[m]
+            clearance, law = float(pads["clearance"][m]), self.setup.pivots[m]
             first = alike.setdefault((id(film.grid), clearance, id(law)), m)
             if first < m:
-                pads.rows[m], pads.attitudes[m] = pads.rows[first], pads.attitudes[first]
+                pads["rows"][m], pads["attitudes"][m] = pads["rows"][first], pads["attitudes"][first]
                 self.rises.append(self.rises[first])
                 continue
             curve = attitudes(film.grid, clearance, running, supply, load)
             unit = viscosity * running.speed * size / clearance**2
             gives = np.empty(0)
-            if pads.laws[m, 0] == OTHER:
+            if pads["law"][m, 0] == OTHER:
                 gives = np.array([law.deflection(w) for w in (curve.load * unit).tolist()])
-            pads.rows[m] = pivot_curve(
-                curve[:3], (clearance, unit), pads.laws[m], pads.curves[m], gives, pads.attitudes[m]
-            )
-            self.rises.append((len(curve.load) - int(pads.rows[m]), curve.rise))
+            pivot = pads["law"][m], self.stack.curves[m]
+            pads["rows"][m] = pivot_curve(curve[:3], (clearance, unit), pivot, gives, pads["attitudes"][m])
+            self.rises.append((len(curve.load) - int(pads["rows"][m]), curve.rise))
 
     def stand(self) -> Search:
         """Put journal and pads where the curves carry the load, and films as warm as they are there; returns itself."""
         self._find_curves()
         pads, state = self.pads, self.state
         state.position[:], loaded, self.other = first_position(self.case.load, pads)
-        state.idle[:] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
-        self.idle_by_curves = int(state.idle.sum())
+        pads["idle"] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
+        self.idle_by_curves = int(pads["idle"].sum())
         self.load_pads(loaded)
-        begun = (state.position, state.tilt, state.deflection, self.works.temperature)
+        begun = (state.position, pads["tilt"], pads["deflection"], self.works.temperature)
         self.begun = Begun(*(values.copy() for values in begun))
         for values in self.begun[1:]:
             values[~loaded] = math.nan
-        if np.any(pads.rows < 2):  # the place is of none that carries without a curve
+        if np.any(pads["rows"] < 2):  # the place is of none that carries without a curve
             self.begun.position[:] = math.nan
         return self
 
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
-        pads, state = self.pads, self.state
-        reach = pads.preload + pads.frame[:, 0] @ state.position
+        pads, position = self.pads, self.state.position
+        place_pads(pads, self.works, loaded, position)
+        if self.case.thermal == ISOTHERMAL:
+            return
+        reach = pads["preload"] + pads["frame"][:, 0] @ position
         for m in np.flatnonzero(loaded).tolist():
-            place(pads, self.works, state, m)
-            if self.case.thermal == ISOTHERMAL:
-                continue
-            curve = pads.attitudes[m, 0, : pads.rows[m]]
+            curve = pads["attitudes"][m, 0, : pads["rows"][m]]
             (low, rises), film, temperature = self.rises[m], self.films[m], self.works.temperature[m]
             point = np.interp(reach[m], curve, np.arange(len(curve)))
             if np.isnan(point):  # a search that has run away: its status says so
@@ -191,7 +168,7 @@ class Search:
             row = min(int((low + point) / BETWEEN), len(rises) - 2)
             part = (low + point) / BETWEEN - row
             along, across = _spread(rises.shape[1:], temperature.shape, film.grid.first == 1)
-            temperature[:] = state.inlet[m] + along @ ((1.0 - part) * rises[row] + part * rises[row + 1]) @ across
+            temperature[:] = pads["inlet"][m] + along @ ((1.0 - part) * rises[row] + part * rises[row + 1]) @ across
             if film.cross is not None:
                 film.cross.temperature[:] = temperature[:, :, None]
                 film.cross.face[:] = temperature
@@ -199,14 +176,14 @@ class Search:
     def margins(self) -> FloatArray:
         """How far pads are above the folds of their curves, as shares of their clearances, (n,)."""
         pads = self.pads
-        reach = pads.preload + pads.frame[:, 0] @ self.state.position
-        folds = np.where(pads.rows >= 2, pads.attitudes[:, 0, 0], math.inf)
-        return np.asarray((reach - folds) / pads.clearance)
+        reach = pads["preload"] + pads["frame"][:, 0] @ self.state.position
+        folds = np.where(pads["rows"] >= 2, pads["attitudes"][:, 0, 0], math.inf)
+        return np.asarray((reach - folds) / pads["clearance"])
 
     def let_idle(self, numbers: list[int]) -> None:
         """Let pads (from 0) carry nothing."""
-        self.state.idle[numbers] = True
-        self.state.tilt[numbers] = self.state.deflection[numbers] = 0.0
+        self.pads["idle"][numbers] = True
+        self.pads["tilt"][numbers] = self.pads["deflection"][numbers] = 0.0
 
     def even_films(self) -> list[int]:
         """Numbers of idle pads that stand at a fold without load, concentric: their films count, as they are there.
@@ -214,11 +191,15 @@ class Search:
         Neither loaded nor loose, such a film has no pressure, and answers a small motion like one that is full.
         """
         pads, even = self.pads, []
-        for m in np.flatnonzero(self.state.idle & (np.abs(self.margins()) < _EVEN)).tolist():
+        for m in np.flatnonzero(pads["idle"] & (np.abs(self.margins()) < _EVEN)).tolist():
             film = self.films[m]
-            if film.rupture == "swift-stieber" and self.case.thermal == ISOTHERMAL and pads.attitudes[m, 3, 0] == 0.0:
+            if (
+                film.rupture == "swift-stieber"
+                and self.case.thermal == ISOTHERMAL
+                and pads["attitudes"][m, 3, 0] == 0.0
+            ):
                 film.work.ruptured[:] = False
-                wedge = (float(pads.clearance[m]), float(pads.attitudes[m, 1, 0]), 0.0)
+                wedge = (float(pads["clearance"][m]), float(pads["attitudes"][m, 1, 0]), 0.0)
                 set_viscosity(film.work, self.case.running.oil)
                 film.forces = solve_film(film.grid, film.work, wedge, self.running.speed, False)
                 even.append(film.number)
@@ -226,7 +207,7 @@ class Search:
 
     def start_from(self, start: Equilibrium) -> bool:
         """Take over a neighbour's state, moved as the curves are; False if it has none or its mesh does not fit."""
-        coupled, state = couples_heat(self.setup), self.state
+        coupled, pads, state = couples_heat(self.setup), self.pads, self.state
         mesh = self.works.pressure.shape
         if not start.converged or mesh != (len(start.films), *start.films[0].work.pressure.shape):
             return False
@@ -237,15 +218,15 @@ class Search:
         shift = Begun(*(np.nan_to_num(new - old) for new, old in zip(moved, start.begun, strict=True)))
         for m, (film, other) in enumerate(zip(self.films, start.films, strict=True)):
             if self.case.mixing and math.isfinite(self.case.fresh):
-                state.passed[m] = through_flow(other)[1]
+                pads["passed"][m] = through_flow(other)[1]
             as_curves_say = other.idle == math.isnan(start.begun.tilt[m])
-            if known and as_curves_say and state.idle[m] != other.idle:
+            if known and as_curves_say and pads["idle"][m] != other.idle:
                 continue  # the neighbour's pad does as its curve says: so does this one
-            state.idle[m] = other.idle
-            state.tilt[m] = other.tilt + shift.tilt[m]
-            state.deflection[m] = other.deflection + shift.deflection[m]
+            pads["idle"][m] = other.idle
+            pads["tilt"][m] = other.tilt + shift.tilt[m]
+            pads["deflection"][m] = other.deflection + shift.deflection[m]
             if coupled:  # elsewhere the inlet is the supply of this set-up, whatever the neighbour drank
-                state.inlet[m] = other.inlet
+                pads["inlet"][m] = other.inlet
             if self.case.thermal != ISOTHERMAL:
                 film.work.temperature[:] = other.work.temperature + shift.temperature[m]
             if film.cross is not None and other.cross is not None:
@@ -257,97 +238,90 @@ class Search:
                 state.bent[m] = other.bent
                 film.work.extra[:] += other.bent
             if self.case.axial:
-                film.work.extra[:] += (other.axial_tilt - state.axial[m]) * axial_shape(film.grid)
-                state.axial[m] = other.axial_tilt
+                film.work.extra[:] += (other.axial_tilt - pads["axial"][m]) * axial_shape(film.grid)
+                pads["axial"][m] = other.axial_tilt
         state.position[:] = start.position + shift.position
         if coupled:
             state.figures[JOURNAL] = start.journal_temperature
         if self.setup.growth is not None:
             hotter = start.mean_journal_temperature - state.figures[GROWN]
             state.figures[GROWN] += hotter
-            self.pads.clearance[:] -= self.case.closing * hotter
+            pads["clearance"] -= self.case.closing * hotter
         return True
 
     def run(self) -> Equilibrium:
         """Iterate from where the search stands."""
-        memory = fresh_memory(vector_size(self.state, self.case))
-        problem = Problem(self.grids, self.bodies, self.pads, self.works, self.state, self.case)
-        operator = None if self.crosses is None else CrossOperator.place(*self.crosses.temperature.shape[1:])
-        code = ASKS_OIL
-        while code in (ASKS_OIL, ASKS_HEAT, ASKS_LAWS, ASKS_STABLE):
-            code = iterate(problem, memory)
-            if code == ASKS_OIL:
-                running = self.case.running
-                turbulent = (running.speed, running.heat[0] / max(running.heat[1], 1e-9))
-                for m, film in enumerate(self.films):
-                    if not self.state.idle[m] and film.cross is not None:
-                        eddies = turbulent if film.rupture == "turbulent" else (0.0, 0.0)
-                        set_cross_viscosity(film.cross, film.work, running.oil, eddies)
-            elif code == ASKS_HEAT:
-                assert operator is not None
-                relaxed = float(memory.trail[RELAXED])
-                change = settle_cross_temperatures(self.films, self.pads, self.state, self.case, relaxed, operator)
-                memory.trail[HEAT] = change
-            elif code == ASKS_LAWS:
-                ask_laws(self.setup.pivots, self.pads.laws, self.state.felt[:, 0])
-            elif code == ASKS_STABLE:
-                memory.trail[STABLE] = float(not self._leave_unstable())
+        memory = iteration.fresh_memory(iteration.vector_size(self.state, len(self.films), self.case))
+        problem = Problem(self.grids, self.bodies, self.stack, self.works, self.state, self.case)
+        across, code = self.across, iteration.ASKS_OIL
+        while code >= iteration.ASKS_OIL:
+            code = iteration.iterate(problem, memory)
+            if code == iteration.ASKS_OIL and across is not None:
+                set_cross_viscosities(problem, across)
+            elif code == iteration.ASKS_HEAT and across is not None:
+                memory.trail[iteration.HEAT] = settle_cross_temperatures(
+                    problem, across, float(memory.trail[iteration.RELAXED])
+                )
+            elif code == iteration.ASKS_LAWS:
+                ask_laws(self.setup.pivots, self.pads["law"], self.pads["felt"][:, 0])
+            elif code == iteration.ASKS_STABLE:
+                memory.trail[iteration.STABLE] = float(not self._leave_unstable())
         self._take_over()
         return self._ended(code, memory)
 
     def _leave_unstable(self) -> bool:
         """Move pads off attitudes that nothing holds, the part of a curve that comes back from its fold."""
-        pads, state, moved = self.pads, self.state, False
-        for m in np.flatnonzero(state.solved).tolist():
-            if not is_doubtful(self.case, pads, state, m):
+        moved = False
+        for pad, film, curve in zip(self.pads.view(np.recarray), self.films, self.stack.curves, strict=True):
+            if not pad.solved or not is_doubtful(self.case, pad, curve):
                 continue
-            stiffness = state.stiffness[m]
+            stiffness = pad.stiffness
             if self.case.thermal in (ALONE, COUPLED):  # the temperature follows, and that is known
-                film, wedge = self.films[m], (float(pads.clearance[m]), *state.wedge[m].tolist())
+                wedge = (float(pad.clearance), *pad.wedge.tolist())
                 stiffness = stiffness + heat_impedance(film.grid, film.work, wedge, self.running, 0.0, _TOLD).real
-            if not is_stable(self.case, pads, state, m, stiffness):
+            if not is_stable(self.case, pad, curve, stiffness):
                 moved = True
-                if not rescue(pads, self.works, state, m):
-                    let_idle(state, m)
+                if not rescue(pad, film.work, self.state.position):
+                    let_idle(pad)
         return moved
 
     def _take_over(self) -> None:
         """Leave the films where the arrays stand."""
-        state = self.state
+        names = ("tilt", "deflection", "idle", "inlet", "supplied")
+        pads, values = self.pads, [self.pads[name].tolist() for name in names]
+        solved, resting = pads["solved"].tolist(), pads["resting"].tolist()
+        forces, least, steps = (pads["force"], pads["stiffness"], pads["damping"]), pads["least"], pads["steps"]
         for m, film in enumerate(self.films):
-            film.tilt = float(state.tilt[m])
-            film.deflection = float(state.deflection[m])
-            film.idle = bool(state.idle[m])
-            film.axial_tilt = float(state.axial[m])
-            film.inlet = float(state.inlet[m])
-            film.supplied = float(state.supplied[m])
+            film.tilt, film.deflection, film.idle, film.inlet, film.supplied = (numbers[m] for numbers in values)
+            film.axial_tilt = float(pads["axial"][m])
+            if self.across is not None:
+                film.outlet = float(self.across.outlet[m])
             if self.setup.flexible_pads:
-                film.bent = state.bent[m]
-            forces = state.force[m], state.stiffness[m], state.damping[m], float(state.least[m]), int(state.steps[m])
-            film.forces = FilmForces(*forces) if state.solved[m] else None
-            film.resting = None if state.solved[m] else RestingFilm(*state.resting[m].tolist())
+                film.bent = self.state.bent[m]
+            force, stiffness, damping = (values[m] for values in forces)
+            film.forces = FilmForces(force, stiffness, damping, float(least[m]), int(steps[m])) if solved[m] else None
+            film.resting = None if solved[m] else RestingFilm(*resting[m])
             if self.setup.growth is not None:
-                clearance = float(self.pads.clearance[m])
+                clearance = float(pads["clearance"][m])
                 assembled = film.pad.assembled_clearance + clearance - film.pad.pad_clearance
                 film.pad = replace(film.pad, pad_clearance=clearance, assembled_clearance=assembled)
 
-    def _ended(self, code: int, memory: Memory) -> Equilibrium:
+    def _ended(self, code: int, memory: iteration.Memory) -> Equilibrium:
         """The state as an answer."""
         films, figures, trail = self.films, self.state.figures, memory.trail
         names: list[Condition] = []
         if code in _FAILURES:
             names.append(named(_FAILURES[code]))
-        elif code != SETTLED and self.setup.friction:  # those that the last step moved most swing
-            tilts = np.abs(self.state.moves[:, 0])
+        elif code != iteration.SETTLED and self.setup.friction:  # those that the last step moved most swing
+            tilts = np.abs(self.pads["moves"][:, 0])
             largest = np.flatnonzero(tilts >= _SWINGING * tilts.max()) + 1
             names.append(named("pads {pads} neither stick nor slide at rest", largest.tolist()))
-        if code != SETTLED:
+        if code != iteration.SETTLED:
             names.append(named("not converged"))
         status = status_of(self.setup, self.load, films, self.running.speed, float(figures[BACKFLOW]), names)
-        return Equilibrium(
-            self.state.position.copy(), tuple(films), int(trail[ITERATION]), float(trail[RESIDUAL]), float(trail[HEAT]),
-            float(figures[JOURNAL]), status, self.running, self.begun,
-        )  # fmt: skip
+        steps, residual, heat = trail[[iteration.ITERATION, iteration.RESIDUAL, iteration.HEAT]].tolist()
+        ended = (int(steps), residual, heat, float(figures[JOURNAL]))
+        return Equilibrium(self.state.position.copy(), tuple(films), *ended, status, self.running, self.begun)
 
 
 @lru_cache(maxsize=16)

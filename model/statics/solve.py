@@ -48,7 +48,7 @@ def solve_equilibrium(
             if warm.converged and not loose and sum(f.idle for f in warm.films) <= search.idle_by_curves:
                 return warm
     search = Search(setup, load, speed).stand()
-    near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]
+    near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.pads["idle"][m]]
     result = _settled(search, search.run())
     if near and not result.converged:  # they may find no rest where they carry
         search = Search(setup, load, speed).stand()
@@ -77,7 +77,7 @@ def _try_sets(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium)
         for pads in itertools.combinations(range(count), size):
             search = Search(setup, load, speed).stand()
             loaded = np.isin(np.arange(count), pads)
-            search.load_pads(loaded & (search.pads.rows >= 2))
+            search.load_pads(loaded & (search.pads["rows"] >= 2))
             search.let_idle(np.flatnonzero(~loaded).tolist())
             result = _settled(search, search.run())
             if result.converged:
@@ -106,10 +106,10 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
         trial.load_pads(np.arange(len(trial.films)) == pad)
         other = trial.run()
         refused.add(pad)
-        if trial.state.idle[pad] and above[pad] < 0.0 and near == _NEAR:
+        if trial.pads["idle"][pad] and above[pad] < 0.0 and near == _NEAR:
             # where its own film carries nothing, those of pads with the same curve that stand farther off do not either
             refused.update(m for m in doubtful if search.rises[m] is search.rises[pad])
-        idle = trial.state.idle
+        idle = trial.pads["idle"]
         fewer = idle.sum() < sum(f.idle for f in result.films)
         if other.converged and not idle[pad] and (fewer or not np.any(idle & (trial.margins() > near))):
             search, result = trial, other
@@ -155,7 +155,7 @@ def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilib
         if result.converged:
             return _settled(search, result, held)
         swinging = pads_of("pads {pads} neither stick nor slide at rest", result.status)
-        loaded = [k - 1 for k in swinging if not search.state.idle[k - 1]]
+        loaded = [k - 1 for k in swinging if not search.pads["idle"][k - 1]]
         if not loaded:
             break
         held |= frozenset(loaded)

@@ -16,7 +16,7 @@ from model.pivots import pivot_laws
 from model.predict import predict
 from model.prediction import Prediction
 from model.setup import Setup
-from model.statics import search
+from model.statics.compiled import iteration
 from model.statics.compiled.iteration import RESIDUAL, SINGULAR
 from model.statics.conditions import overloaded_pads, unsupported
 
@@ -121,7 +121,7 @@ def test_singular_steps_are_named(rocker, monkeypatch):
         arrays[-1].trail[RESIDUAL] = math.inf
         return SINGULAR
 
-    monkeypatch.setattr(search, "iterate", singular)
+    monkeypatch.setattr(iteration, "iterate", singular)
     p = run(rocker)
     assert "singular" in p.status
     assert not p.converged

@@ -8,14 +8,14 @@ from functools import lru_cache
 import numpy as np
 
 from model.compilation import inner
-from model.film.dense import solve
+from model.film.dense import product, solve
 from model.film.faces import conductances
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import force_of, shape_slopes
 from model.interpolation import largest
 from model.pad.bending import PadDeformation
-from model.statics.compiled.case import Case, Problem
-from model.statics.compiled.stack import BodyStack, PadState, grid_of, work_of
+from model.statics.compiled.case import Problem
+from model.statics.compiled.stack import BodyStack, grid_of, work_of
 from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray, IntArray
 
@@ -41,6 +41,9 @@ def stacked_bodies(bodies: tuple[PadDeformation, ...], first: int, factor: float
 
 
 def _stack(matrices: Sequence[FloatArray], dimensions: int) -> FloatArray:
+    """Matrices with an axis before them; one alone is not copied."""
+    if len(matrices) == 1:
+        return matrices[0][None]
     return np.array(matrices) if matrices else np.zeros((0,) * dimensions)
 
 
@@ -50,38 +53,38 @@ def bend_pads(bodies: BodyStack | None, problem: Problem) -> float:
 
     Returns the largest change asked for, as a share of the thinnest film.
     """
-    state, works = problem.state, problem.works
+    state, pads = problem.state, problem.pads.each
     if bodies is None or state.bent.size == 0:
         return 0.0
-    count = len(state.tilt)
-    asked = np.zeros((count, state.bent[0].size))
+    asked = np.zeros((len(pads), state.bent[0].size))
     if len(bodies.shapes) > 0:
-        _ask_bodies(bodies, works, state, problem.case.supply, asked)
+        _ask_bodies(bodies, problem, asked)
     share = 0.0
-    for m in range(count):
-        if state.solved[m]:
+    for m in range(len(pads)):
+        if pads[m].solved:
             change = asked[m] - state.bent[m].reshape(-1)
             tilted = _close_loop(bodies, problem, m, change)
-            share = max(share, max(largest(change), tilted) / state.least[m])
+            share = max(share, max(largest(change), tilted) / pads[m].least)
     return share
 
 
 @inner
-def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, supply: float, asked: FloatArray) -> None:
+def _ask_bodies(bodies: BodyStack, problem: Problem, asked: FloatArray) -> None:
     """Deformation (pads, nodes) that pressure and temperature ask for; pads of one shape in one product [m]."""
-    count = len(state.tilt)
+    pads, works, state, supply = problem.pads.each, problem.works, problem.state, problem.case.supply
+    count = len(pads)
     unknowns, coarse = works.unknown.shape[1], bodies.lighter.shape[1]
     rise = np.zeros((count, state.bent[0].size))
     given = np.zeros((count, unknowns + coarse))
     for m in range(count):
-        if state.solved[m]:
+        if pads[m].solved:
             rise[m] = state.faces[m].reshape(-1) - supply
             given[m, :unknowns] = works.unknown[m] + state.shift[m]
     same = np.empty(count, dtype=np.int64)
     for k in range(bodies.answer.shape[0]):
         some = 0
         for m in range(count):
-            if state.solved[m] and bodies.which[m] == k:
+            if pads[m].solved and bodies.which[m] == k:
                 same[some] = m
                 some += 1
         if some > 0:
@@ -92,20 +95,19 @@ def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, supply: flo
 @inner
 def _times(matrix: np.ndarray, given: FloatArray, rows: IntArray, out: FloatArray) -> None:
     """Product of a matrix with some rows of `given`: all of them for every row of the matrix that is read."""
+    factors = np.empty(matrix.shape[1])
     for i in range(matrix.shape[0]):
-        factors = matrix[i]
+        for q in range(len(factors)):
+            factors[q] = matrix[i, q]
         for row in rows:
-            total, values = 0.0, given[row]
-            for q in range(len(factors)):
-                total += np.float64(factors[q]) * values[q]
-            out[row, i] = total
+            out[row, i] = product(factors, given[row])
 
 
 @inner
 def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray) -> float:
     """One pad's part of a Newton step, see `model.pad.bending`; how far a tilt along the shaft moves the ends [m]."""
     grid, work = grid_of(problem.grids, m), work_of(problem.works, m)
-    state, case = problem.state, problem.case
+    pad, state, case = problem.pads.each[m], problem.state, problem.case
     bends = len(bodies.shapes) > 0
     body, bending = (bodies.which[m], bodies.shapes.shape[3]) if bends else (0, 0)
     count = bending + (1 if case.axial else 0)
@@ -117,85 +119,87 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
     if bends:
         shapes[:, :, :bending], response[:bending] = bodies.shapes[body], bodies.response[body]
         for r in range(bending):
-            matrix[r, r] = 1.0
-            for q in range(len(change)):
-                right[r, 0] += bodies.amplitudes[body, r, q] * change[q]
+            matrix[r, r], right[r, 0] = 1.0, product(bodies.amplitudes[body, r], change)
     if case.axial:
-        right[bending, 0], matrix[bending, bending] = _axial_moment(grid, work, state, case, m, response[bending])
+        right[bending, 0], matrix[bending, bending] = _axial_moment(grid, work, problem, m, response[bending])
         for i in range(rows):
             for j in range(columns):
                 shapes[i, j, bending] = grid.cos[i] * grid.z[j]
     asked = right[:, 0].copy()
-    wedge = (problem.pads.clearance[m], state.wedge[m, 0], state.wedge[m, 1])
+    wedge = (pad.clearance, pad.wedge[0], pad.wedge[1])
     slopes = shape_slopes(grid, work, conductances(grid, work, wedge), shapes)
-    felt = np.empty((2, count))
-    for q in range(unknowns):
-        for r in range(count):
-            value = response[r, q]
-            right[r, 1] += value * work.slopes[q, 0]
-            right[r, 2] += value * work.slopes[q, 1]
-            for s in range(count):
-                matrix[r, s] -= value * slopes[q, s]
-    felt[:] = force_of(grid, grid.area, slopes)
+    _answer(response, slopes, matrix, -1.0, 0)
+    _answer(response, work.slopes[:, :2], right, 1.0, 1)
+    felt = force_of(grid, grid.area, slopes)
     solve(matrix, right)
     for r in range(count):
         for axis in range(2):
-            state.felt[m, axis] += felt[axis, r] * right[r, 0]
-            state.felt_stiffness[m, axis, 0] += felt[axis, r] * right[r, 1]
-            state.felt_stiffness[m, axis, 1] += felt[axis, r] * right[r, 2]
+            pad.felt[axis] += felt[axis, r] * right[r, 0]
+            pad.felt_stiffness[axis, 0] += felt[axis, r] * right[r, 1]
+            pad.felt_stiffness[axis, 1] += felt[axis, r] * right[r, 2]
     for r in range(bending):
-        state.amplitude[m, r] = right[r]
+        pad.amplitude[r] = right[r]
     mismatch = state.mismatch[m].reshape(-1)
     flat = shapes.reshape((len(change), count))
     for q in range(len(change)):
-        mismatch[q] = change[q]
-        for r in range(bending):
-            mismatch[q] -= flat[q, r] * asked[r]
+        mismatch[q] = change[q] - product(flat[q, :bending], asked)
     if not case.axial:
         return 0.0
-    state.axial_step[m] = right[bending]
+    for k in range(3):
+        pad.axial_step[k] = right[bending, k]
     return abs(right[bending, 0]) * largest(shapes[:, :, bending].copy().reshape(-1))
 
 
 @inner
-def _axial_moment(
-    grid: FilmGrid, work: FilmWork, state: PadState, case: Case, m: int, lever: FloatArray
-) -> tuple[float, float]:
+def _answer(response: FloatArray, slopes: FloatArray, matrix: FloatArray, factor: float, first: int) -> None:
+    """Add what shapes answer to pressures (unknowns, m), by a factor, to a matrix from one of its columns on."""
+    column = np.empty(len(slopes))  # side by side for the products
+    for s in range(slopes.shape[1]):
+        for q in range(len(column)):
+            column[q] = slopes[q, s]
+        for r in range(len(response)):
+            matrix[r, first + s] += factor * product(response[r], column)
+
+
+@inner
+def _axial_moment(grid: FilmGrid, work: FilmWork, problem: Problem, m: int, lever: FloatArray) -> tuple[float, float]:
     """Moment along the shaft that nothing balances, what holds that tilt, and the moment by the unknown pressures.
 
     `lever` (unknowns,) [m^3] is less what grows with the pad's load.
     """
-    moment, stiffness, arm, _ = held_moment(case.hold, state.axial[m], state.corrected[m, 0])
+    pad, shift = problem.pads.each[m], problem.state.shift[m]
+    moment, stiffness, arm, _ = held_moment(problem.case.hold, pad.axial, pad.corrected[0])
     total, columns = -moment, grid.steps[0]
     for n in range(work.pressure.size):
         i, j = divmod(n, columns)
         total += grid.area[i, j] * grid.cos[i] * grid.z[j] * work.pressure[i, j]
     for q in range(len(lever)):
         i, j = divmod(grid.node[q], columns)
-        total += grid.area[i, j] * grid.cos[i] * grid.z[j] * state.shift[m, q]
+        total += grid.area[i, j] * grid.cos[i] * grid.z[j] * shift[q]
         lever[q] = grid.area[i, j] * grid.cos[i] * (grid.z[j] - arm)
     return total, stiffness
 
 
 @inner
-def change_shape(bodies: BodyStack | None, state: PadState, case: Case, m: int, da: float, db: float) -> float:
-    """Add to the change of a pad's deformation, `PadState.mismatch`, what belongs to a move of its film.
+def change_shape(bodies: BodyStack | None, problem: Problem, m: int, da: float, db: float) -> float:
+    """Add to the change of a pad's deformation, `SearchState.mismatch`, what belongs to a move of its film.
 
     Returns the change of its tilt along the shaft [rad].
     """
     if bodies is None:
         return 0.0
+    pad, state, case = problem.pads.each[m], problem.state, problem.case
     out = state.mismatch[m]
     if len(bodies.shapes) > 0:
         shapes = bodies.shapes[bodies.which[m]]
         for r in range(shapes.shape[2]):
-            amount = state.amplitude[m, r, 0] + state.amplitude[m, r, 1] * da + state.amplitude[m, r, 2] * db
+            amount = pad.amplitude[r, 0] + pad.amplitude[r, 1] * da + pad.amplitude[r, 2] * db
             for i in range(out.shape[0]):
                 for j in range(out.shape[1]):
                     out[i, j] += amount * shapes[i, j, r]
     if not case.axial:
         return 0.0
-    axial = state.axial_step[m, 0] + state.axial_step[m, 1] * da + state.axial_step[m, 2] * db
-    if case.hold.slip > 0.0 and state.axial[m] * (state.axial[m] + axial) < 0.0:
-        return -state.axial[m]  # friction turns round there
+    axial = pad.axial_step[0] + pad.axial_step[1] * da + pad.axial_step[2] * db
+    if case.hold.slip > 0.0 and pad.axial * (pad.axial + axial) < 0.0:
+        return -pad.axial  # friction turns round there
     return axial

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import Running
-from model.statics.compiled.stack import BodyStack, PadStack, PadState
+from model.statics.compiled.stack import BodyStack, PadStack, SearchState
 from model.tilt_hold import HoldNumbers
 from rigdata.arrays import FloatArray
 
@@ -52,17 +54,17 @@ class Problem(NamedTuple):
     bodies: BodyStack | None  #: None: rigid pads and films for themselves, a search without those loops.
     pads: PadStack
     works: FilmWork
-    state: PadState
+    state: SearchState
     case: Case
 
 
 @inner
-def rigid_approach(pads: PadStack, position: FloatArray, m: int) -> float:
+def rigid_approach(pad: np.record, position: FloatArray) -> float:
     """Approach of a film if its pivot were rigid [m]."""
-    return pads.preload[m] + pads.frame[m, 0, 0] * position[0] + pads.frame[m, 0, 1] * position[1]
+    return pad.preload + pad.frame[0, 0] * position[0] + pad.frame[0, 1] * position[1]
 
 
 @inner
-def along(pads: PadStack, position: FloatArray, m: int) -> float:
+def along(pad: np.record, position: FloatArray) -> float:
     """Journal's place across the pivot line [m]."""
-    return pads.frame[m, 1, 0] * position[0] + pads.frame[m, 1, 1] * position[1]
+    return pad.frame[1, 0] * position[0] + pad.frame[1, 1] * position[1]

@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.dense import nearest, product, solve
+from model.film.dense import product, residual, solve, times
 from model.film.energy import between, heat_sources, heat_step, march, warm
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import edge_flows
@@ -43,75 +43,78 @@ _LEAST_FRESH = 1e-3
 @inner
 def heat_films(problem: Problem, relaxation: float) -> float:
     """Temperatures of the films that carry, each for itself; returns the largest change asked for [K]."""
-    grids, _, _, works, state, case = problem
+    grids, _, pads, works, state, case = problem
     change = 0.0
-    for m in range(len(state.tilt)):
-        if state.solved[m]:
-            thermal = (state.inlet[m], relaxation, HEATING_STEP)
+    for m in range(len(pads.each)):
+        pad = pads.each[m]
+        if pad.solved:
+            thermal = (pad.inlet, relaxation, HEATING_STEP)
             found = heat_step(grid_of(grids, m), work_of(works, m), case.running, thermal, state.shift[m])
-            asked, cut, radial, tangential = found
-            state.heating[m] = asked
-            state.corrected[m, 0] = state.force[m, 0] + radial
-            state.corrected[m, 1] = state.force[m, 1] + tangential
-            state.figures[BACKFLOW] = max(state.figures[BACKFLOW], cut)
-            if not change >= asked:  # a NaN is not to be lost
-                change = asked
+            state.figures[BACKFLOW] = max(state.figures[BACKFLOW], found[1])
+            change = note_heat(pad, found[0], found[2:], change)
     return change
+
+
+@inner
+def note_heat(pad: np.record, asked: float, more: tuple[float, float], change: float) -> float:
+    """Note which change of temperature [K] a film asks for, and its force then [N]; the largest change so far."""
+    pad.heating = asked
+    pad.corrected[0] = pad.force[0] + more[0]
+    pad.corrected[1] = pad.force[1] + more[1]
+    return asked if not change >= asked else change  # a NaN is not to be lost
 
 
 @inner
 def rest_films(problem: Problem) -> None:
     """Say what the films of idle pads do."""
-    pads, state = problem.pads, problem.state
-    for m in range(len(state.tilt)):
-        if state.idle[m]:
-            wedge = (pads.clearance[m], rigid_approach(pads, state.position, m))
-            found = resting_film(grid_of(problem.grids, m), wedge, problem.case.running, state.inlet[m])
+    for m in range(len(problem.pads.each)):
+        pad = problem.pads.each[m]
+        if pad.idle:
+            wedge = (pad.clearance, rigid_approach(pad, problem.state.position))
+            found = resting_film(grid_of(problem.grids, m), wedge, problem.case.running, pad.inlet)
             for k in range(4):
-                state.resting[m, k] = found[k]
+                pad.resting[k] = found[k]
 
 
 @inner
 def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> float:
     """Temperatures of all films, the inlets and the journal for their present flows; returns the largest change [K]."""
     grids, _, pads, works, state, case = problem
-    n, fields = len(state.tilt), 3 if case.journal else 2
+    n, fields = len(pads.each), 3 if case.journal else 2
     answers = np.zeros((n, fields, works.temperature.shape[1], works.temperature.shape[2]))
     flows = np.empty((n, 2))
     outlets = np.zeros((n, 3))
     taken = np.zeros((n, 3))
     for m in range(n):
-        if not state.solved[m]:
-            flows[m] = state.resting[m, 1]
-            outlets[m, 0] = state.resting[m, 2] - state.inlet[m]
+        pad = pads.each[m]
+        if not pad.solved:
+            flows[m] = pad.resting[1]
+            outlets[m, 0] = pad.resting[2] - pad.inlet
             outlets[m, 1] = 1.0
             continue
         _answer(bodies, problem, m, answers[m])
-        entering, sides = edge_flows(grid_of(grids, m), work_of(works, m), state.supplied[m])
+        entering, sides = edge_flows(grid_of(grids, m), work_of(works, m), pad.supplied)
         flows[m, 0], flows[m, 1] = entering, entering - sides
         _pass_on(work_of(works, m), answers[m], outlets[m], taken[m])
     change = 0.0
     for m in range(n):
+        pad = pads.each[m]
         if case.fresh < math.inf and case.mixing > 0.0:  # who gets less oil has another film
-            more = case.mixing * abs(flows[m, 1] - state.passed[m]) / (case.fresh * case.length)
+            more = case.mixing * abs(flows[m, 1] - pad.passed) / (case.fresh * case.length)
             change = max(change, HEAT_PER_FORCE * more)
-        state.passed[m] = flows[m, 1]
-    inlets, journal = balance_heat(pads.order, (flows, outlets, taken), state.solved, case.supply, case.mixing)
+        pad.passed = flows[m, 1]
+    inlets, journal = balance_heat(pads.order, (flows, outlets, taken), pads.each["solved"], case.supply, case.mixing)
     for m in range(n):
-        state.inlet[m], state.heating[m] = inlets[m], 0.0
-        if not state.solved[m]:
+        pad = pads.each[m]
+        pad.inlet, pad.heating = inlets[m], 0.0
+        if not pad.solved:
             continue
         asked = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
         if case.journal:
             asked += journal * answers[m, 2]
         limits = (relaxation, HEATING_STEP)
         found = warm(grid_of(grids, m), work_of(works, m), case.running, asked, limits, state.shift[m])
-        hotter, radial, tangential = found
-        state.heating[m] = hotter
-        state.corrected[m, 0] = state.force[m, 0] + radial
-        state.corrected[m, 1] = state.force[m, 1] + tangential
-        if not change >= hotter:
-            change = hotter
+        change = note_heat(pad, found[0], found[1:], change)
     if case.journal:
         state.figures[JOURNAL] = journal
     return change
@@ -158,7 +161,7 @@ def _conduct(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, fiel
     """
     state = problem.state
     journal = state.figures[JOURNAL] if math.isfinite(state.figures[JOURNAL]) else problem.case.supply
-    hot = (1.0, state.inlet[m], journal)
+    hot = (1.0, problem.pads.each[m].inlet, journal)
     temperature = problem.works.temperature[m].reshape(-1)
     answers = fields.reshape((len(fields), len(temperature)))
     missing = -temperature
@@ -175,17 +178,8 @@ def _conduct(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, fiel
 def _into_pad(grid: FilmGrid, bodies: BodyStack, m: int, rise: FloatArray) -> FloatArray:
     """What a pad takes from its film at every station, (nt + 1, nz + 1) [W], for the rise (nodes,) of its face [K]."""
     to_coarse, flux = bodies.to_coarse[bodies.which[m]], bodies.flux[bodies.which[m]]
-    coarse = np.zeros(to_coarse.shape[0])
-    heat = np.zeros((len(grid.angle), len(grid.height)))
-    for c in range(len(coarse)):
-        for q in range(len(rise)):
-            coarse[c] += to_coarse[c, q] * rise[q]
-    for i in range(heat.shape[0]):
-        for j in range(heat.shape[1]):
-            for c in range(len(coarse)):
-                heat[i, j] += flux[i * heat.shape[1] + j, c] * coarse[c]
-            heat[i, j] *= grid.dx * grid.height[j]
-    return heat
+    heat = times(flux, times(to_coarse, rise)).reshape((len(grid.angle), len(grid.height)))
+    return heat * (grid.dx * grid.height)
 
 
 @inner
@@ -193,37 +187,25 @@ def _krylov(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, right
     """Solve (I + A^-1 F) T = T_alone, (nodes,), by GMRES; NaN where it grows beyond `BOUNDLESS`."""
     grid, work = grid_of(problem.grids, m), work_of(problem.works, m)
     size = math.sqrt(product(right, right))
-    answer = np.zeros(len(right))
-    if not size > 0.0:
-        return answer
-    basis = np.zeros((_KRYLOV_STEPS, len(right)))
+    answer, left, length = np.zeros(len(right)), right.copy(), size
+    steps = np.zeros((_KRYLOV_STEPS, len(right)))
     images = np.zeros((_KRYLOV_STEPS, len(right)))
     taken = np.zeros((1, loss.shape[0], loss.shape[1]))
     fields = np.zeros((1, loss.shape[0], loss.shape[1]))
     weights = np.zeros((_KRYLOV_STEPS, 1))
-    basis[0] = right / size
     for k in range(_KRYLOV_STEPS):
-        taken[0] = -_into_pad(grid, bodies, m, basis[k])
-        fields[0, 0] = 0.0
+        if not length > (_CONDUCTION_TOLERANCE * size if k > 0 else 0.0):
+            break
+        steps[k] = left / length
+        taken[0] = -_into_pad(grid, bodies, m, steps[k])
         march(grid, work, problem.case.running, loss, fields, between(taken))
-        images[k] = basis[k] - fields[0].reshape(-1)
+        images[k] = steps[k] - fields[0].reshape(-1)
         if not product(images[k], images[k]) < BOUNDLESS:
             answer[:] = math.nan
             return answer
-        nearest(images, k + 1, right, 1e-13, weights)
-        answer[:], left = 0.0, -right
-        for r in range(k + 1):
-            answer += weights[r, 0] * basis[r]
-            left += weights[r, 0] * images[r]
-        if k == _KRYLOV_STEPS - 1 or math.sqrt(product(left, left)) < _CONDUCTION_TOLERANCE * size:
-            return answer
-        basis[k + 1] = images[k]
-        for r in range(k + 1):
-            basis[k + 1] -= product(basis[r], basis[k + 1]) * basis[r]
-        length = math.sqrt(product(basis[k + 1], basis[k + 1]))
-        if not length > 1e-12 * size:
-            return answer
-        basis[k + 1] /= length
+        length = residual(images, k + 1, right, weights, left)
+    for k in range(_KRYLOV_STEPS):
+        answer += weights[k, 0] * steps[k]
     return answer
 
 

@@ -18,7 +18,7 @@ from model.statics.compiled.case import ACROSS, ALONE, BOUNDLESS, COUPLED, HEAT_
 from model.statics.compiled.elimination import newton
 from model.statics.compiled.heat import exchange_heat, heat_films
 from model.statics.compiled.place import is_doubtful
-from model.statics.compiled.stack import BACKFLOW, GROWN, BodyStack, PadStack, PadState
+from model.statics.compiled.stack import BACKFLOW, GROWING, GROWN, BodyStack, PadStack, SearchState
 from model.statics.compiled.step import grow_and_bend, move, solve_pressures
 from rigdata.arrays import FloatArray
 
@@ -78,7 +78,7 @@ def iterate(problem: Problem, memory: Memory) -> int:
     accuracy = case.accuracy * (_ACROSS_ACCURACY if across else 1.0)
     while True:
         if trail[_STAGE] == _BEGIN:
-            if trail[ITERATION] >= _MAX_ITERATIONS or (case.tried >= 0 and state.idle[case.tried]):
+            if trail[ITERATION] >= _MAX_ITERATIONS or (case.tried >= 0 and pads.each[case.tried].idle):
                 return NOT_CONVERGED
             trail[ITERATION] += 1
             trail[_STAGE] = _PRESSURE
@@ -104,14 +104,14 @@ def iterate(problem: Problem, memory: Memory) -> int:
             trail[_STAGE] = _STEPPING
             if case.asks_laws:
                 return ASKS_LAWS
-        residual, shift = newton(case, pads, state)
+        residual, shift = newton(case, pads, state.figures[GROWING])
         trail[RESIDUAL], trail[_STAGE] = residual, _BEGIN
-        if not (math.isfinite(residual) and _finite(state, shift)):
+        if not math.isfinite(residual):
             trail[RESIDUAL] = math.inf
             return SINGULAR
         if residual < accuracy and trail[HEAT] < HEAT_PER_FORCE * accuracy:
             trail[_COUNT] = 0
-            if trail[STABLE] == 0.0 and _doubts(case, pads, state):
+            if trail[STABLE] == 0.0 and _doubts(case, pads):
                 return ASKS_STABLE
             sharp, trail[_STAGE] = True, _PRESSURE
             continue
@@ -168,15 +168,6 @@ def _go_on(problem: Problem, memory: Memory, shift: FloatArray) -> None:
 
 
 @inner
-def _finite(state: PadState, shift: FloatArray) -> bool:
-    """Whether all moves are numbers; numpy's own question would load scipy, 0.3 s and 14 MB."""
-    total = state.position[0] + shift[0] + state.position[1] + shift[1]
-    for m in range(len(state.moves)):
-        total += abs(state.moves[m, 0]) + abs(state.moves[m, 1])
-    return math.isfinite(total)
-
-
-@inner
 def _remember(memory: Memory) -> int:
     """Make room for one more; returns how many there are with it."""
     count = int(memory.trail[_COUNT])
@@ -190,17 +181,18 @@ def _remember(memory: Memory) -> int:
 
 
 @inner
-def _doubts(case: Case, pads: PadStack, state: PadState) -> bool:
+def _doubts(case: Case, pads: PadStack) -> bool:
     found = False
-    for m in range(len(state.tilt)):
-        found = found or (state.solved[m] and is_doubtful(case, pads, state, m))
+    for m in range(len(pads.each)):
+        pad = pads.each[m]
+        found = found or (pad.solved and is_doubtful(case, pad, pads.curves[m]))
     return found
 
 
-def vector_size(state: PadState, case: Case) -> int:
+def vector_size(state: SearchState, count: int, case: Case) -> int:
     """Length of the vector of journal, pads, temperatures and deformations."""
     faces = state.faces.size if case.thermal == ACROSS else 0
-    return 3 + 3 * len(state.tilt) + state.warmth.size + faces + state.bent.size
+    return 3 + 3 * count + state.warmth.size + faces + state.bent.size
 
 
 @inner
@@ -212,23 +204,23 @@ def _write_vector(problem: Problem, out: FloatArray) -> None:
     out[2] = state.figures[GROWN]
     warm = 3 + state.warmth.shape[1]
     bent = warm + (state.faces[0].size if case.thermal == ACROSS else 0)
-    for m in range(len(state.tilt)):
-        part = _part(state, out, m)
-        unit = pads.pivot_radius[m] / _MICROMETRE
-        part[0] = state.tilt[m] * unit
-        part[1] = state.deflection[m] / _MICROMETRE
-        part[2] = state.axial[m] * unit
+    for m in range(len(pads.each)):
+        pad, part = pads.each[m], _part(out, m, len(pads.each))
+        unit = pad.pivot_radius / _MICROMETRE
+        part[0] = pad.tilt * unit
+        part[1] = pad.deflection / _MICROMETRE
+        part[2] = pad.axial * unit
         part[3:bent] = 0.0
-        if not state.idle[m]:
+        if not pad.idle:
             part[3:warm] = state.warmth[m]
             part[warm:bent] = state.faces[m].reshape(-1)[: bent - warm]
         part[bent:] = state.bent[m].reshape(-1) / _MICROMETRE
 
 
 @inner
-def _part(state: PadState, vector: FloatArray, m: int) -> FloatArray:
-    """One pad's part of a vector."""
-    return vector[3:].reshape((len(state.tilt), (len(vector) - 3) // len(state.tilt)))[m]
+def _part(vector: FloatArray, m: int, count: int) -> FloatArray:
+    """One pad's part of a vector of so many pads."""
+    return vector[3:].reshape((count, (len(vector) - 3) // count))[m]
 
 
 @inner
@@ -241,15 +233,15 @@ def _read_vector(problem: Problem, vector: FloatArray) -> None:
     state.figures[GROWN] = vector[2]
     warm = 3 + state.warmth.shape[1]
     bent = warm + (state.faces[0].size if case.thermal == ACROSS else 0)
-    for m in range(len(state.tilt)):
-        part = _part(state, vector, m)
-        unit = _MICROMETRE / pads.pivot_radius[m]
-        pads.clearance[m] -= closing
-        state.tilt[m] = part[0] * unit
-        state.deflection[m] = part[1] * _MICROMETRE
-        more = part[2] * unit - state.axial[m]
-        state.axial[m] += more
-        if not state.idle[m]:
+    for m in range(len(pads.each)):
+        pad, part = pads.each[m], _part(vector, m, len(pads.each))
+        unit = _MICROMETRE / pad.pivot_radius
+        pad.clearance -= closing
+        pad.tilt = part[0] * unit
+        pad.deflection = part[1] * _MICROMETRE
+        more = part[2] * unit - pad.axial
+        pad.axial += more
+        if not pad.idle:
             state.warmth[m] = part[3:warm]
             state.faces[m].reshape(-1)[: bent - warm] = part[warm:bent]
         change = part[bent:].reshape(state.bent[m].shape) * _MICROMETRE - state.bent[m]

@@ -9,7 +9,8 @@ import numpy as np
 
 from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
-from rigdata.arrays import BoolArray, FloatArray, IntArray
+from model.pad.bending import SHAPES
+from rigdata.arrays import FloatArray, IntArray
 
 
 class BodyStack(NamedTuple):
@@ -31,62 +32,71 @@ class BodyStack(NamedTuple):
     to_coarse: FloatArray
 
 
+#: Points of a pad's loaded attitudes at most.
+ROWS = 400
+#: The numbers of one pad, of which a search is told the first eight.
+PAD = np.dtype(
+    [
+        ("frame", float, (2, 2)),  # Rows: unit vectors along the pivot (normal) and across it (tangent).
+        ("preload", float),  # Cp - Cb, plus running changes [m].
+        ("pivot_radius", float),  # R_P and Cp [m]; of all that is told only clearances grow.
+        ("clearance", float),
+        ("law", float, 4),  # The pivot, see `model.pad.pivot`; laws of somebody's own are asked anew.
+        ("attitudes", float, (4, ROWS)),  # Loaded: r = a + eta, a and b [m], load [N]; the first is the fold.
+        ("rows", int),  # How many of them there are; 0 where they were not asked for.
+        ("flattest", float),  # Wedges b up to here are none of a pad that is stable in tilt [m].
+        ("tilt", float),  # t [rad], eta [m], tilt along the shaft [rad].
+        ("deflection", float),
+        ("axial", float),
+        ("supplied", float),  # What there is of oil at the leading edge [kg/s/m], and leaves the trailing one [kg/s].
+        ("passed", float),
+        ("idle", bool),  # Carries nothing; has a pressure.
+        ("solved", bool),
+        ("rescues", int),  # How often the pad was put back on its loaded attitude.
+        ("inlet", float),  # Of the oil that enters [degC].
+        ("resting", float, 4),  # The film of an idle pad, see `model.film.resting.RestingFilm`.
+        ("wedge", float, 2),  # (a, b) that the pressure was solved with [m].
+        ("force", float, 2),  # As the pressure was solved, and at the temperature found since [N].
+        ("corrected", float, 2),
+        ("stiffness", float, (2, 2)),  # [N/m], [N s/m]
+        ("damping", float, (2, 2)),
+        ("least", float),  # Thinnest film [m].
+        ("steps", int),  # See `model.film.reynolds.FilmForces`.
+        ("heating", float),  # Largest change of temperature that the last step asked for [K].
+        ("felt", float, 2),  # `corrected` and `stiffness` with the pad giving way: what journal and pivot feel.
+        ("felt_stiffness", float, (2, 2)),
+        ("amplitude", float, (SHAPES, 3)),  # Change of the shapes' amplitudes at rest, and per metre of a and b.
+        ("axial_step", float, 3),  # The same of the tilt along the shaft [rad, rad/m].
+        ("moves", float, 2),  # Last step's tilt and deflection.
+    ],
+    align=True,
+)
+
+
 class PadStack(NamedTuple):
-    """What a search is told of the pads; of it only clearances grow, and laws of somebody's own are asked anew."""
+    """The pads of a search."""
 
-    frame: FloatArray  #: (n, 2, 2): Rows: unit vectors along the pivot (normal) and across it (tangent).
-    preload: FloatArray  #: (n,): Cp - Cb, plus running changes [m].
-    pivot_radius: FloatArray  #: (n,): R_P and Cp [m].
-    clearance: FloatArray
+    each: np.ndarray  #: (n,) of `PAD`.
     order: IntArray  #: (n,) of int: The pads in the order in which oil passes them.
-    laws: FloatArray  #: (n, 4): The pivots, see `model.pad.pivot`.
-    curves: FloatArray  #: (n, 5, m): Measured ones.
-    attitudes: FloatArray  #: (n, 4, r): Loaded attitudes: r = a + eta, a and b [m], load [N]; the first is the fold.
-    flattest: FloatArray  #: (n,): Wedges b up to here are none of a pad that is stable in tilt [m].
-    rows: IntArray  #: (n,) of int: How many of the r there are; 0 where they were not asked for.
+    curves: FloatArray  #: (n, 5, m): Measured curves of their pivots.
 
 
-class PadState(NamedTuple):
-    """What a search changes besides the films' arrays."""
+class SearchState(NamedTuple):
+    """What a search changes besides the pads' numbers and the films' arrays."""
 
     position: FloatArray  #: (2,): Journal [m].
-    tilt: FloatArray  #: (n,): t [rad], eta [m], tilt along the shaft [rad].
-    deflection: FloatArray
-    axial: FloatArray
-    supplied: (
-        FloatArray  #: (n,): What there is of oil at the leading edge [kg/s/m], and leaves the trailing one [kg/s].
-    )
-    passed: FloatArray
-    idle: BoolArray  #: (n,) of bool: Carries nothing; has a pressure.
-    solved: BoolArray
-    rescues: IntArray  #: (n,) of int: How often the pad was put back on its loaded attitude.
-    inlet: FloatArray  #: (n,): Of the oil that enters [degC].
-    resting: FloatArray  #: (n, 4): Films of idle pads, see `model.film.resting.RestingFilm`.
-    wedge: FloatArray  #: (n, 2): (a, b) that the pressure was solved with [m].
-    force: FloatArray  #: (n, 2): As the pressure was solved, and at the temperature found since [N].
-    corrected: FloatArray
-    stiffness: FloatArray  #: (n, 2, 2): [N/m], [N s/m]
-    damping: FloatArray
-    least: FloatArray  #: (n,): Thinnest film [m].
-    steps: IntArray  #: (n,) of int: See `model.film.reynolds.FilmForces`.
-    heating: FloatArray  #: (n,): Largest change of temperature that the last step asked for [K].
     shift: FloatArray  #: (n, unknowns): See `model.film.slopes.pressure_change`.
-    felt: FloatArray  #: (n, 2): `corrected`, and ...
-    felt_stiffness: FloatArray  #: (n, 2, 2): ... `stiffness` with the pad giving way: what journal and pivot feel.
     #: (n, nt + 1, nz + 1): Deformation; what is missing of it besides the shapes of the Newton step [m]. Empty
     #: for rigid pads.
     bent: FloatArray
     mismatch: FloatArray
-    amplitude: FloatArray  #: (n, shapes, 3): Change of their amplitudes at rest, and per metre of a and b.
-    axial_step: FloatArray  #: (n, 3): The same of the tilt along the shaft [rad, rad/m].
-    moves: FloatArray  #: (n, 2): Last step's tilt and deflection.
     faces: FloatArray  #: (n, nt + 1, nz + 1): Temperature of the pads' faces [degC].
     warmth: FloatArray  #: (n, q): All temperatures that the iteration finds; whoever writes to them sets the films'.
     figures: FloatArray  #: See `JOURNAL` and those after it.
 
 
-#: Places in `PadState.figures`: temperature of a journal that takes heat, of one that grows, and what that will change
-#: by in this step [degC]; share of the oil that runs back at a leading edge.
+#: Places in `SearchState.figures`: temperature of a journal that takes heat, of one that grows, and what that will
+#: change by in this step [degC]; share of the oil that runs back at a leading edge.
 JOURNAL, GROWN, GROWING, BACKFLOW = range(4)
 
 

@@ -15,10 +15,9 @@ import math
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.interpolation import least, row_below
+from model.interpolation import row_below
 from model.pad.pivot import deflection
 from model.statics.compiled.case import rigid_approach
-from model.statics.compiled.stack import PadStack
 from rigdata.arrays import BoolArray, FloatArray
 
 #: Share of the clearance over which a curve falls to 1/e beyond its fold.
@@ -35,15 +34,14 @@ _MOST_DOUBTFUL = 6
 def pivot_curve(
     attitude: tuple[FloatArray, FloatArray, FloatArray],
     scale: tuple[float, float],
-    law: FloatArray,
-    measured: FloatArray,
+    pivot: tuple[FloatArray, FloatArray],
     gives: FloatArray,
     out: FloatArray,
 ) -> int:
     """A pad's loaded attitudes on its pivot, rising from the fold: r = a + delta(W), a, b [m], W [N]; how many.
 
-    `attitude` is (A, B, W), `scale` Cp and the unit of the load; `gives` (n,) what the pivot gives, empty where `law`
-    says it.
+    `attitude` is (A, B, W), `scale` Cp and the unit of the load; `pivot` its law and curve; `gives` (n,) what it
+    gives, empty where the law says it.
     """
     curvature, wedge, load = attitude
     clearance, unit = scale
@@ -52,7 +50,7 @@ def pivot_curve(
         return 0
     reach = np.empty(count)
     for k in range(count):
-        give = gives[k] if len(gives) > 0 else deflection(law, measured, load[k] * unit)
+        give = gives[k] if len(gives) > 0 else deflection(pivot[0], pivot[1], load[k] * unit)
         reach[k] = clearance * curvature[k] / (1.0 + curvature[k]) + give
     low = count - 1
     while low > 0 and reach[low - 1] < reach[low]:
@@ -65,19 +63,19 @@ def pivot_curve(
     return count - low
 
 
-def first_position(load: FloatArray, pads: PadStack) -> tuple[FloatArray, BoolArray, BoolArray]:
+def first_position(load: FloatArray, pads: np.ndarray) -> tuple[FloatArray, BoolArray, BoolArray]:
     """Journal (2,) [m], which pads carry there, and which do in another equilibrium (none: there is no other).
 
     `load` (2,) [N].
     """
-    loaded = pads.rows >= 2
+    loaded = pads["rows"] >= 2
     position, other = np.zeros(2), np.zeros(len(loaded), dtype=np.bool_)
     stand_on_curves(load, pads, loaded, position)
     beyond = _beyond(pads, position)
     certain = loaded & ~(beyond > 0.0)
     if not (loaded & ~certain).any():
         return position, loaded, other
-    push = pads.attitudes[:, 3, 0] * np.exp(-np.clip(beyond / (_TAIL * pads.clearance), 0.0, 60.0))
+    push = pads["attitudes"][:, 3, 0] * np.exp(-np.clip(beyond / (_TAIL * pads["clearance"]), 0.0, 60.0))
     doubtful = np.flatnonzero(loaded & ~certain & (push > _NOTHING * math.hypot(*load)))[:_MOST_DOUBTFUL]
     for size in range(len(doubtful), -1 if len(doubtful) else 0, -1):
         found = []
@@ -85,64 +83,66 @@ def first_position(load: FloatArray, pads: PadStack) -> tuple[FloatArray, BoolAr
             mask, place = certain.copy(), position.copy()
             mask[list(chosen)] = True
             good = stand_on_curves(load, pads, mask, place)
-            if good and not (_beyond(pads, place) > _FOLD * pads.clearance)[mask].any():
+            if good and not (_beyond(pads, place) > _FOLD * pads["clearance"])[mask].any():
                 found.append((place, mask))
         if found:
             return *found[0], found[1][1] if len(found) > 1 else other
     return position, certain, other
 
 
-def _beyond(pads: PadStack, position: FloatArray) -> FloatArray:
+def _beyond(pads: np.ndarray, position: FloatArray) -> FloatArray:
     """How far pads stand beyond their folds at a position, (n,) [m]."""
-    reach = pads.preload + pads.frame[:, 0] @ position
-    return np.asarray(pads.attitudes[:, 0, 0] - reach)
+    reach = pads["preload"] + pads["frame"][:, 0] @ position
+    return np.asarray(pads["attitudes"][:, 0, 0] - reach)
 
 
 @inner
-def _pushes(pads: PadStack, m: int, position: FloatArray) -> tuple[float, float]:
+def _pushes(pad: np.record, position: FloatArray) -> tuple[float, float]:
     """Load of a pad's curve at a position [N], and its slope [N/m]."""
-    reach = rigid_approach(pads, position, m)
-    table = pads.attitudes[m, 0]
-    load = pads.attitudes[m, 3]
+    reach = rigid_approach(pad, position)
+    table, load = pad.attitudes[0], pad.attitudes[3]
     if reach < table[0]:
-        tail = _TAIL * pads.clearance[m]
+        tail = _TAIL * pad.clearance
         push = load[0] * math.exp(max((reach - table[0]) / tail, -60.0))
         return push, push / tail
-    low = row_below(table, pads.rows[m], reach)
+    low = row_below(table, pad.rows, reach)
     slope = (load[low + 1] - load[low]) / (table[low + 1] - table[low])
     return load[low] + slope * (reach - table[low]), slope
 
 
 @inner
 def _missing(
-    load: FloatArray, pads: PadStack, loaded: BoolArray, position: FloatArray, slopes: FloatArray
+    load: FloatArray, pads: np.ndarray, loaded: BoolArray, position: FloatArray, slopes: FloatArray
 ) -> tuple[float, float]:
     """Part of the load that the loaded pads do not carry at a position; `slopes` (2, 2) are set."""
     fx, fy = load[0], load[1]
     slopes[:] = 0.0
     for m in range(len(loaded)):
         if loaded[m]:
-            push, slope = _pushes(pads, m, position)
-            fx = fx - pads.frame[m, 0, 0] * push
-            fy = fy - pads.frame[m, 0, 1] * push
+            pad = pads[m]
+            push, slope = _pushes(pad, position)
+            fx = fx - pad.frame[0, 0] * push
+            fy = fy - pad.frame[0, 1] * push
             for i in range(2):
                 for j in range(2):
-                    slopes[i, j] += slope * pads.frame[m, 0, i] * pads.frame[m, 0, j]
+                    slopes[i, j] += slope * pad.frame[0, i] * pad.frame[0, j]
     return fx, fy
 
 
 @compiled
-def stand_on_curves(load: FloatArray, pads: PadStack, loaded: BoolArray, position: FloatArray) -> bool:
+def stand_on_curves(load: FloatArray, pads: np.ndarray, loaded: BoolArray, position: FloatArray) -> bool:
     """Move the journal to where a set of pads carries the load, by Newton's steps down the energy; False if nowhere."""
-    room, stiff, largest = math.inf, 0.0, 0.0
+    room, stiff, largest, least = math.inf, 0.0, 0.0, math.inf
     for m in range(len(loaded)):
+        pad = pads[m]
+        least = min(least, pad.clearance)
         if loaded[m]:
-            last = pads.rows[m] - 1
-            room = min(room, pads.attitudes[m, 1, last] - pads.preload[m])
-            stiff = max(stiff, pads.attitudes[m, 3, last] / pads.clearance[m])
+            last = pad.rows - 1
+            room = min(room, pad.attitudes[1, last] - pad.preload)
+            stiff = max(stiff, pad.attitudes[3, last] / pad.clearance)
     if math.isinf(room):
         return False
-    room = max(room, 0.05 * least(pads.clearance))
+    room = max(room, 0.05 * least)
     size = math.hypot(load[0], load[1])
     if position[0] == 0.0 and position[1] == 0.0 and size > 0.0:
         position[0] = 0.4 * room * load[0] / size
@@ -152,7 +152,7 @@ def stand_on_curves(load: FloatArray, pads: PadStack, loaded: BoolArray, positio
     if size == 0.0:
         for m in range(len(loaded)):
             if loaded[m]:
-                largest = max(largest, _pushes(pads, m, position)[0])
+                largest = max(largest, _pushes(pads[m], position)[0])
         size = largest
     for _ in range(60):
         if math.hypot(fx, fy) < _GOOD_ENOUGH * size:

@@ -10,12 +10,11 @@ from model.compilation import inner
 from model.film.mesh import FilmGrid
 from model.film.models import solve_by
 from model.film.oil_state import least_share, set_viscosity
-from model.interpolation import least
 from model.statics.compiled.bending import bend_pads, change_shape
 from model.statics.compiled.case import ACROSS, BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Problem, along, rigid_approach
 from model.statics.compiled.heat import rest_films
 from model.statics.compiled.place import let_idle, rescue
-from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, PadState, grid_of, work_of
+from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, SearchState, grid_of, work_of
 from rigdata.arrays import FloatArray
 
 #: Largest step of the journal, as a share of the least clearance: the films' slopes are those of where it stands.
@@ -35,31 +34,31 @@ def solve_pressures(problem: Problem, sharp: bool) -> bool:
     lost = False
     for k in range(len(pads.order)):
         m = pads.order[k]
-        grid, work = grid_of(grids, m), work_of(works, m)
-        state.supplied[m] = case.fresh + case.mixing * state.passed[pads.order[k - 1]] / case.length
-        while not state.idle[m]:
+        pad, grid, work = pads.each[m], grid_of(grids, m), work_of(works, m)
+        pad.supplied = case.fresh + case.mixing * pads.each[pads.order[k - 1]].passed / case.length
+        while not pad.idle:
             if not sharp and case.thermal != ACROSS:
                 set_viscosity(work, case.running.oil)
-            a = rigid_approach(pads, state.position, m) - state.deflection[m]
-            b = along(pads, state.position, m) + pads.pivot_radius[m] * state.tilt[m]
-            wedge, speed = (pads.clearance[m], a, b), case.running.speed
-            found = solve_by(case.rupture, grid, work, wedge, speed, sharp, state.supplied[m])
-            state.wedge[m, 0], state.wedge[m, 1], state.solved[m] = a, b, True
-            state.least[m], state.steps[m] = found.min_film, found.steps
+            a = rigid_approach(pad, state.position) - pad.deflection
+            b = along(pad, state.position) + pad.pivot_radius * pad.tilt
+            wedge, speed = (pad.clearance, a, b), case.running.speed
+            found = solve_by(case.rupture, grid, work, wedge, speed, sharp, pad.supplied)
+            pad.wedge[0], pad.wedge[1], pad.solved = a, b, True
+            pad.least, pad.steps = found.min_film, found.steps
             for i in range(2):
-                state.force[m, i] = found.force[i]
+                pad.force[i] = found.force[i]
                 if not sharp:
-                    state.corrected[m, i] = found.force[i]
+                    pad.corrected[i] = found.force[i]
                 for j in range(2):
-                    state.stiffness[m, i, j], state.damping[m, i, j] = found.stiffness[i, j], found.damping[i, j]
+                    pad.stiffness[i, j], pad.damping[i, j] = found.stiffness[i, j], found.damping[i, j]
             if sharp or found.steps < 0 or found.force[0] > 0.0 or case.hold.flexure > 0.0:
                 break
-            if not rescue(pads, works, state, m):
-                let_idle(state, m)
-        if state.idle[m]:
-            state.solved[m] = False
+            if not rescue(pad, work, state.position):
+                let_idle(pad)
+        if pad.idle:
+            pad.solved = False
             work.pressure[1:] = 0.0
-        elif state.steps[m] < 0:
+        elif pad.steps < 0:
             lost = True
     rest_films(problem)
     return not lost
@@ -68,14 +67,14 @@ def solve_pressures(problem: Problem, sharp: bool) -> bool:
 @inner
 def grow_and_bend(problem: Problem, relaxation: float, change: float) -> float:
     """What a journal grows, what pads bend; returns the largest change asked for, from `change` on [K]."""
-    state = problem.state
     if problem.case.closing > 0.0 and change < BOUNDLESS:
         change = max(change, _warm_journal(problem, relaxation))
-    for m in range(len(state.tilt)):
+    for m in range(len(problem.pads.each)):
+        pad = problem.pads.each[m]
         for i in range(2):
-            state.felt[m, i] = state.corrected[m, i]
+            pad.felt[i] = pad.corrected[i]
             for j in range(2):
-                state.felt_stiffness[m, i, j] = state.stiffness[m, i, j]
+                pad.felt_stiffness[i, j] = pad.stiffness[i, j]
     # a deformation counts like a temperature change of the same weight in the film's resistance
     share = bend_pads(problem.bodies, problem) if change < BOUNDLESS else 0.0
     return max(change, HEAT_PER_FORCE * share)
@@ -96,32 +95,35 @@ def _warm_journal(problem: Problem, relaxation: float) -> float:
 @inner
 def _mean_temperature(problem: Problem) -> float:
     """Mean of the films that carry, by area; of the oil where it enters if none does [degC]."""
-    weight, temperature, state = problem.grids.area, problem.works.temperature, problem.state
+    weight, temperature, pads = problem.grids.area, problem.works.temperature, problem.pads.each
     area, total = 0.0, 0.0
-    for m in range(len(state.tilt)):
-        if not state.idle[m]:
+    for m in range(len(pads)):
+        if not pads[m].idle:
             for i in range(temperature.shape[1]):
                 for j in range(temperature.shape[2]):
                     area += weight[m, i, j]
                     total += weight[m, i, j] * temperature[m, i, j]
-    return total / area if area > 0.0 else state.inlet[0]
+    return total / area if area > 0.0 else pads[0].inlet
 
 
 @inner
 def move(problem: Problem, shift: FloatArray, damping: float) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
     grids, _, pads, works, state, case = problem
-    scale = min(damping, _LONGEST_STEP * least(pads.clearance) / max(math.hypot(shift[0], shift[1]), 1e-30))
+    scale = damping
     extra, bending = np.empty((0, 0)), state.bent.size > 0
     closing = case.closing * state.figures[GROWING]
-    axial = np.zeros(len(state.tilt))
-    for m in range(len(state.tilt)):
-        if state.solved[m]:
-            frame, moves = pads.frame[m], state.moves[m]
+    axial = np.zeros(len(pads.each))
+    length = max(math.hypot(shift[0], shift[1]), 1e-30)
+    for m in range(len(pads.each)):
+        pad = pads.each[m]
+        scale = min(scale, _LONGEST_STEP * pad.clearance / length)
+        if pad.solved:
+            frame, moves = pad.frame, pad.moves
             da = frame[0, 0] * shift[0] + frame[0, 1] * shift[1] - moves[1] + closing
-            db = frame[1, 0] * shift[0] + frame[1, 1] * shift[1] + pads.pivot_radius[m] * moves[0]
+            db = frame[1, 0] * shift[0] + frame[1, 1] * shift[1] + pad.pivot_radius * moves[0]
             if bending:
-                axial[m] = change_shape(problem.bodies, state, case, m, da, db)
+                axial[m] = change_shape(problem.bodies, problem, m, da, db)
                 extra = _extra(grid_of(grids, m), state, m, axial[m])
             worst = least_share(grid_of(grids, m), work_of(works, m), da, db, extra)
             if worst * damping < _SHRINK - 1.0:
@@ -129,25 +131,26 @@ def move(problem: Problem, shift: FloatArray, damping: float) -> bool:
     state.position[0] += scale * shift[0]
     state.position[1] += scale * shift[1]
     state.figures[GROWN] += scale * state.figures[GROWING]
-    for m in range(len(state.tilt)):
-        pads.clearance[m] -= scale * closing
+    for m in range(len(pads.each)):
+        pad = pads.each[m]
+        pad.clearance -= scale * closing
         # a pad that friction stops where it does not tilt stops there, whatever the step's length
-        stops = state.moves[m, 0] == -state.tilt[m]
-        state.tilt[m] = 0.0 if stops else state.tilt[m] + scale * state.moves[m, 0]
-        state.deflection[m] += scale * state.moves[m, 1]
-        if bending and state.solved[m]:
+        stops = pad.moves[0] == -pad.tilt
+        pad.tilt = 0.0 if stops else pad.tilt + scale * pad.moves[0]
+        pad.deflection += scale * pad.moves[1]
+        if bending and pad.solved:
             extra = _extra(grid_of(grids, m), state, m, axial[m])
             for i in range(extra.shape[0]):
                 for j in range(extra.shape[1]):
                     works.extra[m, i, j] += scale * extra[i, j]
                     state.bent[m, i, j] += scale * state.mismatch[m, i, j]
-            state.axial[m] += scale * axial[m]
+            pad.axial += scale * axial[m]
     state.figures[GROWING] = 0.0
     return scale == 1.0
 
 
 @inner
-def _extra(grid: FilmGrid, state: PadState, m: int, axial: float) -> FloatArray:
+def _extra(grid: FilmGrid, state: SearchState, m: int, axial: float) -> FloatArray:
     """Change of a film's shape besides its (a, b), (nt + 1, nz + 1) [m]."""
     out = state.mismatch[m].copy()
     if axial != 0.0:

@@ -1,0 +1,205 @@
+"""Temperatures of films, pads, journal and grooves together, with the temperature across the films (`thermal="thd"`).
+
+- Film: `model.film.cross_energy`; its viscosity across the film acts on the pressure (`model.film.cross_film`).
+- Pads conduct, `model.pad.operators`: film temperature and heat flux are those of the face, free faces cool in the oil.
+- Journal: one temperature, at which it keeps no heat over a turn.
+- Grooves: the flow balance of `model.statics.compiled.heat`, oil of one temperature enters.
+
+For given flows all of it is linear: a film's temperatures are those of fresh oil, plus what they answer to its inlet
+and to the journal, and inlets and journal follow from one small system. What a pad conducts hangs on all of its face;
+that is solved as a correction by a few Krylov steps. It is a compiled call of its own beside the search's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from model.compilation import compiled, inner
+from model.film.cross_energy import cross_operator
+from model.film.cross_film import CrossFilm, CrossOperator, cross_pressure_change, set_cross_viscosity
+from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
+from model.film.dense import times
+from model.film.models import TURBULENT
+from model.film.oil_state import edge_flows
+from model.interpolation import largest
+from model.pad.bending import PadDeformation
+from model.statics.compiled.case import BOUNDLESS, HEATING_STEP, Problem
+from model.statics.compiled.heat import balance_heat, note_heat
+from model.statics.compiled.stack import BACKFLOW, JOURNAL, grid_of, work_of
+from rigdata.arrays import FloatArray
+
+#: What a pad conducts is solved to this share in every step; what is left contracts with the rest.
+_CONDUCTION_TOLERANCE = 0.03
+#: And to this one where the last step has changed a temperature by more than so much [K]: all else is far off, too.
+_ROUGH_TOLERANCE, _ROUGH = 0.15, 3.0
+#: Share of a pad's clearance, about two films, through which heat gets from its face into the oil that carries it away.
+_FACE_SHARE = 0.05
+
+
+class Across(NamedTuple):
+    """What a search across films works on besides, n pads."""
+
+    films: CrossFilm  #: Side by side.
+    operator: CrossOperator  #: Room for the balances of one film after the other.
+    guesses: FloatArray  #: (n, c, c): See `_settled`.
+    #: (n, nt + 1, lines * cells, 3), (n, 3, nt + 1, nz + 1): Answers of cells and faces to all else, to a kelvin of the
+    #: inlet, and of the journal.
+    fields: FloatArray
+    faces: FloatArray
+    outlet: FloatArray  #: (n,): Of the oil at the trailing edge [degC].
+
+
+def across_of(
+    films: CrossFilm, bodies: Sequence[PadDeformation], clearances: FloatArray, conductivity: float
+) -> Across:
+    """Room for the heat of films with temperatures across."""
+    n, rows, lines, cells = films.temperature.shape
+    powers = [round(math.log2(_FACE_SHARE * c / conductivity)) for c in clearances.tolist()]
+    fields = np.zeros((n, rows, lines * cells, 3))
+    fields[:, 0, :, 1] = 1.0
+    return Across(
+        films,
+        CrossOperator.place(rows, lines, cells),
+        np.array([_settled(body, power) for body, power in zip(bodies, powers, strict=True)]),
+        fields,
+        np.empty((n, 3, rows, lines)),
+        np.full(n, math.nan),
+    )
+
+
+@lru_cache(maxsize=64)
+def _settled(pad: PadDeformation, power: int) -> FloatArray:
+    """About what the pad's coarser nodes change by, per kelvin that the film would bring them by, (c, c).
+
+    For a film whose oil lies behind a resistance of 2^power [m^2 K/W].
+    """
+    return np.asarray(np.linalg.inv(np.eye(pad.flux.shape[1]) + 2.0**power * (pad.to_coarse @ pad.flux)))
+
+
+@inner
+def _film(films: CrossFilm, m: int) -> CrossFilm:
+    """One film across."""
+    return CrossFilm(
+        films.edges, films.temperature[m], films.face[m], films.fluidity[m], films.shear[m], films.centre[m],
+        films.eddy[m], films.mixing[m], films.driven[m],
+    )  # fmt: skip
+
+
+@compiled
+def set_cross_viscosities(problem: Problem, across: Across) -> None:
+    """Viscosities of the films that carry, for their pressure."""
+    running, turbulent = problem.case.running, (0.0, 0.0)
+    if problem.case.rupture == TURBULENT:
+        turbulent = (running.speed, running.heat[0] / max(running.heat[1], 1e-9))
+    for m in range(len(problem.pads.each)):
+        if not problem.pads.each[m].idle:
+            set_cross_viscosity(_film(across.films, m), work_of(problem.works, m), running.oil, turbulent)
+
+
+@compiled
+def settle_cross_temperatures(problem: Problem, across: Across, relaxation: float) -> float:
+    """Temperatures of all films, pads and the journal for the present flows; returns the largest change asked for [K].
+
+    As `exchange_heat` of `model.statics.compiled.heat`.
+    """
+    pads, state, case = problem.pads, problem.state, problem.case
+    n, limits = len(pads.each), (relaxation, HEATING_STEP)
+    flows, outlets, taken = np.empty((n, 2)), np.zeros((n, 3)), np.zeros((n, 3))
+    for m in range(n):
+        pad = pads.each[m]
+        if pad.solved:
+            entering, sides = edge_flows(grid_of(problem.grids, m), work_of(problem.works, m), math.inf)
+            flows[m, 0], flows[m, 1] = entering, entering - sides
+            _answer(problem, across, m, outlets[m], taken[m])
+        else:  # an idle pad passes its inlet on, somewhat warmer
+            flows[m] = pad.resting[1]
+            outlets[m, 0], outlets[m, 1] = pad.resting[2] - pad.inlet, 1.0
+    inlets, journal = balance_heat(pads.order, (flows, outlets, taken), pads.each["solved"], case.supply, case.mixing)
+    change = 0.0
+    for m in range(n):
+        pad = pads.each[m]
+        hotter = inlets[m] - pad.inlet
+        pad.inlet += _limited_share(hotter, limits) * hotter
+        change = note_heat(pad, abs(hotter), (0.0, 0.0), change)
+        if pad.solved:
+            grid, work, cross = grid_of(problem.grids, m), work_of(problem.works, m), _film(across.films, m)
+            weights, running = (1.0, inlets[m], journal), case.running
+            asked = _warm(cross, across.fields[m], across.faces[m], weights, limits)
+            across.outlet[m] = outlets[m, 0] + outlets[m, 1] * inlets[m] + outlets[m, 2] * journal
+            more = cross_pressure_change(grid, work, cross, running.speed, running.oil, state.shift[m])
+            change = note_heat(pad, asked, more, change)
+    state.figures[JOURNAL] = journal
+    return change
+
+
+@inner
+def _warm(
+    cross: CrossFilm,
+    fields: FloatArray,
+    faces: FloatArray,
+    weights: tuple[float, float, float],
+    limits: tuple[float, float],
+) -> float:
+    """Change a film's temperatures by a share of what is asked for, no more than a limit; returns the largest [K]."""
+    sources, inlet, journal = weights
+    asked = np.empty((fields.shape[0], fields.shape[1]))
+    for i in range(asked.shape[0]):
+        for k in range(asked.shape[1]):
+            asked[i, k] = sources * fields[i, k, 0] + inlet * fields[i, k, 1] + journal * fields[i, k, 2]
+    asked -= cross.temperature.reshape(asked.shape)
+    face = sources * faces[0] + inlet * faces[1] + journal * faces[2] - cross.face
+    change = largest(asked.reshape(-1))
+    hotter = largest(face.reshape(-1))
+    if not change >= hotter:
+        change = hotter
+    share = _limited_share(change, limits)
+    cross.temperature.reshape(asked.shape)[:] += share * asked
+    cross.face[:] += share * face
+    return change
+
+
+@inner
+def _limited_share(change: float, limits: tuple[float, float]) -> float:
+    """Share of a change of temperature that is made."""
+    return limits[0] * min(1.0, limits[1] / max(abs(change), 1e-30))
+
+
+@inner
+def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken: FloatArray) -> None:
+    """What a film's temperatures are made of: with all else at zero, per kelvin of its inlet, of the journal.
+
+    Of cells and faces; of the oil at the trailing edge (3,) [degC], and what the journal takes (3,) [W]. Which share of
+    the oil runs back where it enters is noted in the figures.
+    """
+    grid, work, cross = grid_of(problem.grids, m), work_of(problem.works, m), _film(across.films, m)
+    pad, state, case = problem.pads.each[m], problem.state, problem.case
+    bodies, operator = problem.bodies, across.operator
+    assert bodies is not None
+    fields, faces, (specific, conductivity) = across.fields[m], across.faces[m], case.running.heat
+    journal = state.figures[JOURNAL] if math.isfinite(state.figures[JOURNAL]) else case.supply
+    heat = (specific, conductivity, case.kept, 1.0, case.running.oil[1])
+    back = cross_operator(grid, work, cross, case.running.speed, heat, operator)
+    state.figures[BACKFLOW] = max(state.figures[BACKFLOW], back)
+    body = (bodies.flux[bodies.which[m]], bodies.to_coarse[bodies.which[m]], across.guesses[m])
+    around = problem.pads.each["inlet"].mean()  # what the grooves hold
+    into_pad = times(body[0], times(body[1], (cross.face - around).reshape(-1))).reshape(cross.face.shape)
+    operator.dissipation[:, :: len(cross.edges) - 1] -= station_heat(grid, into_pad)
+    taken[:] = march_cross(operator, fields, operator.dissipation)
+    for q in range(3):
+        given = into_pad if q == 0 else np.zeros(into_pad.shape)
+        face_temperature(work, cross.edges, conductivity, fields[:, :, q], given, faces[q])
+    missing = faces[0] + pad.inlet * faces[1] + journal * faces[2] - cross.face
+    if 0.0 < largest(missing.reshape(-1)) < BOUNDLESS:
+        solved = (grid, work, cross.edges, conductivity)
+        tolerance = _ROUGH_TOLERANCE if pad.heating > _ROUGH else _CONDUCTION_TOLERANCE
+        more = conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
+        taken[0] += more if math.isfinite(more) else 0.0
+    weight = operator.carried.reshape(-1) / operator.carried.sum()
+    for q in range(3):
+        for k in range(len(weight)):
+            outlet[q] += weight[k] * fields[-1, k, q]
