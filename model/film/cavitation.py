@@ -83,7 +83,10 @@ def solve_film_jfo(
         return forces
     film = fed_film(grid, work, wedge, speed, supplied)
     _starved(film)
-    if not work.ruptured.any():
+    full = True
+    for ruptured in work.ruptured.reshape(-1):  # numpy's own question would load scipy
+        full = full and not ruptured
+    if full:
         return forces
     x, band = np.empty((len(work.unknown), 1)), np.empty((len(work.unknown), 2 * work.band.shape[1] - 1))
     steps = _pivot(film, band, x)

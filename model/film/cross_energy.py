@@ -88,8 +88,11 @@ def _make_less(temperature: FloatArray, thinning: float, dissipation: FloatArray
 @inner
 def _flow_back(grid: FilmGrid, work: FilmWork, speed: float, flows: FloatArray) -> float:
     """See what `cross_operator` returns; `flows` of the cells over the leading edge."""
-    net = np.sum(flows)
-    back = max(0.0, -np.sum(np.minimum(flows, 0.0)) - _MOST_BACK * net) / max(net, 1e-300)
+    net, back = 0.0, 0.0
+    for flow in flows.reshape(-1):
+        net += flow
+        back -= min(flow, 0.0)
+    back = max(0.0, back - _MOST_BACK * net) / max(net, 1e-300)
     for j in range(flows.shape[0]):
         dragged = 0.25 * speed * (work.thickness[0, j] * work.density[0, j] + work.thickness[1, j] * work.density[1, j])
         back = max(back, 1.0 - work.flow[0, j] / (_LEAST_NET_FLOW * dragged * grid.height[j]))

@@ -186,7 +186,9 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
     back = cross_operator(grid, work, cross, case.running.speed, heat, operator)
     state.figures[BACKFLOW] = max(state.figures[BACKFLOW], back)
     body = (bodies.flux[bodies.which[m]], bodies.to_coarse[bodies.which[m]], across.guesses[m])
-    around = problem.pads.each["inlet"].mean()  # what the grooves hold
+    around = 0.0  # what the grooves hold
+    for other in problem.pads.each:
+        around += other.inlet / len(problem.pads.each)
     into_pad = times(body[0], times(body[1], (cross.face - around).reshape(-1))).reshape(cross.face.shape)
     operator.dissipation[:, :: len(cross.edges) - 1] -= station_heat(grid, into_pad)
     taken[:] = march_cross(operator, fields, operator.dissipation)
@@ -199,7 +201,10 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
         tolerance = _ROUGH_TOLERANCE if pad.heating > _ROUGH else _CONDUCTION_TOLERANCE
         more = conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
         taken[0] += more if math.isfinite(more) else 0.0
-    weight = operator.carried.reshape(-1) / operator.carried.sum()
+    carried, total = operator.carried.reshape(-1), 0.0
+    for k in range(len(carried)):
+        total += carried[k]
+        for q in range(3):
+            outlet[q] += carried[k] * fields[-1, k, q]
     for q in range(3):
-        for k in range(len(weight)):
-            outlet[q] += weight[k] * fields[-1, k, q]
+        outlet[q] /= total
