@@ -101,6 +101,11 @@ class RunReader(RecordFile):
         """Raw readings of channels of one device, (stop - start,) each."""
         raise NotImplementedError
 
+    def _grid(self, name: str) -> Grid:
+        """Channels at the times of `name`."""
+        grids = self._layout().grids
+        return next((grid for grid in grids if name in grid.channels), grids[0])
+
     def devices(self) -> tuple[Device, ...]:
         """Channels that are sampled together."""
         return by_clock(self._layout().grids, self.channels)
@@ -133,12 +138,16 @@ class RunReader(RecordFile):
         return rate
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of channels of the run's own device, (stop - start,) each."""
-        faults = self._layout().faults
+        """Raw readings of `names` along the run's own times, (stop - start,) each."""
+        faults, apart = self._layout().faults, self.apart()
         for name in names:
             if name in faults:
                 raise faults[name]
-        return self.read_device(names, start, stop)
+        own = [name for name in names if name not in apart]
+        readings = dict(zip(own, self.read_device(own, start, stop), strict=True))
+        for name in apart.intersection(names):
+            readings[name] = self._along(name, start, stop)
+        return [readings[name] for name in names]
 
     def time(self, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,): the file's, else counted from the rate."""
@@ -147,11 +156,27 @@ class RunReader(RecordFile):
 
     def device_time(self, name: str, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,) of a channel's samples: the file's, else counted from its device's rate."""
-        grids = self._layout().grids
-        grid = next((grid for grid in grids if name in grid.channels), grids[0])
+        grid = self._grid(name)
         if grid.clock:
             return self._clock_times(grid.clock, start, stop)
         return grid.begin + np.arange(start, stop) / grid.rate
+
+    def _along(self, name: str, start: int, stop: int) -> FloatArray:
+        """Readings of another device along the run's own times, for those who look at all channels together.
+
+        Straight lines, missing from a step before the first sample and after the last; no phasor may come from it.
+        """
+        grid = self._grid(name)
+        (values,) = self.read_device([name], 0, grid.length)
+        at = self.device_time(name, 0, grid.length)
+        finite = np.isfinite(values)
+        if not finite.any():
+            return np.full(stop - start, np.nan)
+        at, time = at[finite], self.time(start, stop)
+        within = np.clip(time, at[0], at[-1])
+        readings = np.interp(within, at, values[finite])
+        readings[np.abs(time - within) > 1.0 / grid.rate] = np.nan
+        return readings
 
     def _planned(self, timings: Mapping[str, Grid], run_rate: float | None, member: str, remedy: str) -> Layout:
         """Put together what is sampled together; what has no usable times is a fault of that channel."""

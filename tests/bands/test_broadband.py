@@ -442,6 +442,9 @@ def test_lines_are_driven_where_the_command_is_or_else_what_moves():
     command = np.zeros((8, 60, 2), complex)
     command[:, 37] = 1.0
     assert np.flatnonzero(spectra(D, D, command, period=1.0).driven).tolist() == [37]
+    command[:, 20:40, 1] = np.geomspace(1.0, 0.01, 20)
+    command[:, 40:, 0] = 1e-3
+    assert np.flatnonzero(spectra(D, D, command, period=1.0).driven).tolist() == list(range(20, 40))
     assert spectra(D, D, command).driven.all()
 
 

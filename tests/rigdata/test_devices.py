@@ -239,9 +239,11 @@ def test_groups_and_waves_of_two_rates(tmp_path, file, clock):
     expect_two_devices(recorded(tmp_path / file, {}, PROBES | cells(**clock)), clock.get("clock", "250 Hz"))
 
 
-def test_what_is_sampled_apart_is_noted(tmp_path):
+def test_all_channels_together_are_laid_along_the_runs_own_times_and_what_is_apart_is_noted(tmp_path):
     run = recorded(tmp_path / "a.h5", FAST | FORCES, slow_cells(), RATE)
-    np.testing.assert_array_equal(run.reader.read(["X1A"], 4, 40)[0], X[4:40])
+    x, force = run.reader.read(["X1A", "L1H"], 4, 40)
+    np.testing.assert_array_equal(x, X[4:40])
+    np.testing.assert_allclose(force, np.interp(T[4:40], COUNTED, F))
     (note,) = run.reader.problems()
     assert note.severity == "note"
     assert note.what == "sampled apart: X1A, X1B (1000 Hz); L1H, L1V (250 Hz)"

@@ -90,6 +90,7 @@ class Rig:
     excitation: str = "sine"
     band: tuple[float, float] = (6.0, 90.0)
     notch: tuple[float, float] = (0.0, 0.0)  #: part of the band without power [Hz]
+    tones: str = "every"  #: lines of a multi-sine: every one, odd ones, odd ones but every fifth
     amplitude: float = 0.015  #: of the displacement: of a sine the amplitude, of a band the deviation
     sizes: tuple[float, ...] = (1.0,)  #: of the runs' amplitudes, in turn
     harmonic: float = 0.0  #: of the drive's force, at twice its frequency
@@ -157,7 +158,7 @@ def band_course(rig: Rig, t: Array, rng: np.random.Generator) -> Array:
         power = (f >= low) & (f <= high) & ~((f > rig.notch[0]) & (f < rig.notch[1]))
         return np.fft.irfft(np.fft.rfft(rng.standard_normal(len(t))) * power, len(t))
     if rig.excitation == "multisine":
-        tones = np.arange(low, high + 0.5)
+        tones = tones_of(rig)
         return np.asarray(np.cos(2 * np.pi * np.outer(t, tones) + rng.uniform(0, 6.28, len(tones))).sum(axis=1))
     if rig.excitation == "sweep":
         begin, end = rig.share[0] * rig.seconds, rig.share[1] * rig.seconds
@@ -168,6 +169,13 @@ def band_course(rig: Rig, t: Array, rng: np.random.Generator) -> Array:
         shape = np.cos(np.pi * (t - blow) / 6e-3) ** 2 * (abs(t - blow) < 3e-3)
         total += rig.senses[i % len(rig.senses)] * shape
     return total
+
+
+def tones_of(rig: Rig) -> Array:
+    """Lines of a multi-sine [Hz]."""
+    tones = np.arange(rig.band[0], rig.band[1] + 0.5)
+    odd = {"every": tones > 0, "odd": tones % 2 == 1, "some odd": (tones % 2 == 1) & (tones % 10 != 5)}
+    return np.asarray(tones[odd[rig.tones]])
 
 
 def course_signals(rig: Rig, test: Test, rng: np.random.Generator, film: tuple[float, float]) -> dict[str, CubicSpline]:

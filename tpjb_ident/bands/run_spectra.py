@@ -28,8 +28,9 @@ from tpjb_ident.runs.point_data import mean_temperatures
 
 #: Share of the power that a period may leave where none is stated.
 _LEFT = 0.5
-#: Share of a period's largest line from which another one is driven, in the command, and in motion or force.
-_DRIVEN, _MOVED = 0.03, 0.1
+#: Share of a period's largest line, in motion, force or command, from which another one is driven; below it those of
+#: the command are, one after the other, down to a step by so much, or to so little.
+_DRIVEN, _STEP, _NOTHING = 0.1, 3.0, 1e-3
 #: Kinds that may repeat themselves, and whose records may begin and end in motion; a hammer waits for rest.
 OPEN_ENDS = ("multisine", "random", "sweep")
 
@@ -81,10 +82,13 @@ class RunSpectra:
         """Bins (n_bins,) that the excitation drives; of a period the film fills others by its curvature."""
         if self.period is None:
             return np.ones(len(self.frequencies), dtype=bool)
-        least = _MOVED if self.command is None else _DRIVEN
         drives = [self.D, self.F] if self.command is None else [self.command]
         sizes = [np.linalg.norm(drive.mean(axis=0), axis=1) for drive in drives]
-        return np.asarray(np.max([size / max(size.max(), 1e-300) for size in sizes], axis=0) > least)
+        share = np.max([size / max(size.max(), 1e-300) for size in sizes], axis=0)
+        falling = np.sort(share)[::-1] if self.command is not None else np.zeros(0)
+        steps = (falling[1:] < _DRIVEN) & (falling[:-1] > _STEP * falling[1:])
+        last = falling[:-1][steps][0] if steps.any() else min(_DRIVEN, falling.min(initial=_DRIVEN))
+        return np.asarray(share >= max(last, _NOTHING))
 
     @property
     def amplitude(self) -> float:

@@ -173,7 +173,7 @@ def read_parquet(path: Path) -> list[Series]:
         numeric = [c for c in schema if pa.types.is_integer(c.type) or pa.types.is_floating(c.type)]
         refuse_claim(SAMPLE * rows * (len(numeric) + 1), path)
         for column in numeric:
-            values = table.read([column.name], use_threads=False).column(0).cast(pa.float64()).to_numpy()
+            values = table.read([column.name]).column(0).cast(pa.float64()).to_numpy()
             columns[column.name] = to_temporary_file(values)
             units[column.name] = (column.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
     rate = (schema.metadata or {}).get(b"sample_rate_hz")

@@ -225,6 +225,7 @@ def good_bands() -> list[Condition]:
         rig("multi-sine, one command at rest", idle, **{**tones, "directions": (0.0, 90.0)}),
         rig("multi-sine, times of 4 digits", setup={"rate": 2048.0, "time_digits": 4}, **tones),
         rig("multi-sine, tones beside the mains", setup={"hum": {"force": 15.0}}, **tones),
+        rig("multi-sine, odd lines, some left out", tones="some odd", **tones),
         rig("multi-sine, 500 mm", **{**LARGE, **tones, "band": (4.0, 30.0)}),
         rig("blows in both senses, floating", ("X1 L1", {"noise": 0.2}), limits=WIDE, **blows),
     ]
@@ -237,6 +238,7 @@ def marched_rigs() -> list[Condition]:
     curved, cubic, pads = mr.CubicFilm(square=-2.0), mr.CubicFilm(cube=3.0), mr.CubicFilm(cube=2.0, square=-1.5)
     band = {**BAND, "band": (6.0, 70.0), "seconds": 4.0}
     random, tones, blows = ({**band, "excitation": name} for name in ("random", "multisine", "impact"))
+    quiet: Entries = {"quiet": 0.2, "limits": WIDER}
     return [
         march("short bearing"),
         march("short bearing, floating", **hung),
@@ -250,6 +252,11 @@ def marched_rigs() -> list[Condition]:
         march("multi-sine, 0.2 % rms", law=pads, amplitude=0.002, quiet=0.2, limits=WIDER, **tones),
         march("random, 0.3 % rms", law=pads, amplitude=0.003, quiet=0.2, limits=WIDER, **random),
         march("blows in both senses, 2 %", law=curved, amplitude=0.02, quiet=0.1, limits=WIDE, **blows),
+        march("odd multi-sine, 2 % rms", law=pads, amplitude=0.02, tones="odd", **quiet, **tones),
+        march("odd multi-sine, some left out, 2 % rms", law=pads, amplitude=0.02, tones="some odd", **quiet, **tones),
+        march("multi-sine, 1X of 3 %", law=pads, amplitude=0.003, unbalance=0.03, **quiet, **tones),
+        march("random, 1X of 6 %", law=pads, amplitude=0.003, unbalance=0.06, **quiet, **random),
+        march("short bearing, random, 1X of 10 %", "reported", amplitude=0.003, unbalance=0.1, quiet=0.2, **random),
         march("short bearing, sine of 3 %", "reported", amplitude=0.03),
         march("sine of 12 %", "reported", pads, amplitude=0.12),
         march("short bearing, sine of 20 %, floating", "reported", amplitude=0.2, **hung),
