@@ -21,7 +21,6 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.units import to_si
 from tpjb_ident.arguments import as_bearing, as_campaign
 from tpjb_ident.diagnosis.campaign import Baseline, CampaignDiagnosis, diagnose_campaign
-from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.observations.observe import DynamicTest, Layout
 from tpjb_ident.diagnosis.plan import CampaignPlan
 from tpjb_ident.diagnosis.plan import plan as work_out
@@ -30,6 +29,7 @@ from tpjb_ident.errors import ArgumentError
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
+    from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 
 #: Set points of a plan and what they must be.
 _POINT = {"load": "force", "load_direction": "angle", "speed": "speed", "excitation": "speed"}
@@ -84,8 +84,7 @@ def diagnose(
     demo: All pivots have 37.6 ± 1.9 % of the formula's stiffness
     """
     opened = as_campaign(campaign, "campaign")
-    chosen = settings or DiagnoseSettings()
-    return diagnose_campaign(opened, _bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), chosen)
+    return diagnose_campaign(opened, _bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), settings)
 
 
 def plan(
