@@ -226,8 +226,7 @@ class _Search:
         if fit is None:
             return
         wrong = fit.posterior.refused > Deciding.better or fit.needs_more(self.settings)
-        # what stands beside one that was begun coarsely is past its jumps
-        passed = not fit.faults or any(labels <= proposal.labels for labels in self.begun)
+        passed = not fit.faults or proposal.labels in self.begun
         if wrong and not passed and self._near(fit, fit.posterior.promised, 0.0):
             self.begun[proposal.labels] = -math.inf
             coarse = self._reached(Start(fit.faults, fit.linear.theta, fit.linear.jacobian, coarse=True))
