@@ -16,6 +16,9 @@ from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap, noise_floor
 
+#: Gaps that differ by less are the same: so far apart are two predictions of points that an effect does not move.
+_ALIKE = 0.005
+
 
 @dataclass(frozen=True)
 class Touched:
@@ -40,8 +43,6 @@ class HeldOut:
     #: (n,): its faults alone, every tolerance as stated; None: no equilibrium
     stated: FloatArray | None = field(repr=False)
     touched: tuple[Touched, ...] = ()  #: by fault, the largest remainder first; none where one has no equilibrium
-    #: gap over everything before and after, tolerances as uncertain as stated: what they scatter by is no gap
-    whole: tuple[float, float] = (math.nan, math.nan)
 
     @property
     def as_stated(self) -> float:
@@ -71,7 +72,7 @@ class HeldOut:
     def is_shrunk(self, settings: Deciding) -> bool:
         """Whether every fault halves the gap along what it moves, and the gap over everything does not grow."""
         halved = all(one.remaining <= settings.halved**2 for one in self.touched)
-        return bool(self.touched) and halved and self.whole[1] < self.whole[0]
+        return bool(self.touched) and halved and self.as_stated < self.before + _ALIKE
 
 
 def _share(after: float, before: float, floor: float) -> float:
@@ -92,16 +93,7 @@ def held_out_gap(run: Map, fit: Fit) -> HeldOut:
         return HeldOut(fit, None)
     moved = [] if any(one is None for one in (whole, *partial)) else zip(known, partial, strict=True)
     touched = [_touched(fit, theta, fault, (part, whole)) for (fault, _), part in moved]
-    held = fit.problem.held
-    rows = held if any(one.unseen for one in touched) else np.ones_like(held)
-    ends = _scattered(fit, fit.problem.scaled(fit.problem.base), rows), _scattered(fit, stated, rows)
-    return HeldOut(fit, stated * fit.problem.sigma, tuple(sorted(touched, key=lambda one: -one.remaining)), ends)
-
-
-def _scattered(fit: Fit, predicted: FloatArray, rows: BoolArray) -> float:
-    """Gap of a prediction (n,) in units of noise, model error and what tolerances scatter by, as they are stated."""
-    rest, columns = (fit.problem.measured - predicted)[rows], fit.linear.jacobian[rows][:, fit.unknowns.tolerances]
-    return math.sqrt(float(rest @ np.linalg.solve(_covariance(fit, rows, columns), rest)) / len(rest))
+    return HeldOut(fit, stated * fit.problem.sigma, tuple(sorted(touched, key=lambda one: -one.remaining)))
 
 
 def _neutral(theta: FloatArray, *parts: slice | IntArray) -> FloatArray:

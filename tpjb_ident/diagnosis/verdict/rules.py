@@ -120,7 +120,7 @@ def _shrunk(held: HeldOut) -> str:
     where = "on points left out of the fit" if one.unseen else "over all points (those left out do not show it)"
     return (
         f"along what {one.label} does the gap goes from {one.before:.2f} to {one.after:.2f} standard deviations of all "
-        f"else that may be off, {where}, over everything from {held.whole[0]:.2f} to {held.whole[1]:.2f} of it; {whole}"
+        f"else that may be off, {where}; over everything {whole}"
     )
 
 
