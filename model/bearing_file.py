@@ -1,7 +1,5 @@
 """Bearing files (`tpjb-bearing/1`, TOML): every key with its unit checked, every fault said with its place and cure."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

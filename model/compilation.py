@@ -7,8 +7,6 @@ stamped with the sources of all of them.
 numba itself is imported at the first call of a loop: a process that only reads, draws or unpickles does without.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import hashlib

@@ -1,7 +1,5 @@
 """The registry of a prediction's conditions; a new one is one line of `conditions.toml`."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path

@@ -6,8 +6,6 @@ stiffness stand on the pad's diagonal, Eq. (12); eliminating (theta, eta) gives 
 those of `docs/theory.md`: the force on the housing, dF = +h d.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Kinds of it stand with what they refuse: `model.bearing.BearingError`, `model.ef
 `model.predict.OperatingPointError`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from rigdata.near_names import hint

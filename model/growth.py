@@ -5,8 +5,6 @@ Cb and Cp alike; a housing that is hotter gives it to Cb; pads that are hotter t
 their larger radius to Cp. What pads grow above the oil's supply temperature, unevenly, is `model.pad.bending`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 numpy's and scipy's would load scipy: 0.3 s and 20 MB of a process that predicts.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -6,8 +6,6 @@ the edge where the shaft comes from, so the mirror leaves it; it changes where t
 the bearing file states.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What the model can do beyond the paper's: switches of the film, its heat and the clearances, all off by default."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from model.errors import OptionError, check_known

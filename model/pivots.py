@@ -5,8 +5,6 @@ delta(W) = W / K(W); small vibrations feel the tangent dW/ddelta. ``kirk-secant`
 vibrations too, which is what the paper compares.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Numbers that no bearing has: refused by name, before they overflow somewhere in the film or the pad."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Predict: one call from a bearing and an operating point to coefficients, position and fields."""
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Iterable

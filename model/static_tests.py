@@ -4,8 +4,6 @@ They are cold and without rotation: `clearance_change` does not act on them, the
 instruments do.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from model.setup import Setup

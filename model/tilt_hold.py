@@ -12,8 +12,6 @@ All count from the untilted, concentric attitude.
 R. D. Mindlin, ASME J. Appl. Mech. 16 (1949) 259; K. L. Johnson, Contact Mechanics (1985), Eq. (4.22), (7.40), (7.42).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

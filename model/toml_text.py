@@ -1,7 +1,5 @@
 """TOML from a stranger: parsed, or refused with a `ModelError` or tomllib's own before it can take long."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

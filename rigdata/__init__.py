@@ -8,8 +8,6 @@ run.vector("displacement")  # two channels, turned into X and Y
 ```
 """
 
-from __future__ import annotations
-
 import importlib
 from typing import TYPE_CHECKING
 

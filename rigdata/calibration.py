@@ -3,8 +3,6 @@
 A phasor that was recorded through a filter and late by a delay is divided by `ChannelResponse.at` of its frequency.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import re

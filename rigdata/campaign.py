@@ -1,7 +1,5 @@
 """A campaign: its manifest read and checked, its runs ready to be read lazily."""
 
-from __future__ import annotations
-
 import hashlib
 import html
 import itertools

@@ -1,7 +1,5 @@
 """Statistics of one channel's raw readings, gathered block by block."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Devices of a run: channels that are sampled together, each device at its own times."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,5 @@
 """The nearest known name to one that nobody knows: every refusal of a name says what may have been meant."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 

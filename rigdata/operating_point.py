@@ -1,7 +1,5 @@
 """The operating point of a run: the key under which results are grouped."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Samples of a run, calibrated: one channel, or two as X and Y."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """One run of a campaign: lazy, calibrated access, channel by channel."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field, replace

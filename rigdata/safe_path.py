@@ -1,7 +1,5 @@
 """File names from a manifest, which a stranger may have written: kept inside the campaign folder."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path, PureWindowsPath
 

@@ -1,7 +1,5 @@
 """Readings along two or more directions, turned into X and Y."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Iterable, Sequence

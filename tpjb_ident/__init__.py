@@ -13,8 +13,6 @@ p = ti.predict(bearing, load=5000.0, speed=2 * np.pi * 22, excitation=2 * np.pi 
 Everything takes and gives SI floats or arrays (radians, rad/s), or pint quantities.
 """
 
-from __future__ import annotations
-
 import importlib
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Columns of a table that people read: heading, unit and form; the one place that says in which units they read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

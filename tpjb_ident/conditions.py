@@ -5,8 +5,6 @@ refuses a name that is not there. With an error a number is not to be trusted: t
 warning the number holds as far as its interval goes, and somebody should look. A note says how the number was made.
 """
 
-from __future__ import annotations
-
 import csv
 import itertools
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """What the package raises when it must refuse: one base, known to the command line."""
 
-from __future__ import annotations
-
 
 class TpjbError(ValueError):
     """Base of every refusal of this package: what was given cannot be used; the message says why and what to do."""

@@ -1,7 +1,5 @@
 """`model` is a common name: make sure that the one that Python finds is ours."""
 
-from __future__ import annotations
-
 
 def check_model() -> None:
     """Do nothing if `import model` gives the bundled bearing model."""

@@ -1,7 +1,5 @@
 """Numbers as a reader wants them: as many digits as the interval allows, minus signs that do not break."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

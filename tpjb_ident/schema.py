@@ -4,8 +4,6 @@ The names are promised to scripts (docs/results.md, whose lists a test holds to 
 what is derived from a column (an interval's ends, a standard error) adds its own ending behind the unit.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -4,8 +4,6 @@ To add one of your own, call `register` with an `EffectKind`: a name, its parame
 function that takes a `Setup` and returns a changed one.
 """
 
-from __future__ import annotations
-
 from model.effects.effect import Effect, apply_effects, load_effects
 from model.effects.kind import EffectError, EffectKind, EffectWords, Parameter
 from model.effects.registry import kind_of, known_effects, register

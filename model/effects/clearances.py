@@ -1,7 +1,5 @@
 """Pads, shaft and housing that stand otherwise than drawn."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """An effect with its parameters, what a list of them makes of a `Setup`, and files of them (`tpjb-effects/1`, TOML)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial

@@ -1,7 +1,5 @@
 """What an effect is: a name, parameters with units and plausible ranges, and one function."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Records that read otherwise than they should."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Oil that is another, is hotter or is short; heat that goes elsewhere; pads that it bends."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

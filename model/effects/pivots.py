@@ -1,7 +1,5 @@
 """Pivots that give way, damp, roll or slide otherwise than their laws say."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from model.bearing import Bearing

@@ -1,7 +1,5 @@
 """Which effects there are: those of the files beside this one, and those that a user registers."""
 
-from __future__ import annotations
-
 import functools
 import importlib
 import importlib.util

@@ -1,7 +1,5 @@
 """What stands in series with the bearing, or beside it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

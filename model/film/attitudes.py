@@ -10,8 +10,6 @@ It is rounded to `_STEP`, so that bearings that are nearly alike share a curve: 
 pads are near their fold; the film decides.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import NamedTuple

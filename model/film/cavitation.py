@@ -25,8 +25,6 @@ J. Tribology 132 (2010) 041702 (complementarity); L. Portugal, J. Judice, L. Vic
 (block principal pivoting).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

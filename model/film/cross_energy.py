@@ -12,8 +12,6 @@ runs back near a leading edge carries no heat upstream (T. A. Reyhner, I. Flugge
 (1968) 173).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

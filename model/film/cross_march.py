@@ -1,7 +1,5 @@
 """Temperatures across a film from its factorised heat balances: marched as answers, or for what a pad conducts."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small dense systems: Gauss' elimination, the combination of vectors nearest to another, Anderson's mixing."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -8,8 +8,6 @@ Where the film is ruptured, dissipation and flow shrink alike, so that the tempe
 the mass flows used here are those of the full film.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

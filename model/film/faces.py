@@ -1,7 +1,5 @@
 """What passes between the nodes of a film: every face conducts by pressure, and the journal drags through it."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

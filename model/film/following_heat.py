@@ -10,8 +10,6 @@ the heat does in an equilibrium. The oil enters at its own temperature, and jour
 heavy to follow. At omega = 0 this is the slope of the static locus; far above one turn of oil it is the frozen film.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

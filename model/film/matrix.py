@@ -3,8 +3,6 @@
 And L U of those that are not symmetric: films that conserve mass, heat balances across a film.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from model.compilation import inner

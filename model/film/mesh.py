@@ -1,7 +1,5 @@
 """Mesh and arrays of one film: uniform along the arc, finer towards the edges across, half as wide where symmetric."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Models of a film that ruptures, by name. To add one: a file beside this one, and here its name and its call."""
 
-from __future__ import annotations
-
 from model.compilation import inner
 from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork, Wedge

@@ -1,7 +1,5 @@
 """Between two solutions of a film: oil properties, how far a step may go, what passes the edges."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

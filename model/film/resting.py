@@ -9,8 +9,6 @@ than there the film is striated and keeps its flow. Along the arc a full film wi
 which has a closed solution for the exponential mu(T) of Eq. (4); the density is that of the oil that enters.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -16,8 +16,6 @@ the matrix is a symmetric M-matrix, for which the primal-dual active set of the 
 where the film is symmetric about mid-length.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

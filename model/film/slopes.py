@@ -4,8 +4,6 @@ All of them have one form. A perturbation changes what flows through every face 
 flows into each control volume too much is the right-hand side, and one factorisation serves all of them.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -20,8 +20,6 @@ C. W. Ng, C. H. T. Pan, ASME J. Basic Eng. 87 (1965) 675; the fitted constants a
 ASME J. Lubr. Technol. 96 (1974) 109, and textbooks after them give them.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

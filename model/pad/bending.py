@@ -10,8 +10,6 @@ All deformations are relative to the rigid pad held at its pivot face; tilt and 
 business. Positive is outward: the film grows thicker by it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any

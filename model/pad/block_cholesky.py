@@ -5,8 +5,6 @@ speed of BLAS 3; a general sparse solver needs several times as long for the hun
 compliance has.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Piecewise polynomials on one axis: the building brick of the tensor-product finite elements of a pad."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -4,8 +4,6 @@ A row holds which formula it is, its constants, and last the factor on the stiff
 W / delta; of a measured curve `curve` (5, m) holds the loads and the coefficients of the cubics from each on.
 """
 
-from __future__ import annotations
-
 import math
 
 from model.compilation import inner

@@ -1,7 +1,5 @@
 """Pad solutions kept between processes: a few files in the user's cache folder, and never a reason to fail."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import os

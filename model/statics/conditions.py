@@ -4,8 +4,6 @@ Equations have solutions where bearings have none. These are told from the drawi
 the iteration went.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Static equilibrium of a bearing: where the journal stands, and what the films are then."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """One pad with its film: mesh, arrays, geometry."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """What enters and leaves the film of a pad: flows, side leakage, temperatures; what its shear costs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Which physics a set-up asks for, as compiled searches take it: the case's numbers, bodies that bend and conduct."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

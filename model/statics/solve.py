@@ -1,7 +1,5 @@
 """Find a static equilibrium, Eq. (1): from a neighbour, from the curves of its pads, or by raising load or heat."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The ``[channels.*]`` tables of a manifest: channels, and one described otherwise for some runs (``[[..for]]``)."""
 
-from __future__ import annotations
-
 import fnmatch
 import itertools
 from collections import Counter

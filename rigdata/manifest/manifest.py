@@ -1,7 +1,5 @@
 """The manifest of a campaign (`campaign.toml`): parsed and checked as a whole, every problem at once."""
 
-from __future__ import annotations
-
 import codecs
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """What every reader of one run's record offers to `rigdata.campaign.Run`, and which file names which reader takes."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping, Sequence

@@ -3,8 +3,6 @@
 Nothing is interpolated: a slow channel's samples are its cells that are not empty, in order.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 import tempfile

@@ -1,3 +1,1 @@
 """Looking at exports of which nothing is known yet: what the channels may be, which runs these are, a draft."""
-
-from __future__ import annotations

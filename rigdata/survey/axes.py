@@ -4,8 +4,6 @@ Both read the same vector, so the angle of their readings follows its direction,
 and mirrored where the second is clockwise from it: directions that are known tell both, and signs with them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """What a channel may measure, by its unit and its name; where an entry of a draft comes from."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import re

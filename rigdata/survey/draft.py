@@ -3,8 +3,6 @@
 Carried on, open places and guesses are filled in; what was typed stays.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import math

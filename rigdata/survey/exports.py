@@ -1,7 +1,5 @@
 """Find the records in a folder and read them without a manifest."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a record may be: by its file's name, by how the forces move, by its lines."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import re

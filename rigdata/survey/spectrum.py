@@ -1,7 +1,5 @@
 """Amplitude spectrum and statistics of one channel, for a first look."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

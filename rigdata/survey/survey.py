@@ -1,7 +1,5 @@
 """A folder of exports as a whole: what its records tell of each other and of the sensors' axes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Writing a virtual campaign, as HDF5 or a folder of CSV, everything or nothing; and its truth, to be kept outside."""
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile

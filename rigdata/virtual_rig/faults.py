@@ -4,8 +4,6 @@ Four places can be at fault: a sensor (its reading is wrong from the start), a r
 after the converter), a run (the test was done or noted wrongly) and a file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from fnmatch import fnmatchcase

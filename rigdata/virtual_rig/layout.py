@@ -1,7 +1,5 @@
 """How a campaign is laid out on disk: a folder of CSV in some dialect, or one HDF5 file, each with its manifest."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from math import degrees

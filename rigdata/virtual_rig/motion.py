@@ -4,8 +4,6 @@ With the shaft turning (dynamic and locus runs) actuators push through the film,
 there are dry load steps toward one pad, and a small load swept once around the clearance polygon.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 

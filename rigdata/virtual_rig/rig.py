@@ -3,8 +3,6 @@
 From motion to readings: axes, gains, delays, runout, noise, glitches, zero, the converter, faults of the record.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property

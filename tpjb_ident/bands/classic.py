@@ -6,8 +6,6 @@ chapter 9; Rocklin, Crowley and Vold 1985 for Hv. The slope of h over the bins o
 records leak, are taken off first, as they are from the responses that count.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

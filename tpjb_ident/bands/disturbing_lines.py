@@ -4,8 +4,6 @@ The amplitude of each may change slowly over the record, as a polynomial of time
 or creeps, is taken along. A periodic excitation is fitted together with them, period by period, and stays as it is.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

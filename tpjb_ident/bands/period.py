@@ -10,8 +10,6 @@ repeats by chance: a period's lines must stand above the bins beside them (F tes
 of logarithms), at a chance that all lags looked at share.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

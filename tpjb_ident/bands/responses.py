@@ -7,8 +7,6 @@ doi:10.1016/j.ymssp.2009.08.003). The instrument is the command. Without one it 
 taken to be the force's, H1) or the force (all is the displacement's, H2): truth lies between.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Read everything of a campaign and report every problem found, not just the first."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -5,8 +5,6 @@ way under the load that they carry, what a loader can hold against a stator's we
 from their sizes at the excitation line alone.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

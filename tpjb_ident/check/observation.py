@@ -1,7 +1,5 @@
 """What one pass over a run's samples leaves for the checks that compare runs, of whatever kind."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Mapping, Sequence

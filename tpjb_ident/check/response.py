@@ -4,8 +4,6 @@ A bearing film pushes back: the symmetric parts of stiffness and damping are pos
 wrong input or with the wrong sign turns the answer into its mirror image, which is not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

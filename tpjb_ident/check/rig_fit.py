@@ -4,8 +4,6 @@ The film is left free in every block: it takes two of its equations, and what re
 probes tell one vector, a housing on springs moves against the cells' force, one that floats moves as the probes show.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

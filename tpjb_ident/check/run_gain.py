@@ -10,8 +10,6 @@ itself, nothing contradicts it, and nothing else in the run is strange. The mean
 moved by anything.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from operator import attrgetter

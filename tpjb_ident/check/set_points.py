@@ -1,7 +1,5 @@
 """Set points of a run against what its channels show: load, directions, speed and sense of rotation, excitation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Problems that a run's time and one channel's readings show by themselves: gaps, jitter; dead, stuck, clipped."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Check dry, clearance and locus runs: what their own fits refuse, and whether the shaft goes where it is pushed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Which wiring fault of two sensors would explain what they show: swapped, inverted, ten times off."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np

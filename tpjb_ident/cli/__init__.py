@@ -1,7 +1,5 @@
 """The `tpjb` command. Nothing else imports this package."""
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

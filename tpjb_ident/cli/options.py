@@ -1,7 +1,5 @@
 """Every option and argument that can be typed, by command and name: the table `options.csv`."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Effects in the words and units of an engineer: the words are the effect's own, here they get their numbers."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

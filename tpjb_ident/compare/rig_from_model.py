@@ -1,7 +1,5 @@
 """The bearing model as the truth of a virtual rig: what `tpjb simulate` and the recovery tests write campaigns from."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Iterable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Tables of other programs: coefficients in the place of a campaign, predictions that stand beside ours."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

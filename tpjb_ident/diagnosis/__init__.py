@@ -1,7 +1,5 @@
 """Find where simulation and measurement disagree, name the missing effect, show that the gap shrinks."""
 
-from __future__ import annotations
-
 from tpjb_ident.model_guard import check_model
 
 check_model()  # before any file of this package imports the model

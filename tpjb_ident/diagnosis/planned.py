@@ -1,7 +1,5 @@
 """Planned: the observation vector of tests that have not been run, from the model and an assumed noise."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

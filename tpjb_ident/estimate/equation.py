@@ -14,8 +14,6 @@ kappa is one but for wrong sensors. Where no accelerometer tells and the manifes
 a housing that stands still, 1 of one that floats.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How H changes with the static load, dH / d ln W, by the campaign's other loads."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal
 

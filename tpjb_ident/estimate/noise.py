@@ -4,8 +4,6 @@ A random effect is one pattern c of the readings with a random size of variance 
 run's own mean load, a miss of the load where its effect is not known, and the scatter of the force from run to run.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray

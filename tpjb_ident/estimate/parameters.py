@@ -1,7 +1,5 @@
 """Values of the terms' parameters with their priors: one row that all points share, and a table of the points' own."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

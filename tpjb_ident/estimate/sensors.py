@@ -1,7 +1,5 @@
 """Sensors of a campaign as the equation knows them, and what its housing stands on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

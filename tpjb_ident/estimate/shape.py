@@ -4,8 +4,6 @@ K-C, h = K + i omega C, and K-C-M, h = K - omega^2 M + i omega C, hold for all l
 band shares one departure from such a model. Sines, lines of a multi-sine and groups of bins take part alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -4,8 +4,6 @@ For a q-dimensional complex circular Gaussian residual with covariance S, u = sq
 a chi distribution with 2 q degrees of freedom; everything below is an expectation over it.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from math import comb

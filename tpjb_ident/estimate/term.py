@@ -4,8 +4,6 @@ A term speaks of readings. It knows nothing of residuals, weights or points, nor
 A user's own term is a subclass handed to `tpjb_ident.estimate.solve`; docs/design.md has a worked example.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ counted as noise of the probes, such motion would explain away what an error of 
 displacements and oil forces answer it as they do in the means of the runs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

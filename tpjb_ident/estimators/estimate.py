@@ -1,7 +1,5 @@
 """One interface to all estimators: displacement and force phasors in, dynamic stiffness out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

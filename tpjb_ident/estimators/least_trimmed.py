@@ -4,8 +4,6 @@ Many two-window starts are concentrated on the windows nearest to them (multivar
 Agullo, Croux & Van Aelst 2008), all starts at once.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ do not matter. A biweight S-start was tried and given up: with 45 % of the windo
 same disturbance its reweighting leaves the good solution that the trimmed start has found.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

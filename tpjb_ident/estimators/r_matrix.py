@@ -15,8 +15,6 @@ the unknowns, and sees both equations of a window at once. `phasor_table` builds
 estimator.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

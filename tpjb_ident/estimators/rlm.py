@@ -10,8 +10,6 @@ reaching the iteration limit is reported (statsmodels says nothing). What cannot
 weights of their own, and the M-estimator has no breakdown against bad displacements. `mm` exists for that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

@@ -5,8 +5,6 @@ towards zero there, directions that differ by more than their repeats show as sc
 the others loses its weight: `tpjb_ident.estimate.solve`, without terms.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

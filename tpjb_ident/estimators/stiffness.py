@@ -1,7 +1,5 @@
 """The 2x2 complex dynamic stiffness of a bearing at one frequency, with everything known about it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 

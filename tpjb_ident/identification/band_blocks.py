@@ -1,7 +1,5 @@
 """All bands of a campaign as blocks of the measurement equation: a point a group of bins, a block a run's response."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 

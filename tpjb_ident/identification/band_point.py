@@ -3,8 +3,6 @@
 No bin belongs to two lines, so lines err apart from each other.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

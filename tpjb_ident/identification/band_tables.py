@@ -1,7 +1,5 @@
 """From the solve of the bands to their results: lines, models and points with their intervals by source."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

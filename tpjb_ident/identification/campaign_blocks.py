@@ -1,7 +1,5 @@
 """Rig and blocks of a campaign from the means of its points."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 
 import numpy as np

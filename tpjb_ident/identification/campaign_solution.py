@@ -1,7 +1,5 @@
 """The solve of a whole campaign: means of its points to H of all of them, clocks and mains put right on the way."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 

@@ -6,8 +6,6 @@ rate explains the slopes of all runs; where the manifest states clocks, they are
 turn as the windows of sines do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar

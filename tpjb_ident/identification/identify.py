@@ -1,7 +1,5 @@
 """A campaign's dynamic runs to dynamic coefficients: the whole path, point by point."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

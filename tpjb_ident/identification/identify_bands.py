@@ -1,7 +1,5 @@
 """A campaign's broadband runs to h over frequency: the whole path, all operating points in one solve."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """One operating point of a solved campaign: H with its budget, every other method beside it, figures and flags."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The windows of one operating point: a robust start of H, and one phasor per run and channel."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

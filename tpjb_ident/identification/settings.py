@@ -1,7 +1,5 @@
 """What a user may choose when records become coefficients."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from tpjb_ident.phasors.run_phasors import PhasorSettings

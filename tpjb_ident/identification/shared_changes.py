@@ -1,7 +1,5 @@
 """What every source does to the entries of points: what scatters with the runs, and what points share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np

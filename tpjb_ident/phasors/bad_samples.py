@@ -4,8 +4,6 @@ Channel by channel: what is bad in a probe stays good in the cells. An isolated 
 several stand close together, it is a disturbance, and its flanks lie below the limit.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray

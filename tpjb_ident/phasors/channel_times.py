@@ -1,7 +1,5 @@
 """The channels of a run by the devices that recorded them, read stretch by stretch at each device's own times."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -8,8 +8,6 @@ at all f, which those of a record at its own rate do at no sum of two frequencie
 linear makes of the shaft's own motion stands at X - f and 2X - f, and is no image.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Reading a run chunk by chunk and fitting its windows, every channel at its own times."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -7,8 +7,6 @@ clocks that differ. The whole record tells a line from that down to one resoluti
 slow change, one more line explains what is left.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.signal import find_peaks
 

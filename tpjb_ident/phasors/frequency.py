@@ -4,8 +4,6 @@ Set points are not frequencies: the shaft creeps and the generator has a clock o
 advance from window to window tells a frequency error to a fraction of the line's width.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Single lines of a run: what the film makes of the motion, and mains; kept when the windows' phasors are put away."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

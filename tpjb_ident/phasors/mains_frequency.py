@@ -4,8 +4,6 @@ It matters where an excitation stands on 50 or 60 Hz; elsewhere a mains line of 
 other. So only then a few records are looked at, those in which nothing else stands there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Stands in the place of the run's reader. What is asked for beyond the beginning 
 that a short record is read once as a whole, and no sample of a long one twice by those who look at its beginning.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property

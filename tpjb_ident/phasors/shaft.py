@@ -1,7 +1,5 @@
 """The shaft of a run: its speed by tachometer and record, and where it stands against a drive that turns with it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

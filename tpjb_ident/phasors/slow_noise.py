@@ -13,8 +13,6 @@ The four levels are estimated by restricted maximum likelihood (Patterson and Th
 1971, 545-554), pooled over all series of a campaign: the probes are the same in each.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

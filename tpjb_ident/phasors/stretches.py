@@ -4,8 +4,6 @@ Windows of another excitation, of none, or across the change say nothing of the 
 has. A change of the drive shows in forces and displacements alike; what shows in one of them is a fault of channels.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Windows tell outliers from the rest; only the whole record tells lines one resol
 noise is in the cells around a line.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 

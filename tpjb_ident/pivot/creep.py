@@ -8,8 +8,6 @@ end it. Both are tried with several time constants, weighed by how well they fit
 at the largest load counts as an error of all deflections alike.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

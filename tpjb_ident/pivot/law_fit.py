@@ -11,8 +11,6 @@ with half a pseudo-pad spread over the laws, so that a pad of its own kind keeps
 pad's own affair.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -22,8 +22,6 @@ Each shape has a weak prior (mean, standard deviation) that says what is physica
 extrapolation sane where the records say nothing, and it makes the laws' evidences comparable.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ of one common factor, is a signature, and an exchange or a reversal at the recor
 exchanged together with its cable and amplifier keeps its signature: that cannot be seen here.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The page of two campaigns held against each other: what changed, by how much, and how sure that is."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any

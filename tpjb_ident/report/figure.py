@@ -4,8 +4,6 @@ A picture (`tpjb_ident.report.plots`) is drawn once in the colours of `LIGHT`; s
 inside the report gets CSS variables in their place, so that it follows the reader's light or dark screen.
 """
 
-from __future__ import annotations
-
 import functools
 import html
 import io

@@ -1,7 +1,5 @@
 """One self-contained HTML page from headings, sentences, tables and figures; everything from outside is escaped."""
 
-from __future__ import annotations
-
 import base64
 import datetime
 import functools

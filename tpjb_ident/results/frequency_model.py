@@ -4,8 +4,6 @@ Chi-square says which of them the data support. A tilting-pad bearing owes neith
 K-C-M is refused too the raw H is the answer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

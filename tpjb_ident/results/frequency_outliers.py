@@ -5,8 +5,6 @@ point stands apart where its own H, left free, makes far more of what K-C-M leav
 in every entry does, which has as many numbers: H of a film runs smoothly. Where pads bend it, little is told this way.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

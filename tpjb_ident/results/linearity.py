@@ -10,8 +10,6 @@ films integrated in time it is right within a fifth, so 1.3 times it is taken. W
 another line on it) the second harmonic stands in, 4.5 q2^2: for a force law x / (1 - x / c)^n the change is 2.7 q2^2.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

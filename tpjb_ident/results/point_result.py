@@ -1,7 +1,5 @@
 """What a campaign says about one operating point, with everything needed to believe it or not."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

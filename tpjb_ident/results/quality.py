@@ -1,7 +1,5 @@
 """Figures and flags that say how far a point's coefficients can be trusted."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

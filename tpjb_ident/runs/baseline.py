@@ -4,8 +4,6 @@ What hoses, seals and cables carry past the film is in the cells' force too. The
 F = H_b D without oil; in the dynamic runs F = (H + H_b) D.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

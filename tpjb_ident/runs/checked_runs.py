@@ -1,7 +1,5 @@
 """What `tpjb check` knows of the dynamic runs, carried to the operating points that it touches."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """All windows of one operating point, gathered from its runs, and the film temperatures over them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

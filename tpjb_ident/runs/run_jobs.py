@@ -4,8 +4,6 @@ A job carries the run's description and reads the file itself, so that little tr
 travel back.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

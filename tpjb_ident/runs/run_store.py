@@ -9,8 +9,6 @@ dates. A record that changes while it is read is not kept. Files are written who
 read is no result. No pickles: a folder of results may come from anybody.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

@@ -13,8 +13,6 @@ regressed on the set points, with an intercept: F_mean = g W + z, both complex (
 that is off looks like a load that misses its set point by more the smaller it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol

@@ -1,7 +1,5 @@
 """What differs between results and the same results computed again: numbers by size, not by text."""
 
-from __future__ import annotations
-
 import json
 import math
 import tomllib

@@ -10,8 +10,6 @@ with open_workers(count=4) as workers:   # or open_workers(scheduler="tcp://host
 ```
 """
 
-from __future__ import annotations
-
 import collections
 import functools
 import gc

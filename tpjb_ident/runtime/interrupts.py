@@ -3,8 +3,6 @@
 A signal is delivered again until the error that it raises is being handled or the command has said `heard`.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """The output folder of a command: written whole or not at all, and never among somebody's raw data."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import glob

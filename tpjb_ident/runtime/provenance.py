@@ -1,7 +1,5 @@
 """Where a result comes from: versions and fingerprints, and the JSON files that we wrote and read back."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import json

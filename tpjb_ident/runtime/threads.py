@@ -1,7 +1,5 @@
 """Threads of linear algebra: what its libraries read when they are loaded, and how they are told later."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -5,8 +5,6 @@ was run at several amplitudes, the runs tell G, and H is that of no motion; wher
 it is considered, and what the harmonics let expect goes into the interval.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray

@@ -1,7 +1,5 @@
 """Angles of the sensors' axes, as far as the manifest states their uncertainty: one number a sensor."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray

@@ -1,7 +1,5 @@
 """Errors of the dry shaker test that says what the rig carries beside the film: the same in all runs of a frequency."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray

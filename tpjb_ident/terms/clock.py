@@ -3,8 +3,6 @@
 A clock exists between devices only. Whatever phases do within one device, its clock is one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

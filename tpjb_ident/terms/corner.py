@@ -6,8 +6,6 @@ theirs where they lead what the springs make of the cells' force; over frequenci
 never lag by a corner: where they seem to, the accelerometers lead.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

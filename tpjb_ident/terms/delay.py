@@ -4,8 +4,6 @@ Sensors of one clock share a device; where no clock is stated, those of one quan
 cells from accelerometers (a spring knows no phase); probes against cells only a film of known form would tell.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray

@@ -8,8 +8,6 @@ judged. Held against loaded films integrated in time at 1 to 6 % of the clearanc
 up to 0.6, they change H by 0.13 to 0.62 times as much as a random band of one direction does).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray

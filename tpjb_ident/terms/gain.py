@@ -1,7 +1,5 @@
 """Gains of single sensors, as far as the manifest states their uncertainty: one number a sensor for the campaign."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

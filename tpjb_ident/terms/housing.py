@@ -5,8 +5,6 @@ Floating, a = omega^2 (kappa d + C F_oil): the shaft gives way to the film's for
 accelerometers have another gain, axis or delay than is stated. A shaft's lag grows with the film's damping.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """What all static loads miss together, size and turn, in every load direction: no record of a dynamic run tells it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -10,8 +10,6 @@ and weakly::
 with k, omega c the mean direct coefficients of the point and four real 2 x 2 matrices a load direction and speed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray

@@ -7,8 +7,6 @@ by least squares. That has many minima, so it is no term of the linear solve: wh
 before the solve, and what the angles leave uncertain is its own share of the budget.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The housing's mass, as far as the manifest states its uncertainty: it weighs the inertia in the cells' force."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray

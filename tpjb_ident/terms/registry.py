@@ -1,7 +1,5 @@
 """All terms of the measurement equation, in the order of the budget: a new term is one file and its name here."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ The film is a little warmer in one run than in another. At a single line that is
 the lines of a run have it in common, and only its size among the runs tells how far H may be off.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

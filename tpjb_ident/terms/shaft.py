@@ -4,8 +4,6 @@ Such a vector has the drive's frequency and is the same in all runs of a point b
 drive stands otherwise against the shaft tell it from the motion.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray

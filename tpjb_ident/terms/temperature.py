@@ -1,7 +1,5 @@
 """Drift of probes' gains with temperature, as far as the manifest states how well their coefficients are known."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray

@@ -3,8 +3,6 @@
 Every block has a tilt of its own, about X and about Y: a random effect, wide beside what two planes of probes tell.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray

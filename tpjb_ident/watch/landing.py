@@ -1,7 +1,5 @@
 """Records that have landed: nobody writes to them any more; those that no run names, by their name or content."""
 
-from __future__ import annotations
-
 import math
 import re
 import time

@@ -1,7 +1,5 @@
 """How the runs of a plan stand, and what to do next: what to repair, to repeat, to run, and what the plan lacks."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Looks at a campaign's folder again and again: what landed, how good it is, what it gives, what comes next."""
 
-from __future__ import annotations
-
 import contextlib
 import datetime
 import functools

@@ -1,7 +1,5 @@
 """Pads that give way, on the arrays of a compiled search: what `model.pad.bending` does, pad by pad in one call."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 

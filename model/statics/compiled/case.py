@@ -1,7 +1,5 @@
 """What one search is told, and where a pad stands in it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

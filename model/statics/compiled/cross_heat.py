@@ -10,8 +10,6 @@ and to the journal, and inlets and journal follow from one small system. What a 
 that is solved as a correction by a few Krylov steps. It is a compiled call of its own beside the search's.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import lru_cache

@@ -5,8 +5,6 @@ by k_theta), and the pivot has deflected by delta(W). With the film's own deriva
 pad's tilt and deflection and in the journal's move; what they leave of the film's force is linear in the move alone.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

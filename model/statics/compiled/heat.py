@@ -14,8 +14,6 @@ inlet, plus its answer to the journal. So the inlets and the journal follow from
 heat goes round. What a pad conducts depends on all of its film; that is solved by a few Krylov steps.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ behind and contract by a factor of about ten per iteration. Where a step is know
 what it asks for, and is called again to go on.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Where a pad carries: putting it on its loaded attitude, letting it idle, and whether what holds it is stable."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """All pads of a bearing side by side: the same arrays as one film has, with a leading axis for the pad."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

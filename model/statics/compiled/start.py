@@ -7,8 +7,6 @@ curve still pushes, those sets are tried that leave the most of them loaded; of 
 pads counts.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 

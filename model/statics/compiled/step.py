@@ -1,7 +1,5 @@
 """One step of all films, and one Newton step of journal and pads, on the arrays of a search."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

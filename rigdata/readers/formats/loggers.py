@@ -1,7 +1,5 @@
 """Formats of loggers and programs, each read by its own library, which is imported when such a file comes."""
 
-from __future__ import annotations
-
 import importlib.util
 from collections import Counter
 from pathlib import Path

@@ -4,8 +4,6 @@ asammdf 8.8 dies by SIGSEGV, follows circles of addresses without end, and unpac
 bytes of an MDF 4 file are wrong (found by fuzzing). No `except` in this process can help against that.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import json

@@ -4,8 +4,6 @@ The library (1.14, 2.0) never comes back from a heap whose free-space entry has 
 can make it; so such files are found here, by the layout of the HDF5 File Format Specification, III.E.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import re

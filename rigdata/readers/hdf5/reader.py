@@ -1,7 +1,5 @@
 """An HDF5 campaign: the manifest's text, and a group per run with a 1-D dataset per channel, read slice by slice."""
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import math

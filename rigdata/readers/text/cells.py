@@ -1,7 +1,5 @@
 """Text files of any encoding: their lines, their numbers as a stream of ASCII bytes, and what a cell holds."""
 
-from __future__ import annotations
-
 import codecs
 import contextlib
 import datetime

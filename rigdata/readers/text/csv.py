@@ -1,7 +1,5 @@
 """Text files as columns of numbers: parsed by pyarrow in blocks, bad cells named by line and column."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace

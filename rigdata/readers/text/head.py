@@ -4,8 +4,6 @@ What the manifest gives is held against the file, everything else is detected. T
 manifest's channel names; without a manifest they are above the first lines of numbers.
 """
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import itertools

@@ -1,7 +1,5 @@
 """LabVIEW measurement files: a header of the file, then segments of a header and a table each."""
 
-from __future__ import annotations
-
 import io
 import itertools
 from collections.abc import Iterator, Mapping, Sequence

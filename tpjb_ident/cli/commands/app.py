@@ -1,7 +1,5 @@
 """The command line: commands by name. Heavy imports stay inside the commands, so that help is instant."""
 
-from __future__ import annotations
-
 import importlib
 from typing import Annotated, Any
 

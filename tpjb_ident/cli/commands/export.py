@@ -1,7 +1,5 @@
 """`tpjb export`: coefficients in the form that rotordynamic programs read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`tpjb locus`: mean shaft positions and the clearance polygon."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tpjb_ident.cli.command import Command, command

@@ -1,7 +1,5 @@
 """`tpjb pivot`: dry load steps in, pivot stiffness curves out."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tpjb_ident.cli.command import Command, command

@@ -1,7 +1,5 @@
 """`tpjb rerun`: the same computed again, with the options and inputs of a run.json, and what differs."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`tpjb verify`: whether results are still what was computed, and their inputs still the same bytes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any

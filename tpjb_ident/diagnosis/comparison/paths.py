@@ -1,7 +1,5 @@
 """Paths: what every fault does to the prediction over all sizes that a rig may have, laid once per campaign."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ No prediction is needed: the model's residual and derivatives at its solved poin
 the baseline. At every scale the numbers that the model has already are integrated out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -6,8 +6,6 @@ What the campaign hardly tells from a fault of the leader is fitted in its place
 others that already do a look-alike's work a score says little.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections import Counter

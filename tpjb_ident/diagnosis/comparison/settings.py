@@ -1,7 +1,5 @@
 """Settings of a diagnosis: what may be off, what is tried, and the constants of the decision."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances

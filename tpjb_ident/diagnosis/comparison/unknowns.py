@@ -4,8 +4,6 @@ Amplitudes of effects come first, then the sizes of all tolerances, a fault's ow
 width of its prior. All are counted from their priors' means.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ observation vector; so the interval of an amplitude includes them. An effect tha
 viscosity, one pad that stands further out) counts only where it exceeds what is stated.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Workers: the same model runs on both cores; answers do not depend on how many there are."""
 
-from __future__ import annotations
-
 import itertools
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence

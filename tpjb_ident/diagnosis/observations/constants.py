@@ -1,7 +1,5 @@
 """Constants: every number that decides what a diagnosis says, in one table with what set it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

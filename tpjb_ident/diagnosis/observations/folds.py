@@ -4,8 +4,6 @@ Not random elements: neighbours are near copies of each other. Held out are the 
 sweep, every speed beside the most frequent one, and a sector of the locus.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Gap: the root mean square of (measured - predicted) / sigma, over everything and by observable; what scales it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

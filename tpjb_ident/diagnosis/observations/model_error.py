@@ -5,8 +5,6 @@ neighbouring points. One covariance of the stated tolerance's size holds all kin
 over (`comparison.evidence`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

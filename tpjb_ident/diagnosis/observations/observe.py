@@ -5,8 +5,6 @@ dynamic tests), ``locus``, ``load`` (the cells' mean reading against the set poi
 their angles), ``dry`` (tangent compliance of every pivot), ``temperature``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ A spring in series, a parallel stiffness or damping; a pad whose clearance or wh
 amplitude that is not the same at every load, speed and frequency.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Decide: from a comparison to a verdict with everything that it rests on."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

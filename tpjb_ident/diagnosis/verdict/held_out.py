@@ -1,7 +1,5 @@
 """Held out: the gap on points to which a model must extrapolate, with numbers that have not seen them."""
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Rules: what a comparison says, in their order. Constants and what set them: `settings.DiagnoseSettings`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 from tpjb_ident.diagnosis.comparison.fit import Fit

@@ -1,7 +1,5 @@
 """Verdict: what a diagnosis says, and nothing that it cannot say."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
