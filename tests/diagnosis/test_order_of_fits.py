@@ -186,7 +186,6 @@ def stub_search(total, estimate, labels=frozenset("a")):
     """A search led by a right fit, some nats above its score."""
     tried = object.__new__(search._Search)
     tried.settings, tried.estimates, tried.fits = DiagnoseSettings(), {labels: estimate}, {}
-    tried.rough = -np.inf
     leader = stub_fit(total, labels)
     tried._leader = lambda: leader
     tried._log_prior = lambda faults: 0.0
@@ -243,17 +242,3 @@ def test_what_a_leader_rose_by_is_allowed_to_rivals_of_as_many_faults(labels, es
     rival = stub_fit(0.0, frozenset(labels))
     proposal = SimpleNamespace(labels=rival.labels, faults=rival.faults, estimate=estimate, coarse=False)
     assert tried._promising(proposal, tried._leader()) == fitted
-
-
-@pytest.mark.parametrize(("estimate", "fitted"), [(-530.0, True), (-540.0, False)])
-@pytest.mark.parametrize("led", [False, True])
-def test_a_coarse_start_is_left_out_that_stays_behind_what_was_fitted_seen_as_coarsely(estimate, fitted, led):
-    tried = stub_search(total=-50.0, estimate=-50.0)
-    leader = tried._leader() if led else None
-    if led:
-        leader.posterior.scale = 8.0
-    tried.rough = -500.0
-    proposal = SimpleNamespace(labels=frozenset("b"), faults=(), estimate=estimate, coarse=True)
-    assert tried._promising(proposal, leader) == fitted
-    tried.proposals = {proposal.labels: proposal}
-    assert (tried._passed_over(stub_fit(0.0, frozenset("ac"))) is not None) == fitted

@@ -19,8 +19,8 @@ LIMITS = {
     "measurement": (125.88, 14_792),  # lines that only the film fills, and orbits, in bands (+2.4); each was silent
     "model": (78.67, 10_466),  # heat across films compiled: a quarter less time, 8 s less compilation
     "rigdata": (61.98, 8_271),
-    "diagnosis": (38.26, 4_683),  # 38.48, look-alikes, tolerances that say an effect together
-    "cli": (22.77, 3_131),
+    "diagnosis": (38.43, 4_725),  # 38.48, look-alikes, tolerances that say an effect together
+    "cli": (22.78, 3_131),
     "report": (23.69, 3_100),
     "pivot": (17.60, 2_337),  # a random walk of the probes: cycles of loads held 72 % inside 95
     "clearance": (9.49, 1_164),  # what three and four pads leave open, unequal probes, a shaft or a zero that moves

@@ -21,6 +21,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.units import to_si
 from tpjb_ident.arguments import as_bearing, as_campaign
 from tpjb_ident.diagnosis.campaign import Baseline, CampaignDiagnosis, diagnose_campaign
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.observations.observe import DynamicTest, Layout
 from tpjb_ident.diagnosis.plan import CampaignPlan
 from tpjb_ident.diagnosis.plan import plan as work_out
@@ -29,7 +30,6 @@ from tpjb_ident.errors import ArgumentError
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
-    from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 
 #: Set points of a plan and what they must be.
 _POINT = {"load": "force", "load_direction": "angle", "speed": "speed", "excitation": "speed"}
@@ -84,7 +84,8 @@ def diagnose(
     demo: All pivots have 37.6 ± 1.9 % of the formula's stiffness
     """
     opened = as_campaign(campaign, "campaign")
-    return diagnose_campaign(opened, _bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), settings)
+    chosen = settings or DiagnoseSettings()
+    return diagnose_campaign(opened, _bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), chosen)
 
 
 def plan(

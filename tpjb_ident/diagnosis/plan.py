@@ -7,7 +7,6 @@ can imitate, d_AB = 6 |(I - P_B) s_A| / |s_A|. Below 3 the two are confusable.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -43,7 +42,7 @@ class CampaignPlan:
     def floor(self) -> FloatArray:
         """Smallest change of every parameter that would be seen (3 standard deviations), in its nearly linear form."""
         with np.errstate(divide="ignore"):  # what cannot be detected has an infinite floor
-            return Deciding.visible * np.array([c.steps[0] for c in self.candidates]) / self.detectable
+            return Deciding.visible * np.array([c.step for c in self.candidates]) / self.detectable
 
     @property
     def confusable(self) -> tuple[tuple[str, str], ...]:
@@ -55,7 +54,8 @@ class CampaignPlan:
     @property
     def pairs(self) -> int:
         """Pairs of candidates that have an effect at all."""
-        return math.comb(int(np.sum(self.detectable > 0.0)), 2)
+        n = int(np.sum(self.detectable > 0.0))
+        return n * (n - 1) // 2
 
     @property
     def below_floor(self) -> tuple[str, ...]:
@@ -89,14 +89,14 @@ class CampaignPlan:
         for i, c in enumerate(self.candidates):
             apart = zip(self.candidates, self.separation[i], strict=True)
             like = [other.label for other, distance in apart if distance < Deciding.visible]
-            at, (low, high) = c.neutral + self.floor[i], c.limits
+            at = c.parameter.from_linear(c.neutral + self.floor[i]) if np.isfinite(self.floor[i]) else np.nan
             rows.append(
                 {
                     "effect": c.label,
                     "parameter": c.parameter.name,
                     "unit": c.parameter.unit,
                     "typical_size_sigma": self.detectable[i],
-                    "seen_from": c.parameter.from_linear(at) if low[0] <= at <= high[0] else np.nan,
+                    "seen_from": at if c.bounds[0] <= c.neutral + self.floor[i] <= c.bounds[1] else np.nan,
                     "mistaken_for": ", ".join(like),
                 }
             )
@@ -139,16 +139,16 @@ def _shown(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None
 
 def _signature(forward: Forward, base: FloatArray, candidate: Candidate) -> FloatArray:
     """Change by a typical size, from half of it; zero where the model has no equilibrium on either side."""
-    (low,), (high,) = candidate.limits
+    low, high = candidate.bounds
     for share in (0.5, -0.5, 0.05, -0.05):
-        value = min(max(candidate.neutral + share * candidate.steps[0], low), high)
+        value = min(max(candidate.neutral + share * candidate.step, low), high)
         if value == candidate.neutral:
             continue
         try:
             moved = forward.fresh()((candidate.effect(value),)) - base
         except NoEquilibriumError:
             continue
-        return np.asarray(moved / (value - candidate.neutral) * candidate.steps[0])
+        return np.asarray(moved / (value - candidate.neutral) * candidate.step)
     return np.zeros_like(base)
 
 
@@ -169,19 +169,36 @@ _FAMILIES = {
 _FASTER = 1.5
 
 
-def data_sets(setup: Setup, layout: Layout) -> tuple[list[dict[str, object]], dict[str, CampaignPlan]]:
-    """Count what every data set sees at typical sizes and mixes up at d' = 6; their plans with nuisances free."""
+@dataclass(frozen=True)
+class DataSet:
+    """What one part of a campaign could tell."""
+
+    name: str
+    numbers: int
+    known: CampaignPlan = field(repr=False)
+    free: CampaignPlan = field(repr=False)
+
+    def to_row(self) -> dict[str, object]:
+        """Counts, flat."""
+        row: dict[str, object] = {"data_set": self.name, "numbers": self.numbers}
+        k = len(self.known.candidates)
+        for words, labels in (("known", self.known), ("free", self.free)):
+            row |= {
+                f"detectable_nuisances_{words}": k - len(labels.below_floor),
+                f"confusable_pairs_nuisances_{words}": len(labels.confusable), "pairs": k * (k - 1) // 2,
+            }  # fmt: skip
+        return {**row, "mixed_up": "; ".join(" / ".join(pair) for pair in self.free.confusable)}
+
+
+def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
+    """Work out what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free."""
     faster = tuple(replace(t, speed=_FASTER * t.speed) for t in layout.dynamic)
     shown = _shown(setup, replace(layout, dynamic=(*layout.dynamic, *faster)))
-    rows, plans = [], {}
-    for name, mask in _masks(shown.observations.elements, {t.speed for t in layout.dynamic}).items():
-        row: dict[str, object] = {"data_set": name, "numbers": int(mask.sum())}
-        count, plans[name] = len(shown.candidates), shown.by(mask)
-        for words, part in (("known", shown.by(mask, free=False)), ("free", plans[name])):
-            row[f"detectable_nuisances_{words}"] = count - len(part.below_floor)
-            row |= {f"confusable_pairs_nuisances_{words}": len(part.confusable), "pairs": math.comb(count, 2)}
-        rows.append({**row, "mixed_up": "; ".join(" / ".join(pair) for pair in plans[name].confusable)})
-    return rows, plans
+    planned = {t.speed for t in layout.dynamic}
+    return tuple(
+        DataSet(name, int(mask.sum()), shown.by(mask, free=False), shown.by(mask))
+        for name, mask in _masks(shown.observations.elements, planned).items()
+    )
 
 
 def _masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
@@ -192,7 +209,8 @@ def _masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolAr
     # the frequency that is there at the most loads, the middle one among equals
     frequencies, counts = np.unique(line[np.isfinite(line)], return_counts=True)
     usual = frequencies[counts == counts.max()]
+    usual_line = line == usual[len(usual) // 2]
     direct = np.array([e.observable in _DIRECT for e in elements])
-    masks = {"A": direct & (line == usual[len(usual) // 2]) & first}
+    masks = {"A": direct & usual_line & first}
     masks |= {name: np.isin(families, sorted(families_used)) & first for name, families_used in _FAMILIES.items()}
     return {**masks, "E": np.ones(len(elements), dtype=bool)}

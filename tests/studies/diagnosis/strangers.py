@@ -208,8 +208,8 @@ def faults(one: Stranger, kind: str, rng: np.random.Generator) -> list[Effect]:
 def _sized(able: Sequence[Candidate], rng: np.random.Generator) -> Effect:
     """One place of an effect, its size between 0.7 and 3 typical ones, as likely small as large."""
     one = able[int(rng.integers(len(able)))]
-    (low,), (high,) = one.limits
-    size = one.steps[0] * float(np.exp(rng.uniform(math.log(0.7), math.log(3.0))))
+    low, high = one.bounds
+    size = one.step * float(np.exp(rng.uniform(math.log(0.7), math.log(3.0))))
     ends = [one.neutral + sign * size for sign in rng.permutation([-1.0, 1.0])]
     amplitude = next((end for end in ends if low < end < high), 0.5 * (one.neutral + high))
     parameters = one.values(np.array([amplitude]))

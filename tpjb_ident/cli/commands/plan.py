@@ -63,9 +63,9 @@ def plan(
         plans = {"isolability": result}
         if data_sets:
             show("parts of the campaign", 1, 2)
-            rows, parts = planning.data_sets(setup, tests)
-            c.table("data_sets", pd.DataFrame(rows))
-            plans |= {f"isolability_{name}": part for name, part in parts.items()}  # calibration errors free
+            sets = planning.data_sets(setup, tests)
+            c.table("data_sets", pd.DataFrame([data_set.to_row() for data_set in sets]))
+            plans |= {f"isolability_{data_set.name}": data_set.free for data_set in sets}  # calibration errors free
         c.table("effects", result.to_frame())
         for name, part in plans.items():
             c.table(name, part.matrix())

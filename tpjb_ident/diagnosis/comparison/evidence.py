@@ -8,7 +8,6 @@ S from identification, M the stated model tolerance, s one scale for all of it, 
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass, field
 
@@ -42,7 +41,7 @@ class ErrorModel:
         """S + s^2 M at a scale's index, (n, n)."""
         return self.noise + self.scales[index] ** 2 * self.model
 
-    @functools.cached_property
+    @property
     def coarse(self) -> ErrorModel:
         """Every element off by itself, by its own sigma."""
         return ErrorModel(self.noise + np.eye(len(self.noise)), 0.0 * self.model, np.ones(1))

@@ -193,10 +193,12 @@ def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
     if linear is None:
         return None
     if start.coarse:
+        held = unknowns.width.copy()
+        held[unknowns.tolerances] = Deciding.held
         coarse = problem.errors.coarse
         # those from before the jump say nothing behind it; of tolerances that are held little is asked
         linear = _renewed(run, unknowns, linear, [i for at in unknowns.slices for i in range(at.start, at.stop)])
-        linear = _stepped(run, unknowns, replace(linear, width=unknowns.held), coarse)
+        linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
         linear = _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
     return _settled(run, unknowns, linear)
 

@@ -36,15 +36,15 @@ class Path:
         """Weights of the columns between the nodes."""
         return CubicHermiteSpline(self.nodes, *np.split(np.eye(self.columns.shape[1]), 2))
 
-    def _inside(self, amplitudes: FloatArray) -> FloatArray:
+    def _inside(self, amplitudes: FloatArray, nodes: FloatArray) -> FloatArray:
         """The first amplitude of each, between the ends: beyond them a path goes on straight, (t,)."""
-        return np.clip(amplitudes[:, 0], *self.pieces.x[[0, -1]])
+        return np.clip(amplitudes[:, 0], nodes[0], nodes[-1])
 
     def weights(self, amplitudes: FloatArray) -> FloatArray:
         """Of the columns in the change at amplitudes (t, k), (t, c)."""
         if self.nodes is None:
             return amplitudes
-        inside = self._inside(amplitudes)
+        inside = self._inside(amplitudes, self.nodes)
         beyond = amplitudes - inside[:, None]
         return np.asarray(self.pieces(inside) + beyond * self.pieces(inside, 1))
 
@@ -52,7 +52,7 @@ class Path:
         """Of the columns in the derivatives at amplitudes (t, k), (t, c, k)."""
         if self.nodes is None:
             return np.tile(np.eye(amplitudes.shape[1]), (len(amplitudes), 1, 1))
-        return np.asarray(self.pieces(self._inside(amplitudes), 1)[:, :, None])
+        return np.asarray(self.pieces(self._inside(amplitudes, self.nodes), 1)[:, :, None])
 
     @property
     def neutral_slope(self) -> FloatArray:
@@ -85,7 +85,8 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
     asked = [f for f in curved if f.own < 0]
     changes = run(path_changes, [(f, [sign * _NEAR * float(f.width[0]) for sign in (1.0, -1.0)], 1) for f in asked])
     paths += [path_through(fault, row) for fault, row in zip(asked, changes, strict=True) if row]
-    jobs = [((f,), np.zeros(len(f.width) + len(problem.nuisances)), tuple(range(len(f.width)))) for f in straight]
+    count = len(problem.nuisances)
+    jobs = [((f,), np.zeros(len(f.width) + count), tuple(range(len(f.width)))) for f in straight]
     for fault, found in zip(straight, run(derivatives, jobs), strict=True):
         whole = [column for column in found if column is not None]
         if len(whole) == len(fault.width):

@@ -83,7 +83,7 @@ class _Search:
         self.paths: tuple[Path, ...] = ()
         self.exchanged: dict[frozenset[str], list[Start]] = {}  #: look-alikes by the leader that they are held against
         self.whole = True  #: whether paths are known as far as jumps of K and C ask for
-        self.rough = -math.inf  #: best coarse evidence of what was fitted [nats]
+        self.clear = -math.inf  #: coarse estimate from which a start comes before all others [nats]
         self.places = Counter(name for name, _ in {(fault.name, fault.label) for fault in problem.faults})
 
     def result(self) -> Comparison:
@@ -104,14 +104,12 @@ class _Search:
         """The likeliest proposal; None where none comes near the leader."""
         if self.tried >= self.settings.most_fits:
             return None
-        leader = self._leader()
-        promising = [p for p in self.proposals.values() if self._promising(p, leader)]
-        passed = self._passed
-        if promising:  # coarse starts first: once a fit is past the jumps the best ones have been
-            return self.proposals.pop(max(promising, key=lambda p: (p.coarse > passed, p.estimate)).labels)
-        if not (self.whole or passed):
+        if not (self.whole or self._passed or any(map(self._comes_first, self.proposals.values()))):
             self._ask_whole_paths()
-            return self._next()
+        leader = self._leader()
+        promising = [p for p in self.proposals.values() if leader is None or self._promising(p, leader)]
+        if promising:
+            return self.proposals.pop(max(promising, key=lambda p: (self._comes_first(p), p.estimate)).labels)
         if leader is None or leader.posterior.scale > self.settings.right:
             return None
         return self._look_alike(leader) or self._passed_over(leader)
@@ -130,7 +128,7 @@ class _Search:
 
     def _passed_over(self, leader: Fit) -> Start | None:
         """A coarse start that others came before: one cause that does it all is likelier than several."""
-        waiting = [p for p in self.proposals.values() if self._in_reach(p) and p.coarse and p.labels not in self.fits]
+        waiting = [p for p in self.proposals.values() if p.coarse and p.labels not in self.fits]
         if len(leader.faults) < 2 or not waiting:
             return None
         return self.proposals.pop(max(waiting, key=lambda p: p.estimate).labels)
@@ -148,34 +146,29 @@ class _Search:
         return [path for path, part in zip(others, nearest, strict=True) if part.min() < Deciding.visible]
 
     def _exchange(self, fit: Fit, fault: Fault, path: Path) -> Start:
-        """A fit with another fault in the place of one of its own, begun coarsely where its score there is far off."""
+        """A fit with another fault in the place of one of its own."""
         faults, linear = self._without(fit, fault)
-        score = scores(self.problem.errors, linear, [path], Strain(np.zeros((0, 1)), np.zeros(0)))[0]
-        start, reach = self._with(score, faults, linear), self.settings.near + self.settings.mistaken
-        return replace(start, solved=None, coarse=start.estimate < self._log_probability(fit) - reach)
+        score = scores(self.problem.errors, linear, [path], Strain(np.zeros((0, len(linear.theta))), np.zeros(0)))[0]
+        return replace(self._with(score, faults, linear), solved=None)
 
     @property
     def _passed(self) -> bool:
         """Whether a fit, tenable or not, has found its way past the jumps of K and C."""
         return any(fit.posterior.scale <= self.settings.suspect for fit in self.fits.values())
 
+    def _comes_first(self, proposal: Start) -> bool:
+        """Whether a start is coarse, and has no clearly better ones: once a fit is past the jumps these have been."""
+        return proposal.coarse and (proposal.estimate >= self.clear or (self.whole and not self._passed))
+
     def _ask_whole_paths(self) -> None:
         """Ask for every path to both of its ends, where no fit got past the jumps that may lie on them."""
         self.whole = True
         for end in (-1.0, 1.0):
-            sizes = [end * float(path.fault.width[0]) for path in self.paths]
-            self.paths = lengthened(self.run, self.problem, self.paths, sizes)
+            self._lengthen([end * float(path.fault.width[0]) for path in self.paths])
         self._propose_alone()
 
-    def _in_reach(self, proposal: Start) -> bool:
-        """Whether a coarse start may come near what was fitted, all of it seen as coarsely."""
-        return not proposal.coarse or proposal.estimate > self.rough - self.settings.near - self.settings.mistaken
-
-    def _promising(self, proposal: Start, leader: Fit | None) -> bool:
+    def _promising(self, proposal: Start, leader: Fit) -> bool:
         """Whether a proposal may change the answer: as a rival of a leader, or by a fault beside a right one."""
-        reach = self._in_reach(proposal)
-        if leader is None or not reach:
-            return reach
         total, near, mistaken = self._log_probability(leader), self.settings.near, self.settings.mistaken
         if leader.posterior.scale > self.settings.right:
             slow = any(fault.name in SLOW for fault in proposal.faults)  # only where they promise to lead
@@ -224,7 +217,8 @@ class _Search:
         if fit is None:
             return
         wrong = fit.posterior.refused > Deciding.better or fit.needs_more(self.settings)
-        passed = not fit.faults or proposal.labels in self.begun
+        # what stands beside one that was begun coarsely is past its jumps
+        passed = not fit.faults or any(labels <= proposal.labels for labels in self.begun)
         if wrong and not passed and self._near(fit, fit.posterior.promised, 0.0):
             self.begun[proposal.labels] = -math.inf
             coarse = self._reached(Start(fit.faults, fit.linear.theta, fit.linear.jacobian, coarse=True))
@@ -233,8 +227,6 @@ class _Search:
         if known is not None and known.posterior.total >= fit.posterior.total:
             return
         self.fits[proposal.labels] = fit
-        rough = posterior(self.problem.errors.coarse, replace(fit.linear, width=fit.unknowns.held))
-        self.rough = max(self.rough, rough.promised + self._log_prior(fit.faults))
         self.estimates[proposal.labels] = math.inf if proposal.coarse else proposal.estimate
         if fit.faults and self._near(fit, fit.posterior.total, self.settings.near):
             self._propose_neighbours(fit)
@@ -267,12 +259,14 @@ class _Search:
             self._follow(self._singles(coarse=True))
             self._propose_alone()
 
+    def _lengthen(self, sizes: Sequence[float]) -> None:
+        self.paths = lengthened(self.run, self.problem, self.paths, sizes)
+
     def _follow(self, leading: Sequence[Score]) -> None:
         """Ask for more of the paths that lead, towards where they lead."""
         labels = list(dict.fromkeys(score.path.fault.label for score in leading))[: Deciding.followed]
         sizes = {id(score.path): float(score.amplitudes[0]) for score in leading if score.path.fault.label in labels}
-        asked = [sizes.get(id(path), 0.0) for path in self.paths]
-        self.paths = lengthened(self.run, self.problem, self.paths, asked)
+        self._lengthen([sizes.get(id(path), 0.0) for path in self.paths])
 
     @functools.cached_property
     def _stated(self) -> Linear:
@@ -298,6 +292,7 @@ class _Search:
             rough = [score for score in self._singles(coarse=True) if score.path.nodes is not None]
             for score in rough[: self.settings.coarse]:
                 self._propose(score, (), self._stated, coarse=True)
+            self.clear = max((score.total for score in rough), default=-math.inf) - self.settings.mistaken
         return scale
 
     def _propose_neighbours(self, fit: Fit) -> None:

@@ -49,21 +49,15 @@ class Unknowns:
         self.tolerances = self.amplitudes + np.array([i for i in range(count) if i not in taken], dtype=int)
 
     @property
-    def held(self) -> FloatArray:
-        """Widths of the priors while a coarse start passes jumps of K and C, (k,)."""
-        out = self.width.copy()
-        out[self.tolerances] = Deciding.held
-        return out
-
-    @property
     def is_reading(self) -> list[bool]:
         """Which numbers act on readings alone: their derivative is known without a prediction, (k,)."""
         return [False] * self.amplitudes + [nuisance.column is not None for nuisance in self.problem.nuisances]
 
     def effects(self, theta: FloatArray) -> tuple[Effect, ...]:
         """The faults as effects."""
-        pairs, amplitudes = zip(self.faults, self.slices, strict=True), theta + self.origin
-        return tuple(Effect(fault.name, **fault.values(amplitudes[at])) for fault, at in pairs)
+        amplitudes = theta + self.origin
+        values = [fault.values(amplitudes[at]) for fault, at in zip(self.faults, self.slices, strict=True)]
+        return tuple(Effect(fault.name, **table) for fault, table in zip(self.faults, values, strict=True))
 
     def predict(self, forward: ForwardModel, theta: FloatArray) -> FloatArray | None:
         """Prediction in units of sigma, (n,); None where the model has no equilibrium."""
@@ -94,7 +88,7 @@ def derivatives(
     for index in indices:
         step = _SHARE * unknowns.width[index]
         if index >= unknowns.amplitudes:  # towards zero: there the model surely has an equilibrium
-            step = max(step, _DEVIATIONS) * (-1.0 if theta[index] > 0.0 else 1.0)
+            step = -max(step, _DEVIATIONS) if theta[index] > 0.0 else max(step, _DEVIATIONS)
         out.append(None if at_point is None else _difference(forward, unknowns, theta, at_point, (index, step)))
     return out
 

@@ -41,7 +41,8 @@ class Candidate:
         """Amplitudes at which nothing happens, (k,)."""
         if self.basis:
             return np.zeros(len(self.basis))
-        return np.array([self.about.get(p.name, p.to_linear(p.neutral)) for p in self.free])
+        return np.array([self.about.get(p.name, 0.0) if p.name in self.about else p.to_linear(p.neutral)
+                         for p in self.free])  # fmt: skip
 
     @property
     def width(self) -> FloatArray:
@@ -71,6 +72,17 @@ class Candidate:
     def neutral(self) -> float:
         """The first of `origin`."""
         return float(self.origin[0])
+
+    @property
+    def step(self) -> float:
+        """The first of `steps`."""
+        return float(self.steps[0])
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The first of `limits`."""
+        low, high = self.limits
+        return float(low[0]), float(high[0])
 
     def values(self, amplitudes: FloatArray) -> dict[str, float]:
         """Parameters at amplitudes (k,), clipped to their bounds; fixed ones too."""

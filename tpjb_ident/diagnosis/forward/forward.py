@@ -101,6 +101,8 @@ class ModelCache:
         return SolvedPoint(h, in_rig(running, equilibrium.position), force, warm, loads)
 
 
+__all__ = ["Forward", "ForwardModel", "NoEquilibriumError"]
+
 Change = Callable[[Setup], Setup]
 #: Fraction of the arc at which a pad carries its thermometer where nothing is said.
 SENSOR = 0.75

@@ -93,8 +93,12 @@ class Shift:
     @property
     def readings(self) -> FloatArray | float:
         """Change of the observation vector by those that act on readings."""
-        pairs = zip(self.nuisances, self.size, strict=True)
-        return sum((nuisance.column * size for nuisance, size in pairs if nuisance.column is not None), start=0.0)
+        parts = [
+            nuisance.column * s
+            for nuisance, s in zip(self.nuisances, self.size, strict=True)
+            if nuisance.column is not None
+        ]
+        return np.sum(parts, axis=0) if parts else 0.0
 
 
 def nuisances(
@@ -127,8 +131,11 @@ def at_baseline(
     forward: ForwardModel, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
 ) -> FloatArray:
     """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
-    listed, step = nuisances(forward.elements, setup, known, by_pad=False), np.array([_STEP])
-    return np.column_stack([(predict(forward, effects, (one,), step) - base) / _STEP for one in listed])
+    columns = []
+    for one in nuisances(forward.elements, setup, known, by_pad=False):
+        moved = predict(forward, effects, (one,), np.array([_STEP]))
+        columns.append((moved - base) / _STEP)
+    return np.column_stack(columns)
 
 
 def predict(

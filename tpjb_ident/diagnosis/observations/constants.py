@@ -21,6 +21,8 @@ class Deciding:
     untenable: float = 0.01
     #: Probability from which a name is listed, alone or as a family; right names reach 0.976 and more.
     included: float = 0.95
+    #: Probability of no fault at all from which none is sought.
+    nothing: float = 0.05
     #: Names in a family of look-alikes: a longer list says nothing.
     family: int = 3
     #: Scale of the model's error that right models reach. Its prior has 0.90 above; right models have 0.00 to 0.64 of

@@ -136,17 +136,10 @@ def contradictions(observations: Observations, base: FloatArray) -> tuple[str, .
 _LOADS = 0.05
 
 
-_COORDINATES = (
-    ("pad", "pad", "", 1.0),
-    ("load", "static_load", "N", 1.0),
-    ("direction", "static_load_direction", "deg", 180 / math.pi),
-)
-
-
 def _regions(observations: Observations, mine: BoolArray):  # type: ignore[no-untyped-def]
     """Halves of the range of the coordinate that varies most among the elements, or single pads."""
     elements = observations.elements
-    for coordinate, name, unit, factor in _COORDINATES:
+    for coordinate, unit, factor in (("pad", "", 1.0), ("load", "N", 1.0), ("direction", "deg", 180 / math.pi)):
         values = np.array([e.place(coordinate) for e in elements])
         levels = sorted(set(values[mine & np.isfinite(values)]))
         if len(levels) < 2:
@@ -157,6 +150,7 @@ def _regions(observations: Observations, mine: BoolArray):  # type: ignore[no-un
             half = len(levels) // 2
             for part in (levels[:half], levels[half:]):
                 low, high = part[0] * factor, part[-1] * factor
+                name = {"load": "static_load", "direction": "static_load_direction"}[coordinate]
                 yield f"{name} {low:.0f}-{high:.0f} {unit}", mine & np.isin(values, part)
         return
     yield "everywhere", mine

@@ -335,9 +335,7 @@ def _turned(point: LocusPoint, locus: Locus) -> FloatArray:
     place = np.array([p.position for p in alike])
     count = len(np.unique(np.round(np.exp(1j * angle), 6)))
     orders = np.arange(1, min(_HARMONICS, (count - 1) // 2) + 1)
-    around = np.sort(np.mod(angle, 2 * math.pi))
-    apart = np.diff(np.append(around, around[0] + 2 * math.pi))
-    if not len(orders) or apart.max() > math.pi / orders[-1]:
+    if not len(orders) or _largest_gap(angle) > math.pi / orders[-1]:
         # too few directions: as if the whole locus turned about its middle, or about the zero where that is all
         middle = place.mean(axis=0) if count > 2 else np.zeros(2)
         x, y = point.position - middle
@@ -347,6 +345,12 @@ def _turned(point: LocusPoint, locus: Locus) -> FloatArray:
     fitted = np.linalg.lstsq(design, place, rcond=None)[0]
     slope = np.concatenate([[0.0], -orders * np.sin(at * orders), orders * np.cos(at * orders)])
     return np.asarray(slope @ fitted)
+
+
+def _largest_gap(angle: FloatArray) -> float:
+    """Largest angle between neighbouring directions."""
+    around = np.sort(np.mod(angle, 2 * math.pi))
+    return float(np.diff(np.append(around, around[0] + 2 * math.pi)).max())
 
 
 def observe_table(path: Path, reading_error: float | None = None, tolerance: Tolerance | None = None) -> Observations:

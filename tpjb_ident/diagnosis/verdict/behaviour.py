@@ -119,14 +119,14 @@ def drifts(fit: Fit, notable: float) -> tuple[Drift, ...]:
     for fault, at in zip(fit.faults, fit.unknowns.slices, strict=True):
         if fault.is_term:
             continue
-        rows = [_over(fit, fault, at, row) for row in Deciding.over]
+        rows = [_over(fit, fault, at.start, row) for row in Deciding.over]
         best = max((row for row in rows if row is not None), key=lambda row: row[0], default=None)
         if best is not None and best[0] > notable:
             out.append(best[1])
     return tuple(out)
 
 
-def _over(fit: Fit, fault: Fault, at: slice, row: tuple[str, str, int]) -> tuple[float, Drift] | None:
+def _over(fit: Fit, fault: Fault, index: int, row: tuple[str, str, int]) -> tuple[float, Drift] | None:
     """Rise of the log evidence where an amplitude may grow over a coordinate, and how it does."""
     name, coordinate, levels = row
     elements = fit.problem.observations.elements
@@ -136,24 +136,35 @@ def _over(fit: Fit, fault: Fault, at: slice, row: tuple[str, str, int]) -> tuple
         return None
     middle = float(np.mean(finite_values))
     slope = np.nan_to_num(places / middle - 1.0)
-    linear, amplitudes, parameter = fit.linear, fit.posterior.mean[at], fault.candidate.free[0]
+    linear, moved = fit.linear, float(fit.posterior.mean[index])
     # per unit of relative growth; a prior of one: up to twice, down to nothing
-    column = linear.jacobian[:, at.start] * slope * amplitudes[0]
+    column = linear.jacobian[:, index] * slope * moved
     wider = Linear(
         linear.residual, np.append(linear.theta, 0.0), np.column_stack([linear.jacobian, column]),
         np.append(linear.width, 1.0),
     )  # fmt: skip
     state = posterior(fit.problem.errors, wider)
-    ends = []
-    for value in finite_values[:: len(finite_values) - 1]:
-        there = amplitudes.copy()
-        there[0] *= 1.0 + float(state.mean[-1]) * (value / middle - 1.0)
-        ends.append(fault.values(there + fault.origin)[parameter.name])
+    plain = posterior(fit.problem.errors, linear)
+    growth = float(state.mean[-1])
+    ends = [
+        _value(fault, index, fit, moved * (1.0 + growth * (v / middle - 1.0)))
+        for v in finite_values[:: len(finite_values) - 1]
+    ]
     size = abs(ends[1] - ends[0]) / max(abs(ends[0]), abs(ends[1]), 1e-300)
     if size < Deciding.same:
         return None
-    drift = Drift(fault.label, parameter.name, name, ends[0], ends[1], _words(ends, finite_values, name))
-    return state.promised - fit.posterior.promised, drift
+    parameter = fault.candidate.free[0]
+    words = _words(ends, finite_values, name)
+    rise = state.promised - plain.promised
+    return rise, Drift(fault.label, parameter.name, name, ends[0], ends[1], words)
+
+
+def _value(fault: Fault, index: int, fit: Fit, amplitude: float) -> float:
+    """The fault's first parameter at an amplitude counted from where nothing happens."""
+    at = next(s for s in fit.unknowns.slices if s.start == index)
+    amplitudes = fit.posterior.mean[at] + fault.origin
+    amplitudes[0] = amplitude + fault.origin[0]
+    return fault.values(amplitudes)[fault.candidate.free[0].name]
 
 
 def _words(ends: list[float], known: list[float], over: str) -> str:

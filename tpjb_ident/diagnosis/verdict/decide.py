@@ -62,8 +62,7 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
     """Turn a comparison into a verdict."""
     observations, rows = problem.observations, problem.held
     judgement = judge(run, comparison, settings)
-    held = judgement.held
-    effects = () if judgement.name in {"consistent", "unexplained"} else _effects(comparison, judgement)
+    effects, held = _effects(comparison, judgement) if judgement.has_effects else (), judgement.held
     after = unseen = problem.base
     if effects and held.stated is not None:
         (exact,) = tuple(run(_exact, [(effects,)]))

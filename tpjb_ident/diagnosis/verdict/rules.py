@@ -21,17 +21,20 @@ class Judgement:
     family: tuple[str, ...] = ()
     drift: tuple[Drift, ...] = ()
 
+    @property
+    def has_effects(self) -> bool:
+        """Whether effects are listed."""
+        return self.name in {"named", "ambiguous", "partly-explained"}
+
 
 def judge(run: Map, comparison: Comparison, settings: DiagnoseSettings) -> Judgement:
     """Apply the rules in their order."""
     nothing = comparison.nothing
+    chance = comparison.probability(nothing)
     held = held_out_gap(run, nothing)
-    sure = frozenset(name for name, share in comparison.shares.items() if share >= settings.included)
-    # nothing is one of the look-alikes: no group that needs it is a finding
-    likely, alike = comparison.probability(nothing), _family(comparison, sure, settings)
-    needed = likely >= 1.0 - settings.included or nothing.label in alike
-    if held.before <= settings.quiet or (needed and comparison.is_tenable(nothing)):
+    if held.before <= settings.quiet or (comparison.is_tenable(nothing) and chance >= settings.nothing):
         return _without_effects(held, settings)
+    sure = frozenset(name for name, share in comparison.shares.items() if share >= settings.included)
     model = _exactly(comparison, sure, settings) or comparison.best
     held = held_out_gap(run, model)
     judgement = _of_model(comparison, model, sure, held, settings)
@@ -75,10 +78,8 @@ def _exactly(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSet
 
 
 def _family(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSettings) -> tuple[str, ...]:
-    """Names, nothing among them, that only together have the probability that a name takes; none where too many."""
+    """Names that only together have the probability that a name takes; none where these are too many."""
     rest = {name: share for name, share in comparison.shares.items() if name not in sure}
-    if not sure:
-        rest[comparison.nothing.label] = comparison.probability(comparison.nothing)
     names = sorted(rest, key=lambda name: -rest[name])[: settings.family]
     for count in range(2, len(names) + 1):
         if sum(rest[name] for name in names[:count]) >= settings.included:
