@@ -32,8 +32,10 @@ from tpjb_ident.pivot.fit import (
     assemble_curve,
     bad_blocks,
     fit_data,
+    with_repeats,
 )
-from tpjb_ident.pivot.law_fit import LawFit
+from tpjb_ident.pivot.law_fit import SCALE as LN_SCALE
+from tpjb_ident.pivot.law_fit import LawFit, fit_law
 from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.pickup import PickupSignature
 from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, check_spares, structure_behind
@@ -538,3 +540,19 @@ def test_a_spring_of_one_direction_is_found_with_its_size(direction):
 )
 def test_no_structure_is_seen_where_none_is_known(compliance, mirror, pads):
     assert structure_behind(pressed(compliance, mirror, pads)) == ""
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.06, 0.3])
+def test_tests_of_one_pad_tell_how_far_they_are_to_be_believed(apart):
+    """The other pads, tested once, are no better: what one test says of a pad scatters as much there."""
+    first, second, single = record(name="a"), record(name="b"), record(pad=2)
+    softer = replace(second.blocks, deflection=REACH + (1 + apart) * (second.blocks.deflection - REACH))
+    pads = [[first, replace(second, blocks=softer)], [single]]
+    data = [fit_data(records, NOISE) for records in pads]
+    wider, scatter = with_repeats(pads, data)
+    assert scatter == pytest.approx(apart / math.sqrt(2), rel=0.3, abs=1e-6)
+    for plain, wide, tests in zip(data, wider, (2, 1), strict=True):
+        before, after = (fit_law(LAWS["spline"], False, pad) for pad in (plain, wide))
+        assert after.theta[LN_SCALE] == pytest.approx(before.theta[LN_SCALE], abs=0.02)
+        grown = after.covariance[LN_SCALE, LN_SCALE] - before.covariance[LN_SCALE, LN_SCALE]
+        assert math.sqrt(max(grown, 0.0)) == pytest.approx(scatter / math.sqrt(tests), rel=0.3, abs=1e-6)

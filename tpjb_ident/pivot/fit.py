@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from scipy import linalg, special
+from scipy import linalg, optimize, special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError, refuse
@@ -58,6 +58,12 @@ _ANGLE_WARNING = math.radians(4.0)
 _MISFIT_PROBABILITY = 1e-4
 _CLEAR_CHOICE = 0.5  # posterior share below which the law counts as undecided
 _MANY_LOST = 0.05
+#: Share of a difference that a curve must leave for the tests to tell it.
+_TOLD = 1e-3
+#: Fall of the deviance from which tests of one pad differ: one in twenty sets of equal tests shows it.
+_CLEAR_SCATTER = 2.7
+#: Scatter of a pad's compliance from test to test that no pivot has.
+_TOO_MUCH = 0.05
 
 
 def fit_data(records: Sequence[DryRecord], noise: NoiseModel) -> FitData:
@@ -110,17 +116,61 @@ def _groups(record: DryRecord) -> IntArray:
 
 def _worst(fit: LawFit, data: FitData, groups: IntArray) -> tuple[int, float]:
     """The group (of m) whose shift is most significant, and its size in standard errors."""
-    reading, jacobian = fit.reading_gradient(data.load, data.branch)
-    design, residual = data.whitener @ jacobian, data.whitener @ (data.deflection - reading)
     numbers = np.unique(groups)
-    shift = data.whitener @ (groups[:, None] == numbers)
-    # what the law could take up of a shift is not held against the hold
-    left = shift - design @ (fit.covariance @ (design.T @ shift))
+    shift, left, score = _shown(fit, data, groups[:, None] == numbers)
     information, whole = np.sum(shift * left, axis=0), np.sum(shift**2, axis=0)
-    size = np.abs(residual @ left) / np.sqrt(np.maximum(information, 1e-6 * whole))
+    size = np.abs(score) / np.sqrt(np.maximum(information, 1e-6 * whole))
     size[information <= 1e-6 * whole] = 0.0
     worst = int(np.argmax(size))
     return int(numbers[worst]), float(size[worst])
+
+
+def _shown(fit: LawFit, data: FitData, columns: FloatArray | BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Changes (m, k) of the readings, whitened; what the law cannot take up of them; the residual along that (k,)."""
+    reading, jacobian = fit.reading_gradient(data.load, data.branch)
+    design, residual = data.whitener @ jacobian, data.whitener @ (data.deflection - reading)
+    shift = data.whitener @ columns
+    left = shift - design @ (fit.covariance @ (design.T @ shift))
+    return shift, left, residual @ left
+
+
+def with_repeats(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitData]) -> tuple[list[FitData], float]:
+    """Data whose compliance is another one in every test of a pad, by a scatter that all pads' tests tell together."""
+    runs, changes, sizes, squares = [], [], [np.zeros(0)], [np.zeros(0)]
+    for records, pad in zip(pads, data, strict=True):
+        fit = fit_law(LAWS["spline"], True, pad)
+        runs.append(np.repeat(np.arange(len(records)), [len(record.used) for record in records]))
+        # of the curve, not of the readings: these would favour the softer test
+        changes.append(fit.reading_gradient(pad.load, pad.branch)[0] - fit.theta[OFFSET])
+        if len(records) < 2:
+            continue
+        columns = (runs[-1][:, None] == np.arange(len(records))) * changes[-1][:, None]
+        # what all tests have in common is the curve's
+        shift, left, score = _shown(fit, pad, columns @ linalg.null_space(np.ones((1, len(records)))))
+        information, basis = np.linalg.eigh(shift.T @ left)
+        told = information > _TOLD * np.sum(shift**2)
+        sizes.append(information[told])
+        squares.append((basis.T @ score)[told] ** 2 / information[told])
+    scatter = _scatter(np.concatenate(sizes), np.concatenate(squares))
+    wider = []
+    for pad, run, change in zip(data, runs, changes, strict=True):
+        root = np.linalg.inv(pad.whitener)
+        covariance = root @ root.T + scatter**2 * np.outer(change, change) * (run[:, None] == run)
+        wider.append(replace(pad, whitener=np.linalg.inv(np.linalg.cholesky(covariance))))
+    return (wider if scatter else list(data)), scatter
+
+
+def _scatter(size: FloatArray, square: FloatArray) -> float:
+    """Scatter of numbers (n,) of information `size` about zero by their squares in standard errors; zero by chance."""
+    if not len(size):
+        return 0.0
+
+    def deviance(logarithm: float) -> float:
+        variance = 1.0 + math.exp(2.0 * logarithm) * size
+        return float(np.sum(np.log(variance) + square / variance))
+
+    best = optimize.minimize_scalar(deviance, bounds=(math.log(1e-4), 0.0), method="bounded").x
+    return math.exp(best) if float(np.sum(square)) - deviance(best) > _CLEAR_SCATTER else 0.0
 
 
 def fit_pivots(
@@ -194,12 +244,16 @@ def _fit_pads(pads: Sequence[Sequence[DryRecord]], structure: str) -> list[Pivot
     """Learn the noise about the curves, fit every law to the records of each pad, weigh the laws over the pads."""
     noise = pooled_noise(list(itertools.chain(*pads)), about_curve=True)
     data = [fit_data(records, noise) for records in pads]
+    data, scatter = with_repeats(pads, data)
     variants = list(itertools.product(LAWS.values(), (False, True)))
     fits = [[fit_law(law, contact, pad_data) for law, contact in variants] for pad_data in data]
     fits = with_shared_shape(fits, posterior_weights(fits), data)
     curves = []
     for records, candidates, weights in zip(pads, fits, posterior_weights(fits), strict=True):
-        curves.append(assemble_curve(records, keep_likely(candidates, weights), noise, structure))
+        curve = assemble_curve(records, keep_likely(candidates, weights), noise, structure)
+        text = f"tests of one pad differ by {100 * scatter:.0f} % in deflection over load"
+        apart = holding((scatter > _TOO_MUCH and len(records) > 1, "runs-disagree", text))
+        curves.append(replace(curve, status=(*curve.status, *apart)))
     return curves
 
 
