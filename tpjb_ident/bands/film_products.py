@@ -59,16 +59,16 @@ def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
         return FilmProducts(np.nan, np.nan, orbit, 0.0, True)
     orders = [order for order in (1, 2) if _falls_on_lines(runs[0], order)]
     shaft = orbit, float(np.linalg.norm([film.at_turned(runs, order) for order in orders]))
-    silent = ~np.any([run.driven | run.disturbed for run in runs], axis=0)
+    undriven = ~np.any([run.driven | run.disturbed for run in runs], axis=0)
     number = np.round(runs[0].frequencies * runs[0].period).astype(int)
     motion = np.mean([np.sum(np.abs(run.D.mean(axis=0)) ** 2, axis=1) * run.driven for run in runs], axis=0)
     sums = np.stack(_sums(number, motion / 4), axis=1)
-    reached = sums > _REACHED * np.median(sums[driven | silent], axis=0)
-    silent &= reached.any(axis=1)
+    reached = sums > _REACHED * np.median(sums[driven | undriven], axis=0)
+    undriven &= reached.any(axis=1)
     even = bool(reached[driven, 0].mean() > 0.5)
-    if silent.sum() < _LEAST_LINES:
+    if undriven.sum() < _LEAST_LINES:
         return FilmProducts(np.nan, np.nan, *shaft, even)
-    square, cube = _curvature(sums[silent] * [8.0, 24.0], film.excess(runs, silent))  # of amplitudes' squares, 4 S
+    square, cube = _curvature(sums[undriven] * [8.0, 24.0], film.excess(runs, undriven))  # of amplitudes' squares, 4 S
     stiffness = np.sqrt(film.force / motion[driven].mean())
     cube = max(cube, (_STANDS_IN * square / stiffness) ** 2)
     change = 3 * np.sqrt(cube) * max(run.rms for run in runs) ** 2 / stiffness
@@ -151,9 +151,9 @@ class _Film:
                 turned, motion = run.turned[order], run.D.mean(axis=0)[self.driven]
                 D, F = turned.displacement.phasors, turned.oil_force(slice(None))
                 force = self.unexplained(D, F, run.frequencies - order * run.shaft)[0, self.driven]
-                kept = motion @ np.linalg.lstsq(motion, force, rcond=_ACROSS)[0]
-                noise = np.sum(np.abs(force - kept) ** 2) * 2 / max(len(force) - 2, 1)
-                squares.append((np.sum(np.abs(kept) ** 2) - noise) / len(force) / self.force)
+                coherent = motion @ np.linalg.lstsq(motion, force, rcond=_ACROSS)[0]
+                noise = np.sum(np.abs(force - coherent) ** 2) * 2 / max(len(force) - 2, 1)
+                squares.append((np.sum(np.abs(coherent) ** 2) - noise) / len(force) / self.force)
         return float(np.sqrt(max(np.sum(squares) / max(len(squares) - 1, 1), 0.0)))
 
 

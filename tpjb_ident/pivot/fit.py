@@ -59,7 +59,7 @@ _MISFIT_PROBABILITY = 1e-4
 _CLEAR_CHOICE = 0.5  # posterior share below which the law counts as undecided
 _MANY_LOST = 0.05
 #: Share of a difference that a curve must leave for the tests to tell it.
-_TOLD = 1e-3
+_LEAST_SHARE = 1e-3
 #: Fall of the deviance from which tests of one pad differ: one in twenty sets of equal tests shows it.
 _CLEAR_SCATTER = 2.7
 #: Scatter of a pad's compliance from test to test that no pivot has.
@@ -117,21 +117,21 @@ def _groups(record: DryRecord) -> IntArray:
 def _worst(fit: LawFit, data: FitData, groups: IntArray) -> tuple[int, float]:
     """The group (of m) whose shift is most significant, and its size in standard errors."""
     numbers = np.unique(groups)
-    shift, left, score = _shown(fit, data, groups[:, None] == numbers)
-    information, whole = np.sum(shift * left, axis=0), np.sum(shift**2, axis=0)
+    shift, remainder, score = _score_of(fit, data, groups[:, None] == numbers)
+    information, whole = np.sum(shift * remainder, axis=0), np.sum(shift**2, axis=0)
     size = np.abs(score) / np.sqrt(np.maximum(information, 1e-6 * whole))
     size[information <= 1e-6 * whole] = 0.0
     worst = int(np.argmax(size))
     return int(numbers[worst]), float(size[worst])
 
 
-def _shown(fit: LawFit, data: FitData, columns: FloatArray | BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _score_of(fit: LawFit, data: FitData, columns: FloatArray | BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Changes (m, k) of the readings, whitened; what the law cannot take up of them; the residual along that (k,)."""
     reading, jacobian = fit.reading_gradient(data.load, data.branch)
     design, residual = data.whitener @ jacobian, data.whitener @ (data.deflection - reading)
     shift = data.whitener @ columns
-    left = shift - design @ (fit.covariance @ (design.T @ shift))
-    return shift, left, residual @ left
+    remainder = shift - design @ (fit.covariance @ (design.T @ shift))
+    return shift, remainder, residual @ remainder
 
 
 def with_repeats(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitData]) -> tuple[list[FitData], float]:
@@ -146,11 +146,11 @@ def with_repeats(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitData]) -
             continue
         columns = (runs[-1][:, None] == np.arange(len(records))) * changes[-1][:, None]
         # what all tests have in common is the curve's
-        shift, left, score = _shown(fit, pad, columns @ linalg.null_space(np.ones((1, len(records)))))
-        information, basis = np.linalg.eigh(shift.T @ left)
-        told = information > _TOLD * np.sum(shift**2)
-        sizes.append(information[told])
-        squares.append((basis.T @ score)[told] ** 2 / information[told])
+        shift, remainder, score = _score_of(fit, pad, columns @ linalg.null_space(np.ones((1, len(records)))))
+        information, basis = np.linalg.eigh(shift.T @ remainder)
+        informative = information > _LEAST_SHARE * np.sum(shift**2)
+        sizes.append(information[informative])
+        squares.append((basis.T @ score)[informative] ** 2 / information[informative])
     scatter = _scatter(np.concatenate(sizes), np.concatenate(squares))
     wider = []
     for pad, run, change in zip(data, runs, changes, strict=True):
@@ -252,8 +252,8 @@ def _fit_pads(pads: Sequence[Sequence[DryRecord]], structure: str) -> list[Pivot
     for records, candidates, weights in zip(pads, fits, posterior_weights(fits), strict=True):
         curve = assemble_curve(records, keep_likely(candidates, weights), noise, structure)
         text = f"tests of one pad differ by {100 * scatter:.0f} % in deflection over load"
-        apart = holding((scatter > _TOO_MUCH and len(records) > 1, "runs-disagree", text))
-        curves.append(replace(curve, status=(*curve.status, *apart)))
+        differing = holding((scatter > _TOO_MUCH and len(records) > 1, "runs-disagree", text))
+        curves.append(replace(curve, status=(*curve.status, *differing)))
     return curves
 
 
