@@ -61,8 +61,8 @@ def compile_all_kinds() -> None:
     from model.statics.compiled.iteration import fresh_memory, iterate, vector_size
 
     s = search({"conduction": True})
-    size = vector_size(s.state, s.case)
-    iterate(Problem(s.grids, s.bodies, s.pads, s.works, s.state, s.case), fresh_memory(size))
+    size = vector_size(s.state, len(s.films), s.case)
+    iterate(Problem(s.grids, s.bodies, s.stack, s.works, s.state, s.case), fresh_memory(size))
     predict_all(ALL_KINDS)
 
 

@@ -361,8 +361,10 @@ def test_samples(name):
         stiffness = np.interp(LOADS, true["force_N"], true["stiffness_N_per_m"])
         error = np.log(curve.stiffness(LOADS) / stiffness)
         errors.append(error)
-        assert np.all(np.abs(error) < 2.6 * curve.relative_stiffness_se(LOADS))
-        assert np.abs(error[1:]).max() < 0.05
+        deviation = curve.relative_stiffness_se(LOADS)
+        assert np.all(np.abs(error) < 2.6 * deviation)
+        # 5 %, where the record can tell that: probes that wander leave 3 % of one campaign
+        assert np.all(np.abs(error) < np.maximum(0.05, 2.0 * deviation))
     assert np.median(np.abs(errors)) < 0.03
     polygon = measure_clearance(source, ANGLES, curves)
     assert polygon.clearance == pytest.approx(np.array(truth["clearance_cold_m"]), abs=0.5e-6)
