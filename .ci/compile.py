@@ -57,12 +57,10 @@ def compile_plain() -> None:
 
 def compile_all_kinds() -> None:
     """Search from anywhere: where the pads carry is being compiled by the other process."""
-    from model.statics.compiled.case import Problem
-    from model.statics.compiled.iteration import fresh_memory, iterate, vector_size
+    from model.statics.compiled.iteration import fresh_memory, iterate
 
-    s = search({"conduction": True})
-    size = vector_size(s.state, len(s.films), s.case)
-    iterate(Problem(s.grids, s.bodies, s.stack, s.works, s.state, s.case), fresh_memory(size))
+    problem = search({"conduction": True}).problem
+    iterate(problem, fresh_memory(problem))
     predict_all(ALL_KINDS)
 
 

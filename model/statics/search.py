@@ -249,19 +249,22 @@ class Search:
             pads["clearance"] -= self.case.closing * hotter
         return True
 
+    @property
+    def problem(self) -> Problem:
+        """What the compiled search works on."""
+        return Problem(self.grids, self.bodies, self.stack, self.works, self.state, self.case)
+
     def run(self) -> Equilibrium:
         """Iterate from where the search stands."""
-        memory = iteration.fresh_memory(iteration.vector_size(self.state, len(self.films), self.case))
-        problem = Problem(self.grids, self.bodies, self.stack, self.works, self.state, self.case)
-        across, code = self.across, iteration.ASKS_OIL
+        problem, across, code = self.problem, self.across, iteration.ASKS_OIL
+        memory = iteration.fresh_memory(problem)
         while code >= iteration.ASKS_OIL:
             code = iteration.iterate(problem, memory)
             if code == iteration.ASKS_OIL and across is not None:
                 set_cross_viscosities(problem, across)
             elif code == iteration.ASKS_HEAT and across is not None:
-                memory.trail[iteration.HEAT] = settle_cross_temperatures(
-                    problem, across, float(memory.trail[iteration.RELAXED])
-                )
+                relaxed = float(memory.trail[iteration.RELAXED])
+                memory.trail[iteration.HEAT] = settle_cross_temperatures(problem, across, relaxed)
             elif code == iteration.ASKS_LAWS:
                 ask_laws(self.setup.pivots, self.pads["law"], self.pads["felt"][:, 0])
             elif code == iteration.ASKS_STABLE:

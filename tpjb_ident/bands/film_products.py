@@ -12,8 +12,6 @@ The shaft's orbit makes of every line another one at f - 2X, half as large as it
 turns with a multiple of the period, what it makes at f - X falls on other lines, with another phase in every run.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,11 +22,10 @@ from scipy.signal import fftconvolve
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.shape import over_frequency
+from tpjb_ident.estimate.term import ALLOWED_CHANGE, CHANGE_BY_ORBIT
 
 #: Undriven lines that tell, at least, and how much of what falls on driven lines must fall on them.
 _LEAST_LINES, _REACHED = 3, 0.1
-#: Of what the lines show so much is allowed for, as with sines; change of h for the force at f - 2X.
-_ALLOWED, _ORBIT = 1.3, 2.0
 #: Bins of the whole record within which one line falls on another.
 _ON_LINE = 1.0
 #: Motion across the drive, over that along it, that is itself a product of other lines.
@@ -53,12 +50,12 @@ class FilmProducts:
 def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
     """What the lines of a point's runs tell."""
     driven = np.all([run.driven & ~run.disturbed for run in runs], axis=0)
-    film = _Film.of(runs, driven)
-    orbit = _ALLOWED * _ORBIT * film.at_turned(runs, 2)
+    film = _film(runs, driven)
+    turned = [film.at_turned(runs, order) for order in (1, 2)]
+    orbit = ALLOWED_CHANGE * CHANGE_BY_ORBIT * turned[1]
     if runs[0].period is None or not driven.any():
         return FilmProducts(np.nan, np.nan, orbit, 0.0, True)
-    orders = [order for order in (1, 2) if _falls_on_lines(runs[0], order)]
-    shaft = orbit, float(np.linalg.norm([film.at_turned(runs, order) for order in orders]))
+    shaft = orbit, float(np.linalg.norm([_falls_on_lines(runs[0], n) * size for n, size in enumerate(turned, 1)]))
     undriven = ~np.any([run.driven | run.disturbed for run in runs], axis=0)
     number = np.round(runs[0].frequencies * runs[0].period).astype(int)
     motion = np.mean([np.sum(np.abs(run.D.mean(axis=0)) ** 2, axis=1) * run.driven for run in runs], axis=0)
@@ -73,7 +70,7 @@ def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
     cube = max(cube, (_STANDS_IN * square / stiffness) ** 2)
     change = 3 * np.sqrt(cube) * max(run.rms for run in runs) ** 2 / stiffness
     scatter = np.sqrt((sums[driven] @ [8 * square, 24 * cube]).mean() / film.force)
-    return FilmProducts(_ALLOWED * float(change), _ALLOWED * float(scatter), *shaft, even)
+    return FilmProducts(ALLOWED_CHANGE * float(change), ALLOWED_CHANGE * float(scatter), *shaft, even)
 
 
 def _falls_on_lines(run: RunSpectra, order: int) -> bool:
@@ -92,8 +89,9 @@ def _curvature(sums: FloatArray, power: FloatArray) -> tuple[float, float]:
     expected = np.ones(len(power))
     for _ in range(_ROUNDS):
         numbers = nnls(sums / size / expected[:, None], power / expected)[0]
-        expected = np.maximum(sums / size @ numbers, 1e-3 * max(float((sums / size @ numbers).max()), 1e-300))
-        expected /= expected.max()
+        fitted = sums / size @ numbers
+        largest = max(fitted.max(), 1e-300)
+        expected = np.maximum(fitted / largest, 1e-3)
     square, cube = numbers / size
     return float(square), float(cube)
 
@@ -116,18 +114,6 @@ class _Film:
     numbers: FloatArray  #: (12,)
     middle: float  #: rad/s
     force: float  #: N^2: mean square of the driven lines' film force
-
-    @staticmethod
-    def of(runs: Sequence[RunSpectra], driven: BoolArray) -> _Film:
-        """The film of some runs by their driven lines (n_bins,)."""
-        omega = 2 * np.pi * runs[0].frequencies[driven]
-        middle = float(np.median(omega)) if len(omega) else 1.0
-        columns = _columns(omega, middle)
-        D, F = (np.array([getattr(run, name).mean(axis=0)[driven] for run in runs]) for name in "DF")
-        design = np.einsum("kijq,rkj->rkiq", columns, D).reshape(-1, columns.shape[3])
-        rows = np.concatenate([design.real, design.imag])
-        numbers = np.linalg.lstsq(rows, np.concatenate([F.real.ravel(), F.imag.ravel()]), rcond=None)[0]
-        return _Film(driven, numbers, middle, float(np.mean(np.sum(np.abs(F) ** 2, axis=2))) if F.size else np.inf)
 
     def unexplained(self, D: ComplexArray, F: ComplexArray, frequencies: FloatArray) -> ComplexArray:
         """Force beyond h D at some frequencies [Hz], negative ones too, (n_windows, n_bins, 2) [N]."""
@@ -155,6 +141,18 @@ class _Film:
                 noise = np.sum(np.abs(force - coherent) ** 2) * 2 / max(len(force) - 2, 1)
                 squares.append((np.sum(np.abs(coherent) ** 2) - noise) / len(force) / self.force)
         return float(np.sqrt(max(np.sum(squares) / max(len(squares) - 1, 1), 0.0)))
+
+
+def _film(runs: Sequence[RunSpectra], driven: BoolArray) -> _Film:
+    """The film of some runs by their driven lines (n_bins,)."""
+    omega = 2 * np.pi * runs[0].frequencies[driven]
+    middle = float(np.median(omega)) if len(omega) else 1.0
+    columns = _columns(omega, middle)
+    D, F = (np.array([getattr(run, name).mean(axis=0)[driven] for run in runs]) for name in "DF")
+    design = np.einsum("kijq,rkj->rkiq", columns, D).reshape(-1, columns.shape[3])
+    rows = np.concatenate([design.real, design.imag])
+    numbers = np.linalg.lstsq(rows, np.concatenate([F.real.ravel(), F.imag.ravel()]), rcond=None)[0]
+    return _Film(driven, numbers, middle, float(np.mean(np.sum(np.abs(F) ** 2, axis=2))) if F.size else np.inf)
 
 
 def _columns(omega: FloatArray, middle: float) -> ComplexArray:

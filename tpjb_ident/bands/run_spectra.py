@@ -85,10 +85,11 @@ class RunSpectra:
         drives = [self.D, self.F] if self.command is None else [self.command]
         sizes = [np.linalg.norm(drive.mean(axis=0), axis=1) for drive in drives]
         share = np.max([size / max(size.max(), 1e-300) for size in sizes], axis=0)
-        falling = np.sort(share)[::-1] if self.command is not None else np.zeros(0)
-        steps = (falling[1:] < _DRIVEN) & (falling[:-1] > _STEP * falling[1:])
-        last = falling[:-1][steps][0] if steps.any() else min(_DRIVEN, falling.min(initial=_DRIVEN))
-        return np.asarray(share >= max(last, _NOTHING))
+        if self.command is None:
+            return np.asarray(share >= _DRIVEN)
+        falling = np.sort(share)[::-1]
+        ends = np.flatnonzero((falling[1:] < _DRIVEN) & (falling[:-1] > _STEP * falling[1:]))
+        return np.asarray(share >= max(falling[ends[0]] if len(ends) else 0.0, _NOTHING))
 
     @property
     def amplitude(self) -> float:
@@ -150,7 +151,8 @@ def run_spectra(
 def _turned(spectra: RunSpectra, samples: Samples, places: IntArray) -> RunSpectra:
     """The spectra with those of the record turned as fast as the shaft and twice as fast, where the shaft shows."""
     turned = {}
-    for order in (1, 2) if spectra.shaft else ():
+    orders = (1, 2) if spectra.period is not None else (2,)  # what is at f - X meets lines of a period alone
+    for order in orders if spectra.shaft else ():
         wave = np.exp(2j * np.pi * order * spectra.shaft / samples.rate * np.arange(samples.length))
         bins = np.fft.fft(samples.rows * wave, axis=1)[:, places * len(spectra.phasors.start)]
         turned[order] = replace(spectra.phasors, z=bins.T[None] * (2 / samples.length))

@@ -16,8 +16,21 @@ from tpjb_ident.estimate.equation import HOUSING_ROWS, State, film_change_rows
 
 #: Largest logarithm of a factor.
 _LARGEST = 5.0
+#: Of a change of H that a film's lines show so much is allowed for: they are right within a fifth.
+ALLOWED_CHANGE = 1.3
+#: Change of H over the share of the force at f - 2X that goes with the motion at f.
+CHANGE_BY_ORBIT = 2.0
+#: A change is no larger than what is allowed for; as a standard deviation it is this part of it.
+CHANGE_AS_DEVIATION = 1 / 1.6
+#: Changes below this share are not worth telling [share of H].
+_LEAST_CHANGE = 2e-4
 #: Condition of accelerometers that lead the cells: the housing's test finds it, the delay tells whether it stays.
 OUT_OF_STEP = "cells-and-accelerometers-out-of-phase"
+
+
+def worth_stating(share: float) -> float:
+    """A share by which H may change, none where it is too small to tell."""
+    return share if share > _LEAST_CHANGE else 0.0
 
 
 @dataclass(frozen=True)

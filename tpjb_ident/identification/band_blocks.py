@@ -13,11 +13,12 @@ from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_nois
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.sensors import alive, axes_of
+from tpjb_ident.estimate.term import worth_stating
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.campaign_blocks import calibration_numbers
 from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.runs.static_load import missed_load
-from tpjb_ident.terms.distortion import band_change, line_scatter, worth_stating
+from tpjb_ident.terms.distortion import band_change, line_scatter
 
 #: F ratio from which an excitation tells the displacements from their noise,
 STRONG = 10.0
@@ -103,15 +104,15 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, float, floa
     pair = periodic and max(s.driven.sum() for s in point.spectra) < 3
     # alike in all runs: more than the two that h needs do not average it away
     repeats = np.sqrt(max(len(point.spectra), 2) / 2) if periodic and not pair and one_phase_set(point.spectra) else 0.0
-    lines = film_products(point.spectra)
-    change, scatter = lines.change, lines.scatter
+    film = film_products(point.spectra)
+    change, scatter = film.change, film.scatter
     if np.isnan(change) and clearance:
         rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
         one_sided = max(s.one_sided for s in point.spectra)
         change = band_change("pair" if pair else point.group.kind, rms, peak, one_sided)
-        scatter = line_scatter(rms) if lines.even else change
+        scatter = line_scatter(rms) if film.even else change
     change, scatter = np.nan_to_num([change, scatter])
-    return worth_stating(change + lines.orbit), scatter * repeats, lines.turning
+    return worth_stating(change + film.orbit), scatter * repeats, film.turning
 
 
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:

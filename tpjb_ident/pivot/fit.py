@@ -136,7 +136,9 @@ def _score_of(fit: LawFit, data: FitData, columns: FloatArray | BoolArray) -> tu
 
 def with_repeats(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitData]) -> tuple[list[FitData], float]:
     """Data whose compliance is another one in every test of a pad, by a scatter that all pads' tests tell together."""
-    runs, changes, sizes, squares = [], [], [np.zeros(0)], [np.zeros(0)]
+    if all(len(records) < 2 for records in pads):
+        return list(data), 0.0
+    runs, changes, sizes, squares = [], [], [], []
     for records, pad in zip(pads, data, strict=True):
         fit = fit_law(LAWS["spline"], True, pad)
         runs.append(np.repeat(np.arange(len(records)), [len(record.used) for record in records]))
@@ -162,8 +164,6 @@ def with_repeats(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitData]) -
 
 def _scatter(size: FloatArray, square: FloatArray) -> float:
     """Scatter of numbers (n,) of information `size` about zero by their squares in standard errors; zero by chance."""
-    if not len(size):
-        return 0.0
 
     def deviance(logarithm: float) -> float:
         variance = 1.0 + math.exp(2.0 * logarithm) * size

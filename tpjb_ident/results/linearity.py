@@ -18,6 +18,7 @@ from scipy.special import stdtrit
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.estimate.term import ALLOWED_CHANGE, CHANGE_BY_ORBIT, worth_stating
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.phasors.line_means import FilmLines
 from tpjb_ident.runs.point_data import PointData
@@ -29,12 +30,8 @@ SIGNIFICANCE = 0.01
 NOTABLE = 0.01
 
 #: Change of h per share of the force at 3f and at 2X - f, and per squared share at 2f.
-_WEIGHTS = {"3f": 3.0, "2X-f": 2.0}
+_WEIGHTS = {"3f": 3.0, "2X-f": CHANGE_BY_ORBIT}
 _SECOND = 4.5
-#: Of the change that the lines show, so much is allowed for.
-_ALLOWED = 1.3
-#: Changes below this share are not worth telling [share of h].
-_NOTHING = 2e-4
 #: From here on no interval can be answered for.
 _REFUSED = 0.05
 #: Share of the clearance from which a motion may be too large for a linear film, if the harmonics do not tell,
@@ -99,8 +96,8 @@ def film_change(runs: Sequence[FilmLines], h: ComplexArray) -> FilmChange:
     parts = parts[np.isfinite(parts).all(axis=1)]
     if not len(parts):
         return FilmChange()
-    share, hidden = (_ALLOWED * parts.sum(axis=0)).tolist()
-    return FilmChange(share if share > _NOTHING else 0.0, hidden)
+    share, hidden = (ALLOWED_CHANGE * parts.sum(axis=0)).tolist()
+    return FilmChange(worth_stating(share), hidden)
 
 
 def _size(runs: Sequence[FilmLines], name: str, h: ComplexArray) -> FloatArray:

@@ -13,12 +13,10 @@ from tpjb_ident.estimate.arrowhead import NUMBERS
 from tpjb_ident.estimate.blocks import Blocks, Rig, totals
 from tpjb_ident.estimate.equation import State, entry_changes, entry_sizes
 from tpjb_ident.estimate.shape import real_numbers
-from tpjb_ident.estimate.term import FilmTerm, Fitted, numbered
+from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION, FilmTerm, Fitted, numbered
 
 #: Name of the condition where the runs tell G.
 ZERO_AMPLITUDE = "zero amplitude"
-#: A change is no larger than what the harmonics let expect; as a standard deviation it is this part of it.
-_AS_DEVIATION = 1 / 1.6
 #: Runs of one direction must differ in amplitude by this factor to tell G: directions differ by more than their size.
 _SEVERAL = 1.3
 #: Cosine between the motions of two runs from which they have one direction.
@@ -42,7 +40,7 @@ class Amplitude(FilmTerm):
         self.group = np.where(blocks.bent > 0, np.cumsum(blocks.bent > 0) - 1, -1)
         for p in self.points:
             place = f"{blocks.points[p].static_load:g} N, {blocks.points[p].excitation_hz:g} Hz"
-            self.parameters += numbered(place, "1", [_AS_DEVIATION * float(blocks.bent[p])] * NUMBERS)
+            self.parameters += numbered(place, "1", [CHANGE_AS_DEVIATION * float(blocks.bent[p])] * NUMBERS)
 
     def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> tuple[Condition, ...]:
         """What to say where the runs of a point tell G; `h` (2, 2) [N/m]."""

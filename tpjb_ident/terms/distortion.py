@@ -15,16 +15,12 @@ from tpjb_ident.estimate.arrowhead import NUMBERS
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State, entry_changes, entry_sizes, film_force_rows
 from tpjb_ident.estimate.noise import scatter_patterns
-from tpjb_ident.estimate.term import FilmTerm, numbered
+from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION, FilmTerm, numbered, worth_stating
 
 #: Change of H over the squared motion of a band and of two tones, over a blow's peak in one sense, in both its square.
 _BAND, _PAIR, _BLOW, _BLOWS = 20.0, 10.0, 1.5, 5.0
 #: Scatter of a line over the motion of a multi-sine of one phase set.
 _LINE = 3.0
-#: A change is no larger than what is stated; as a standard deviation it is this part of it.
-_AS_DEVIATION = 1 / 1.6
-#: Changes below this share are not worth telling [share of H].
-_NOTHING = 2e-4
 
 
 def band_change(kind: str, rms: float, peak: float, one_sided: float) -> float:
@@ -37,12 +33,7 @@ def band_change(kind: str, rms: float, peak: float, one_sided: float) -> float:
 
 def line_scatter(rms: float) -> float:
     """Relative scatter of a line's film force in a multi-sine of one phase set; `rms` over the clearance."""
-    return _LINE * rms if _BAND * rms**2 > _NOTHING else 0.0
-
-
-def worth_stating(share: float) -> float:
-    """A share of H, none where it is too small to tell."""
-    return share if share > _NOTHING else 0.0
+    return _LINE * rms if worth_stating(_BAND * rms**2) else 0.0
 
 
 class Distortion(FilmTerm):
@@ -68,7 +59,7 @@ class Distortion(FilmTerm):
         share = np.zeros(1) if share is None else share
         self.group = np.where(share > 0, np.cumsum(share > 0) - 1, -1)[self._band]
         for b in np.flatnonzero(share):
-            self.parameters += numbered(f"band {b + 1}", "1", [_AS_DEVIATION * float(share[b])] * NUMBERS)
+            self.parameters += numbered(f"band {b + 1}", "1", [CHANGE_AS_DEVIATION * float(share[b])] * NUMBERS)
 
     def changes(self, blocks: Blocks, state: State) -> ComplexArray:
         """A share of every entry of H."""

@@ -16,7 +16,7 @@ from model.statics.compiled.case import ACROSS, ALONE, BOUNDLESS, COUPLED, HEAT_
 from model.statics.compiled.elimination import newton
 from model.statics.compiled.heat import exchange_heat, heat_films
 from model.statics.compiled.place import is_doubtful
-from model.statics.compiled.stack import BACKFLOW, GROWING, GROWN, BodyStack, PadStack, SearchState
+from model.statics.compiled.stack import BACKFLOW, GROWING, GROWN, BodyStack, PadStack
 from model.statics.compiled.step import grow_and_bend, move, solve_pressures
 from rigdata.arrays import FloatArray
 
@@ -59,8 +59,11 @@ class Memory(NamedTuple):
     before: FloatArray
 
 
-def fresh_memory(size: int) -> Memory:
-    """Of an iteration that has not begun, over a state of a size; films begin warm, and nothing is relaxed."""
+def fresh_memory(problem: Problem) -> Memory:
+    """Of an iteration that has not begun: films begin warm, and nothing is relaxed; vectors are `_write_vector`'s."""
+    state = problem.state
+    faces = state.faces.size if problem.case.thermal == ACROSS else 0
+    size = 3 + 3 * len(problem.pads.each) + state.warmth.size + faces + state.bent.size
     trail = np.zeros(TRAIL)
     trail[[RESIDUAL, HEAT, _BEST, _LEFT, _BEST_LEFT]] = math.inf
     trail[RELAXED] = 1.0
@@ -185,12 +188,6 @@ def _doubts(case: Case, pads: PadStack) -> bool:
         pad = pads.each[m]
         found = found or (pad.solved and is_doubtful(case, pad, pads.curves[m]))
     return found
-
-
-def vector_size(state: SearchState, count: int, case: Case) -> int:
-    """Length of the vector of journal, pads, temperatures and deformations."""
-    faces = state.faces.size if case.thermal == ACROSS else 0
-    return 3 + 3 * count + state.warmth.size + faces + state.bent.size
 
 
 @inner
