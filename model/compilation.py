@@ -108,13 +108,12 @@ _LOADING = ("_load_overload", "_guard_against_spurious_io_errors")
 @functools.cache
 def _cache_type() -> Any:
     from numba.core.caching import FunctionCache
-    from numba.core.runtime import rtsys
 
     class Cache(FunctionCache):  # type: ignore[misc]  # numba has no types
         """Loads machine code without what only a compiler needs: half of numba, 0.6 s of a process that predicts."""
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
-            rtsys.initialize(target_context)  # allocation of arrays
+            _name_allocation(target_context)
             loaded = None
             with self._guard_against_spurious_io_errors():
                 loaded = self._load_overload(sig, target_context)
@@ -128,6 +127,24 @@ def _cache_type() -> Any:
             super().save_overload(sig, data)
 
     return Cache
+
+
+def _name_allocation(target_context: Any) -> None:
+    """Let machine code find what allocates arrays.
+
+    numba compiles something besides that only new code needs: half of LLVM, 22 MB of a process. It makes up for it
+    where it compiles.
+    """
+    from numba.core.runtime import rtsys
+
+    try:
+        from numba.core.codegen import ll
+        from numba.core.runtime._nrt_python import c_helpers
+    except ImportError:  # a numba that is built otherwise
+        rtsys.initialize(target_context)
+        return
+    for name, address in c_helpers.items():
+        ll.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 def _names_of(library: Any) -> Any:

@@ -71,6 +71,18 @@ def test_nothing_is_compiled_or_loaded_until_a_loop_is_called():
     assert told.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
+def test_code_on_the_disk_allocates_without_a_compiler():
+    asked = (
+        "import numpy as np; from model.statics.compiled.heat import balance_heat; from numba.core.runtime import rtsys;"
+        "answers = np.ones((2, 2)), np.zeros((2, 3)), np.zeros((2, 3));"
+        "inlets, _ = balance_heat(np.arange(2), answers, np.ones(2, dtype=bool), 40.0, 0.0);"
+        "print(inlets.tolist(), rtsys._init)"
+    )
+    told = [subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True) for _ in range(2)]
+    assert told[1].stdout.strip() == "[40.0, 40.0] False"
+
+
 def test_without_numbas_cache_the_code_is_compiled_anew(monkeypatch):
     def other(*args, **options):
         return lambda function: (function.__name__, options.get("cache", False))
