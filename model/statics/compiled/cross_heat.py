@@ -23,11 +23,10 @@ from model.film.cross_film import CrossFilm, CrossOperator, cross_pressure_chang
 from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
 from model.film.dense import times
 from model.film.models import TURBULENT
-from model.film.oil_state import edge_flows
 from model.interpolation import largest
 from model.pad.bending import PadDeformation
 from model.statics.compiled.case import BOUNDLESS, HEATING_STEP, Problem
-from model.statics.compiled.heat import balance_heat, note_heat
+from model.statics.compiled.heat import balance_heat, note_flows, note_heat
 from model.statics.compiled.stack import BACKFLOW, JOURNAL, grid_of, work_of
 from rigdata.arrays import FloatArray
 
@@ -109,14 +108,9 @@ def settle_cross_temperatures(problem: Problem, across: Across, relaxation: floa
     n, limits = len(pads.each), (relaxation, HEATING_STEP)
     flows, outlets, taken = np.empty((n, 2)), np.zeros((n, 3)), np.zeros((n, 3))
     for m in range(n):
-        pad = pads.each[m]
-        if pad.solved:
-            entering, sides = edge_flows(grid_of(problem.grids, m), work_of(problem.works, m), math.inf)
-            flows[m, 0], flows[m, 1] = entering, entering - sides
+        note_flows(problem, m, math.inf, flows[m], outlets[m])
+        if pads.each[m].solved:
             _answer(problem, across, m, outlets[m], taken[m])
-        else:  # an idle pad passes its inlet on, somewhat warmer
-            flows[m] = pad.resting[1]
-            outlets[m, 0], outlets[m, 1] = pad.resting[2] - pad.inlet, 1.0
     inlets, journal = balance_heat(pads.order, (flows, outlets, taken), pads.each["solved"], case.supply, case.mixing)
     change = 0.0
     for m in range(n):

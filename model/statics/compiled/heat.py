@@ -84,16 +84,10 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
     outlets = np.zeros((n, 3))
     taken = np.zeros((n, 3))
     for m in range(n):
-        pad = pads.each[m]
-        if not pad.solved:
-            flows[m] = pad.resting[1]
-            outlets[m, 0] = pad.resting[2] - pad.inlet
-            outlets[m, 1] = 1.0
-            continue
-        _answer(bodies, problem, m, answers[m])
-        entering, sides = edge_flows(grid_of(grids, m), work_of(works, m), pad.supplied)
-        flows[m, 0], flows[m, 1] = entering, entering - sides
-        _pass_on(work_of(works, m), answers[m], outlets[m], taken[m])
+        note_flows(problem, m, pads.each[m].supplied, flows[m], outlets[m])
+        if pads.each[m].solved:
+            _answer(bodies, problem, m, answers[m])
+            _pass_on(work_of(works, m), answers[m], outlets[m], taken[m])
     change = 0.0
     for m in range(n):
         pad = pads.each[m]
@@ -116,6 +110,18 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
     if case.journal:
         state.figures[JOURNAL] = journal
     return change
+
+
+@inner
+def note_flows(problem: Problem, m: int, supplied: float, flows: FloatArray, outlet: FloatArray) -> None:
+    """Set a pad's flows over its leading and trailing edge [kg/s]; an idle one passes its inlet on, somewhat warmer."""
+    pad = problem.pads.each[m]
+    if pad.solved:
+        entering, sides = edge_flows(grid_of(problem.grids, m), work_of(problem.works, m), supplied)
+        flows[0], flows[1] = entering, entering - sides
+    else:
+        flows[:] = pad.resting[1]
+        outlet[0], outlet[1] = pad.resting[2] - pad.inlet, 1.0
 
 
 @inner
