@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from model.bearing import Bearing, Pad
-from model.pad.bending import film_maps
+from model.pad.bending import axis_maps
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, SectorMesh, sector_mesh
 from model.pad.operators import PadOperators, conduct, pad_operators
@@ -31,7 +31,8 @@ class PadResponse:
         parts = []
         for even in (True, False) if full else (True,):
             solid = pad_operators(self.geometry, self.density, even)
-            parts.append((solid, film_maps((solid.theta, solid.z), film, even if full else None)))
+            along, across = axis_maps(solid.theta, film[0], None), axis_maps(solid.z, film[1], even if full else None)
+            parts.append((solid, tuple(np.kron(*pair) for pair in zip(along, across, strict=True))))
         return parts
 
     @cached_property

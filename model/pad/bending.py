@@ -11,7 +11,7 @@ business. Positive is outward: the film grows thicker by it.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -30,15 +30,27 @@ SHAPES = 12
 
 @dataclass(frozen=True, eq=False)
 class PadDeformation:
-    """How a pad's face moves outward under its film; n = (nt + 1)(nz + 1) film nodes, raveled."""
+    """How a pad's face moves outward under its film; n = (nt + 1)(nz + 1) film nodes, raveled.
 
-    compliance: FloatArray  #: (n, n): Deformation by pressure [m/Pa].
+    The solid has some 37 lines of nodes along the arc where the film has 81: what it answers is kept between its own
+    lines and the film's columns across, column by column, a quarter of the matrix on the film's nodes.
+    """
+
+    gather: FloatArray  #: (a, nt + 1): Loads of the solid's lines by the film's pressure along the arc.
+    corners: FloatArray  #: (b, nt + 1): Temperatures of the lines between its elements by the film's.
+    spread: FloatArray  #: (nt + 1, a): Deformation of the film's nodes by that of the lines.
+    by_load: FloatArray  #: ((nz + 1) a, (nz + 1) a): Deformation of the lines by their loads [m/Pa].
+    by_heat: FloatArray  #: ((nz + 1) a, (nz + 1) b): And by their temperatures [m/K].
     to_coarse: FloatArray  #: (c, n): Temperatures of the pad's coarser nodes by those of the film.
-    expansion: FloatArray  #: (n, c): Deformation by them [m/K].
     flux: FloatArray  #: (n, c): Heat flux density into the pad by them [W/m^2/K].
     shapes: FloatArray  #: (nt + 1, nz + 1, m): In which the pad gives way most.
     amplitudes: FloatArray  #: (m, n): Amplitudes of the shapes in a deformation.
     response: FloatArray  #: (m, unknowns): Amplitudes by the pressure at the film's unknown nodes.
+
+    @cached_property
+    def compliance(self) -> FloatArray:
+        """Deformation by pressure, (n, n) [m/Pa]."""
+        return _on_film(self.gather, self.spread, self.by_load)
 
 
 def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = False) -> PadDeformation:
@@ -59,24 +71,28 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
     if angle[0] - geometry.leading > 1e-9:  # a starved film: the dry arc ahead of it carries nothing
         ahead = _DRY_STATIONS
         angle = np.concatenate([np.linspace(geometry.leading, angle[0], ahead + 1)[:-1], angle])
-    wet = slice(ahead * len(z), None)
-    compliance = np.zeros((inner.size, inner.size))
-    coarser, expansion, flux = [], [], []
-    for even in (True,) if z[0] == 0.0 else (True, False):
+    half = z[0] == 0.0
+    by_load, by_heat, coarser, flux = np.zeros(()), np.zeros(()), [], []
+    for even in (True,) if half else (True, False):
         solid = pad_operators(geometry, even=even, cooled=cooled)
-        film = Line(angle, 1), Line(z, 1)
-        gather, project, coarse = film_maps((solid.theta, solid.z), film, None if z[0] == 0.0 else even)
-        project = project[wet]
-        compliance += geometry.inner_radius * (project @ (solid.compliance @ gather[:, wet]))
-        coarser.append(coarse[:, wet])
-        expansion.append(project @ solid.expansion)
-        flux.append(project @ solid.flux)
+        gather, spread, corners = axis_maps(solid.theta, Line(angle, 1), None)
+        gather, spread, corners = gather[:, ahead:], spread[ahead:], corners[:, ahead:]
+        across = axis_maps(solid.z, Line(z, 1), None if half else even)
+        loads = geometry.inner_radius * solid.compliance
+        by_load = by_load + _between_lines(across[1], loads, across[0])
+        by_heat = by_heat + _between_lines(across[1], solid.expansion, across[2])
+        coarser.append(np.kron(corners, across[2]))
+        flux.append(np.kron(spread, across[1]) @ solid.flux)
+    compliance = _on_film(gather, spread, by_load)
     shapes = _softest_shapes(compliance, area)
     amplitudes = (shapes * area[:, None]).T
     return PadDeformation(
-        compliance=compliance,
+        gather=gather,
+        corners=corners,
+        spread=spread,
+        by_load=by_load,
+        by_heat=by_heat,
         to_coarse=np.vstack(coarser),
-        expansion=np.hstack(expansion),
         flux=np.hstack(flux),
         shapes=shapes.reshape(-1, len(z), SHAPES),
         amplitudes=amplitudes,
@@ -84,25 +100,33 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
     )
 
 
-def film_maps(face: tuple[Line, Line], film: tuple[Line, Line], even: bool | None) -> tuple[Any, Any, Any]:
-    """Gather, project and coarse on raveled fields: (face, film), (film, face), (coarse, film).
+def _between_lines(out: FloatArray, matrix: FloatArray, given: FloatArray) -> FloatArray:
+    """A matrix on the solid's face as one between its lines along the arc, of the film's columns, column by column."""
+    face = matrix.reshape(-1, out.shape[1], matrix.shape[1] // len(given), len(given))
+    columns = np.tensordot(np.tensordot(out, face, (1, 1)), given, 1).swapaxes(2, 3)
+    return columns.reshape(len(out) * face.shape[0], -1)
+
+
+def _on_film(gather: FloatArray, spread: FloatArray, by_load: FloatArray) -> FloatArray:
+    """A pad's compliance on the film's nodes from that between its lines."""
+    columns = len(by_load) // len(gather)
+    lines = by_load.reshape(columns, len(gather), columns, len(gather))
+    nodes = np.tensordot(spread, np.tensordot(lines, gather, 1), (1, 1))
+    return nodes.swapaxes(2, 3).reshape(len(spread) * columns, -1)
+
+
+def axis_maps(face: Line, film: Line, even: bool | None) -> tuple[Any, Any, Any]:
+    """Gather, project and coarse of one axis: (face, film), (film, face), (corners, film).
 
     The film's pressure is bilinear on its grid, the pad's displacement quadratic on its elements. Loads are integrals
     of one against the basis of the other; the displacement at film nodes is the bilinear function closest to that of
     the elements in the mean square (L2 projection), and the temperature of the elements' corners that closest to the
     film's. Both use the same integrals G = int psi phi, so with M = int phi phi the compliance C on film nodes obeys
-    M C = G^T S G: work done by the film is work taken up by the pad, to rounding.
+    M C = G^T S G: work done by the film is work taken up by the pad, to rounding. On a face all are products of those
+    along and across.
 
-    `even` is None for a film on the half length, else the part of a full one.
+    `even` is None for two bases on the same interval, else the part of a film on -L/2..L/2, the pad on 0 <= z <= L/2.
     """
-    along = _axis_maps(face[0], film[0], None)
-    across = _axis_maps(face[1], film[1], even)
-    gather, project, coarse = (np.kron(*pair) for pair in zip(along, across, strict=True))
-    return gather, project, coarse
-
-
-def _axis_maps(face: Line, film: Line, even: bool | None) -> tuple[Any, Any, Any]:
-    """Maps of two bases on the same interval, or of one on 0 <= z <= L/2 and a film's even or odd part on -L/2..L/2."""
     merged = np.unique(np.concatenate((face.breaks, film.breaks if even is None else np.abs(film.breaks))))
     distinct = np.concatenate(([True], np.diff(merged) > 1e-12 * (merged[-1] - merged[0])))
     # exact for products of piecewise polynomials of both sets of breaks

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from model.compilation import inner
-from model.film.dense import product, solve
+from model.film.dense import product, solve, times
 from model.film.faces import conductances
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import force_of, shape_slopes
@@ -15,7 +15,7 @@ from model.pad.bending import PadDeformation
 from model.statics.compiled.case import Problem
 from model.statics.compiled.stack import BodyStack, grid_of, work_of
 from model.tilt_hold import held_moment
-from rigdata.arrays import FloatArray, IntArray
+from rigdata.arrays import FloatArray
 
 
 @lru_cache(maxsize=8)
@@ -23,13 +23,13 @@ def stacked_bodies(bodies: tuple[PadDeformation, ...], first: int, factor: float
     """Matrices of the pads side by side: of their deformation times a factor, of what they conduct."""
     kinds = list(dict.fromkeys(bodies))
     bending, conductors = (kinds if factor else []), (kinds if conducting else [])
-    inner = np.zeros(kinds[0].shapes.shape[:2] if kinds else (0, 0), dtype=bool)
-    inner[1:-1, first:-1] = True
-    answer = [factor * np.hstack([b.compliance[:, inner.ravel()], b.expansion]) for b in bending]
+    answer = [factor * np.hstack([b.by_load[:, first * len(b.gather) : -len(b.gather)], b.by_heat]) for b in bending]
     return BodyStack(
         np.array([kinds.index(b) for b in bodies], dtype=np.int64),
-        _stack(answer, 3).astype(np.float32),
-        _stack([b.to_coarse for b in bending], 3).astype(np.float32),
+        _stack(answer, 3),
+        _stack([b.gather[:, 1:-1] for b in bending], 3),
+        _stack([b.corners for b in bending], 3),
+        _stack([b.spread for b in bending], 3),
         _stack([b.shapes for b in bending], 4),
         _stack([b.amplitudes for b in bending], 3),
         _stack([factor * b.response for b in bending], 3),
@@ -39,9 +39,9 @@ def stacked_bodies(bodies: tuple[PadDeformation, ...], first: int, factor: float
 
 
 def _stack(matrices: Sequence[FloatArray], dimensions: int) -> FloatArray:
-    """Matrices with an axis before them; one alone is not copied."""
+    """Matrices with an axis before them; one alone is not copied where it need not be."""
     if len(matrices) == 1:
-        return matrices[0][None]
+        return np.ascontiguousarray(matrices[0])[None]
     return np.array(matrices) if matrices else np.zeros((0,) * dimensions)
 
 
@@ -70,35 +70,37 @@ def bend_pads(bodies: BodyStack | None, problem: Problem) -> float:
 def _ask_bodies(bodies: BodyStack, problem: Problem, asked: FloatArray) -> None:
     """Deformation (pads, nodes) that pressure and temperature ask for; pads of one shape in one product [m]."""
     pads, works, state, supply = problem.pads.each, problem.works, problem.state, problem.case.supply
-    count = len(pads)
-    unknowns, coarse = works.unknown.shape[1], bodies.lighter.shape[1]
-    rise = np.zeros((count, state.bent[0].size))
-    given = np.zeros((count, unknowns + coarse))
-    for m in range(count):
-        if pads[m].solved:
-            rise[m] = state.faces[m].reshape(-1) - supply
-            given[m, :unknowns] = works.unknown[m] + state.shift[m]
-    same = np.empty(count, dtype=np.int64)
+    lines = bodies.gather.shape[1]
+    stations, columns = works.pressure.shape[1], works.pressure.shape[2]
+    given = np.zeros((len(pads), bodies.answer.shape[2]))
+    moved = np.zeros((len(pads), columns * lines))
+    loaded = works.unknown.shape[1] // (stations - 2) * lines
+    same = np.empty(len(pads), dtype=np.int64)
     for k in range(bodies.answer.shape[0]):
         some = 0
-        for m in range(count):
+        for m in range(len(pads)):
             if pads[m].solved and bodies.which[m] == k:
+                pressure = (works.unknown[m] + state.shift[m]).reshape((stations - 2, loaded // lines))
+                _columns(bodies.gather[k], pressure, given[m, :loaded])
+                _columns(bodies.corners[k], state.faces[m] - supply, given[m, loaded:])
                 same[some] = m
                 some += 1
-        if some > 0:
-            _times(bodies.lighter[k], rise, same[:some], given[:, unknowns:])
-            _times(bodies.answer[k], given, same[:some], asked)
+        for i in range(bodies.answer.shape[1]):  # every row is read once
+            for m in same[:some]:
+                moved[m, i] = product(bodies.answer[k, i], given[m])
+        for m in same[:some]:
+            by_column = moved[m].reshape((columns, lines))
+            for i in range(stations):
+                for j in range(columns):
+                    asked[m, i * columns + j] = product(by_column[j], bodies.spread[k, i])
 
 
 @inner
-def _times(matrix: np.ndarray, given: FloatArray, rows: IntArray, out: FloatArray) -> None:
-    """Product of a matrix with some rows of `given`: all of them for every row of the matrix that is read."""
-    factors = np.empty(matrix.shape[1])
-    for i in range(matrix.shape[0]):
-        for q in range(len(factors)):
-            factors[q] = matrix[i, q]
-        for row in rows:
-            out[row, i] = product(factors, given[row])
+def _columns(matrix: FloatArray, field: FloatArray, out: FloatArray) -> None:
+    """Product of a matrix with every column of a field, one behind the other."""
+    count = len(matrix)
+    for j in range(field.shape[1]):
+        out[j * count : (j + 1) * count] = times(matrix, field[:, j].copy())
 
 
 @inner
@@ -111,13 +113,14 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
     count = bending + (1 if case.axial else 0)
     unknowns = len(work.unknown)
     rows, columns = work.pressure.shape
-    shapes = np.empty((rows, columns, count))
-    response = np.empty((count, unknowns))
-    matrix, right = np.zeros((count, count)), np.zeros((count, 3))
-    if bends:
+    shapes, response = np.empty((rows, columns, count)), np.empty((count, unknowns))
+    if bends and not case.axial:
+        shapes, response = bodies.shapes[body], bodies.response[body]
+    elif bends:
         shapes[:, :, :bending], response[:bending] = bodies.shapes[body], bodies.response[body]
-        for r in range(bending):
-            matrix[r, r], right[r, 0] = 1.0, product(bodies.amplitudes[body, r], change)
+    matrix, right = np.zeros((count, count)), np.zeros((count, 3))
+    for r in range(bending):
+        matrix[r, r], right[r, 0] = 1.0, product(bodies.amplitudes[body, r], change)
     if case.axial:
         right[bending, 0], matrix[bending, bending] = _axial_moment(grid, work, problem, m, response[bending])
         for i in range(rows):

@@ -18,11 +18,12 @@ class BodyStack(NamedTuple):
     """
 
     which: IntArray  #: (pads,) of int: Body of every film.
-    #: (k, n, unknowns + c) of float32: Deformation by the pressure at the unknown nodes [m/Pa] and by the
-    #: temperatures of the pad's coarser nodes [m/K]: half the memory, which is what the product waits for, at a
-    #: ten-millionth of a deformation.
-    answer: np.ndarray
-    lighter: np.ndarray  #: (k, c, n) of float32: Those temperatures by the film's.
+    #: (k, lines, loads + temperatures): Deformation of the solid's lines by both [m/Pa, m/K], and what maps between
+    #: them and the film, see `PadDeformation`.
+    answer: FloatArray
+    gather: FloatArray  #: (k, a, nt - 1): Of the unknown pressures.
+    corners: FloatArray  #: (k, b, nt + 1)
+    spread: FloatArray  #: (k, nt + 1, a)
     shapes: FloatArray  #: (k, nt + 1, nz + 1, m)
     amplitudes: FloatArray  #: (k, m, n)
     response: FloatArray  #: (k, m, unknowns): With the factor on the deformation, as `answer`.
