@@ -11,7 +11,7 @@ business. Positive is outward: the film grows thicker by it.
 """
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ class PadDeformation:
     lines and the film's columns across, column by column, a quarter of the matrix on the film's nodes.
     """
 
+    compliance: FloatArray  #: (n, n): Deformation by pressure [m/Pa].
     gather: FloatArray  #: (a, nt + 1): Loads of the solid's lines by the film's pressure along the arc.
     corners: FloatArray  #: (b, nt + 1): Temperatures of the lines between its elements by the film's.
     spread: FloatArray  #: (nt + 1, a): Deformation of the film's nodes by that of the lines.
@@ -46,11 +47,6 @@ class PadDeformation:
     shapes: FloatArray  #: (nt + 1, nz + 1, m): In which the pad gives way most.
     amplitudes: FloatArray  #: (m, n): Amplitudes of the shapes in a deformation.
     response: FloatArray  #: (m, unknowns): Amplitudes by the pressure at the film's unknown nodes.
-
-    @cached_property
-    def compliance(self) -> FloatArray:
-        """Deformation by pressure, (n, n) [m/Pa]."""
-        return _on_film(self.gather, self.spread, self.by_load)
 
 
 def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = False) -> PadDeformation:
@@ -72,21 +68,22 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
         ahead = _DRY_STATIONS
         angle = np.concatenate([np.linspace(geometry.leading, angle[0], ahead + 1)[:-1], angle])
     half = z[0] == 0.0
-    by_load, by_heat, coarser, flux = np.zeros(()), np.zeros(()), [], []
+    compliance, by_load, by_heat, coarser, flux = np.zeros(()), np.zeros(()), np.zeros(()), [], []
     for even in (True,) if half else (True, False):
         solid = pad_operators(geometry, even=even, cooled=cooled)
         gather, spread, corners = axis_maps(solid.theta, Line(angle, 1), None)
         gather, spread, corners = gather[:, ahead:], spread[ahead:], corners[:, ahead:]
         across = axis_maps(solid.z, Line(z, 1), None if half else even)
-        loads = geometry.inner_radius * solid.compliance
+        project, loads = np.kron(spread, across[1]), geometry.inner_radius * solid.compliance
+        compliance = compliance + project @ (loads @ np.kron(gather, across[0]))
         by_load = by_load + _between_lines(across[1], loads, across[0])
         by_heat = by_heat + _between_lines(across[1], solid.expansion, across[2])
         coarser.append(np.kron(corners, across[2]))
-        flux.append(np.kron(spread, across[1]) @ solid.flux)
-    compliance = _on_film(gather, spread, by_load)
+        flux.append(project @ solid.flux)
     shapes = _softest_shapes(compliance, area)
     amplitudes = (shapes * area[:, None]).T
     return PadDeformation(
+        compliance=compliance,
         gather=gather,
         corners=corners,
         spread=spread,
@@ -103,16 +100,8 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
 def _between_lines(out: FloatArray, matrix: FloatArray, given: FloatArray) -> FloatArray:
     """A matrix on the solid's face as one between its lines along the arc, of the film's columns, column by column."""
     face = matrix.reshape(-1, out.shape[1], matrix.shape[1] // len(given), len(given))
-    columns = np.tensordot(np.tensordot(out, face, (1, 1)), given, 1).swapaxes(2, 3)
-    return columns.reshape(len(out) * face.shape[0], -1)
-
-
-def _on_film(gather: FloatArray, spread: FloatArray, by_load: FloatArray) -> FloatArray:
-    """A pad's compliance on the film's nodes from that between its lines."""
-    columns = len(by_load) // len(gather)
-    lines = by_load.reshape(columns, len(gather), columns, len(gather))
-    nodes = np.tensordot(spread, np.tensordot(lines, gather, 1), (1, 1))
-    return nodes.swapaxes(2, 3).reshape(len(spread) * columns, -1)
+    lines = np.einsum("xs,asbt,ty->xayb", out, face, given, optimize=True)
+    return lines.reshape(len(out) * len(face), -1)
 
 
 def axis_maps(face: Line, film: Line, even: bool | None) -> tuple[Any, Any, Any]:

@@ -74,7 +74,8 @@ def test_nothing_is_compiled_or_loaded_until_a_loop_is_called():
 @pytest.mark.slow
 def test_code_on_the_disk_allocates_without_a_compiler():
     asked = (
-        "import numpy as np; from model.statics.compiled.heat import balance_heat; from numba.core.runtime import rtsys;"
+        "import numpy as np; from numba.core.runtime import rtsys\n"
+        "from model.statics.compiled.heat import balance_heat\n"
         "answers = np.ones((2, 2)), np.zeros((2, 3)), np.zeros((2, 3));"
         "inlets, _ = balance_heat(np.arange(2), answers, np.ones(2, dtype=bool), 40.0, 0.0);"
         "print(inlets.tolist(), rtsys._init)"
