@@ -152,7 +152,8 @@ def walk(
     for row in range(middle, numbers.shape[0]):
         wedge = first * _DEEPER ** (row - middle)
         if row > middle + 1:
-            curvature = _ahead(numbers, wedge, (row - 1, row - 2, max(row - 3, middle)))
+            slope = (numbers[row - 1, 0] - numbers[row - 2, 0]) / (numbers[row - 1, 1] - numbers[row - 2, 1])
+            curvature = numbers[row - 1, 0] + slope * (wedge - numbers[row - 1, 1])
             _warm(work, rises, row - 1, row - 2)
         found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
         if not found:
@@ -172,7 +173,7 @@ def walk(
             break
         curvature = numbers[before, 0] * flatter
         if row + 2 < high:
-            more = _ahead(numbers, wedge, (before, row + 2, min(row + 3, high - 1))) - numbers[before, 0]
+            more = _ahead(numbers, wedge, before, min(row + 3, high - 1)) - numbers[before, 0]
             most = 0.3 * (1.0 + numbers[before, 0])
             curvature = numbers[before, 0] + min(max(more, -most), most)
         _warm(work, rises, before, min(before + 1, high - 1))
@@ -189,9 +190,9 @@ def walk(
 
 
 @inner
-def _ahead(numbers: FloatArray, wedge: float, rows: tuple[int, int, int]) -> float:
-    """Curvature at a wedge as the last rows head, a parabola where there are three."""
-    last, before, first = rows
+def _ahead(numbers: FloatArray, wedge: float, last: int, first: int) -> float:
+    """Curvature at a flatter wedge as the last rows head, a parabola where there are three."""
+    before = last + 1
     near = wedge - numbers[last, 1]
     slope = (numbers[last, 0] - numbers[before, 0]) / (numbers[last, 1] - numbers[before, 1])
     if first == before:
