@@ -29,8 +29,6 @@ _MESH = (20, 4)
 _STEP = 0.02
 #: What the trailing edge of the first film has lost of the gap at the pivot, and by which factors it goes on.
 _FIRST, _DEEPER, _FLATTER = 0.4, 1.4, 0.68
-#: And what its leading edge has more, about: of central pivots 0.65 to 0.7, of those at 0.65 of the arc 0.6 to 0.7.
-_OPENS = 0.66
 _ROWS = 40
 #: Points of a curve from one row to the next: cubics through four rows, straight from point to point.
 BETWEEN = 4
@@ -40,8 +38,6 @@ _DEEPEST, _HOTTEST = 60.0, 300.0
 _FARTHEST = -0.8
 #: Where a step fails it is halved, up to this factor.
 _LEAST_STEP = 0.96
-#: A last move by this share of the gap leaves a fifth of what rows as far apart as these leave between them.
-_MOVED = 3e-3
 #: Below this wedge, as a share of the first, heat alone balances a film.
 _FLATTEST = 0.015
 
@@ -147,8 +143,7 @@ def walk(
     if not grid.angle[-1] > 0.0 or not grid.angle[0] < 0.0:
         return middle, middle
     first = _FIRST / np.sin(grid.angle[-1])
-    low, high, ahead = middle, middle, grid.angle[0]
-    curvature = max(2.0 * (_OPENS + first * ahead) / ahead**2, -0.75)
+    low, high, curvature = middle, middle, 0.1
     for row in range(middle, numbers.shape[0]):
         wedge = first * _DEEPER ** (row - middle)
         if row > middle + 1:
@@ -173,9 +168,9 @@ def walk(
             break
         curvature = numbers[before, 0] * flatter
         if row + 2 < high:
-            more = _ahead(numbers, wedge, before, min(row + 3, high - 1)) - numbers[before, 0]
+            slope = (numbers[before, 0] - numbers[row + 2, 0]) / (numbers[before, 1] - numbers[row + 2, 1])
             most = 0.3 * (1.0 + numbers[before, 0])
-            curvature = numbers[before, 0] + min(max(more, -most), most)
+            curvature = numbers[before, 0] + min(max(slope * (wedge - numbers[before, 1]), -most), most)
         _warm(work, rises, before, min(before + 1, high - 1))
         work.ruptured[:] = False
         found, curvature, load = _balance(grid, work, running, isothermal, max(curvature, -0.75), wedge)
@@ -187,19 +182,6 @@ def walk(
         else:
             flatter = np.sqrt(flatter)
     return low, high
-
-
-@inner
-def _ahead(numbers: FloatArray, wedge: float, last: int, first: int) -> float:
-    """Curvature at a flatter wedge as the last rows head, a parabola where there are three."""
-    before = last + 1
-    near = wedge - numbers[last, 1]
-    slope = (numbers[last, 0] - numbers[before, 0]) / (numbers[last, 1] - numbers[before, 1])
-    if first == before:
-        return numbers[last, 0] + slope * near
-    older = (numbers[before, 0] - numbers[first, 0]) / (numbers[before, 1] - numbers[first, 1])
-    bend = (slope - older) / (numbers[last, 1] - numbers[first, 1])
-    return numbers[last, 0] + near * (slope + bend * (wedge - numbers[before, 1]))
 
 
 @inner
@@ -246,7 +228,7 @@ def _balance(
         settled = warmer < max(0.3, 0.01 * hottest)
         if settled and curvature == _FARTHEST and move < 0.0:
             return True, curvature, load  # the pad carries as far off as is of concern
-        if settled and abs(move) < _MOVED * (1.0 + curvature):
+        if settled and abs(move) < 1e-3 * (1.0 + curvature):
             return True, curvature + share * move, load
         # a film that comes nearer grows hotter, and needs less of a step than one that stays as warm (Aitken)
         if last != 0.0:
