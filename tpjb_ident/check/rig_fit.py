@@ -101,7 +101,7 @@ def _check_accelerometers(
     inverse = np.linalg.pinv(blocks.along[:, rows])
     shown = np.einsum("naj,nj->na", inverse, blocks.z[:, rows])
     size = np.linalg.norm(blocks.z[:, rows], axis=1)
-    noise = np.sqrt(np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real)
+    noise = np.sqrt(blocks.noise_power(rows))
     judged = np.flatnonzero(np.isfinite(moved).all(axis=1) & (size > _CLEAR * noise))
     off = _off(shown, moved)[judged]
     for b in judged[far(off, _OFF, _MANY, _MIN_BLOCKS)]:

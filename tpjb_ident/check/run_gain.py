@@ -346,11 +346,9 @@ def check_shaft_lines(runs: Sequence[Observation]) -> None:
     """
     shown = [observation for observation in runs if len(observation.shaft_line)]
     for alike, least in (("run.point.static_key", _SAME_LINE), ("run.point.spin", _LIKE_LINE)):
-        sizes = _by_probe(shown, attrgetter(alike), _log_size)
+        sizes = _by_probe(
+            shown, attrgetter(alike), lambda run, k: math.log(max(np.nan_to_num(run.shaft_line[k]), 1e-300))
+        )
         for name, observation, off in _outlying(sizes, least, _MANY_LINES, _MIN_LINES):
             if f"shaft line {name}" not in observation.report.keys:
                 observation.report.ask("shaft line", math.exp(off), name)
-
-
-def _log_size(observation: Observation, place: int) -> float:
-    return math.log(max(float(np.nan_to_num(observation.shaft_line[place])), 1e-300))

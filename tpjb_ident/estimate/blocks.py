@@ -37,6 +37,11 @@ class Sensor:
     out_of_step: bool = False  #: leads what the springs under the housing make of the cells' force
     axis: float = 0.0  #: rad: as the campaign has it; a run's own counts in its blocks
 
+    def doubted(self, gain: float, turn: float = 0.0) -> Sensor:
+        """The sensor, its gain and axis [rad] known no better than this."""
+        uncertainty = max(self.uncertainty or 0.0, gain) or None
+        return replace(self, uncertainty=uncertainty, axis_uncertainty=max(self.axis_uncertainty, turn))
+
 
 @dataclass(frozen=True)
 class RigStiffness:
@@ -116,6 +121,10 @@ class Blocks:
 
     def __len__(self) -> int:
         return len(self.point)
+
+    def noise_power(self, rows: IntArray) -> FloatArray:
+        """Sum of the noise's variances of some sensors, (n,)."""
+        return np.einsum("njj->n", self.noise[:, rows][:, :, rows]).real
 
     def part(self, places: slice | IntArray) -> Blocks:
         """Some of the blocks."""

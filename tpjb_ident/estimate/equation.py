@@ -52,10 +52,6 @@ class State:
         """Force of the cells along X and Y, the film's without the housing's inertia, (n, 2) [N]."""
         return np.einsum("nij,nj->ni", self.at_run(blocks), self.u[:, :2]) - rig.mass * self.u[:, 2:]
 
-    def factor_rows(self, rows: ComplexArray) -> ComplexArray:
-        """T times rows (n, m + 2, ..)."""
-        return with_factor(self.factor, rows)
-
     def reading(self, rig: Rig, blocks: Blocks) -> ComplexArray:
         """T B u, (n, m + 2)."""
         return np.einsum("nri,ni->nr", with_factor(self.factor, motion_matrix(rig, blocks, self)), self.u)

@@ -61,7 +61,7 @@ def housing_noise(rig: Rig, blocks: Blocks, motion: ComplexArray, misfit: Comple
     rows = rig.of("acceleration")
     moving = size > 0
     share = np.sum(np.abs(misfit) ** 2, axis=1) / 2
-    records = np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real / len(rows)
+    records = blocks.noise_power(rows) / len(rows)
     beyond = np.maximum(share - records, 0.0)[moving] / size[moving] ** 2
     excess = np.median(beyond) / np.log(2)
     n = len(beyond)

@@ -14,6 +14,8 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
 from tpjb_ident.estimate.equation import HOUSING_ROWS, State, film_change_rows
 
+#: Standard deviations beyond which a parameter contradicts what is stated.
+_LIMIT = 3.0
 #: Largest logarithm of a factor.
 _LARGEST = 5.0
 #: Of a change of H that a film's lines show so much is allowed for: they are right within a fifth.
@@ -90,8 +92,13 @@ class Term:
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         self.rig = rig
+        self._omega = float(np.median(blocks.omega)) if len(blocks) else 1.0
         self.parameters: tuple[Parameter, ...] = ()
         self.points: tuple[int, ...] = ()
+        self.prepare(rig, blocks)
+
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Take from rig and blocks what the term needs: its parameters, where it applies."""
 
     @property
     def width(self) -> int:
@@ -209,7 +216,7 @@ class FilmTerm(Additive):
         return np.asarray(np.einsum("nk,nkij->nij", numbers, changes))
 
 
-def exceeding(fitted: Fitted, parameters: tuple[Parameter, ...], limit: float = 3.0) -> list[int]:
+def exceeding(fitted: Fitted, parameters: tuple[Parameter, ...]) -> list[int]:
     """Places of estimated parameters further from the mean than they scatter if the prior holds.
 
     The value's variance is then the prior's less what the records leave; and it must stand above its own error.
@@ -218,7 +225,7 @@ def exceeding(fitted: Fitted, parameters: tuple[Parameter, ...], limit: float = 
     for k, parameter in enumerate(parameters):
         distance, error = abs(float(fitted.value[k]) - parameter.mean), float(fitted.deviation[k])
         scatter = np.sqrt(max(parameter.deviation**2 - error**2, error**2))
-        if fitted.estimated[k] and distance > limit * scatter:
+        if fitted.estimated[k] and distance > _LIMIT * scatter:
             places.append(k)
     return places
 

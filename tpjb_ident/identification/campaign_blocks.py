@@ -12,7 +12,6 @@ from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, stacked
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.sensors import axes_of, sensors_of
 from tpjb_ident.identification.point_means import PointMeans
-from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.runs.static_load import missed_load
 
@@ -55,7 +54,10 @@ def campaign_blocks(
                 continue
             channels = point.channels[g]
             calibrations = calibrations or [[] for _ in channels]
-            load = data.point.static_load
+            load, loads = data.point.static_load, run.cell_force.mean
+            loads = loads[np.isfinite(loads).all(axis=1)]
+            # standard error of the size of the run's mean cell force
+            error = float(np.linalg.norm(loads.std(axis=0, ddof=1)) / np.sqrt(len(loads))) if len(loads) > 1 else 0.0
             present = np.array([channel is not None for channel in channels])
             row: dict[str, object] = {
                 "point": p,
@@ -73,18 +75,12 @@ def campaign_blocks(
                 "time": w.time[g],
                 "temperature": temperatures.get(run.run, np.nan),
                 "miss": missed_load(miss, [g]),
-                "miss_error": _load_error(run) / max(load, 1e-9) if load > 0 else _LOAD_ERROR,
+                "miss_error": error / max(load, 1e-9) if load > 0 else _LOAD_ERROR,
                 "shaft": point.shaft[g],
             }
             names.append(run.run)
             rows.append(row)
     return stacked([data.point for data in points], names, len(means[0].channels[0]), rows, bent)
-
-
-def _load_error(run: RunPhasors) -> float:
-    """Standard error of the size of a run's mean cell force [N]."""
-    rows = run.cell_force.mean[np.isfinite(run.cell_force.mean).all(axis=1)]
-    return float(np.linalg.norm(rows.std(axis=0, ddof=1)) / np.sqrt(len(rows))) if len(rows) > 1 else 0.0
 
 
 def calibration_numbers(channels: Sequence[Channel | None], tables: list[list[Hashable]]) -> list[int]:

@@ -12,7 +12,7 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.identification.campaign_blocks import unstated
 from tpjb_ident.identification.campaign_solution import solve_campaign
 from tpjb_ident.identification.identify_bands import identify_bands
-from tpjb_ident.identification.point import PointTask, finished_point, own_method, point_share
+from tpjb_ident.identification.point import SOLVED, PointTask, finished_point, point_share
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.phasors.mains_frequency import mains_frequency
@@ -77,7 +77,7 @@ def identify(
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     report = progress or (lambda text, done, total: None)
     settings = _with_mains(replace(chosen, method=method or chosen.method), campaign)
-    dry = dry_test(campaign, settings.phasors, own_method(settings.method))
+    dry = dry_test(campaign, settings.phasors, SOLVED if settings.method == "iv" else settings.method.partition(":")[0])
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
     bands = None
     if any(is_broadband(run) for run in runs):

@@ -13,14 +13,7 @@ from tpjb_ident.estimators.rlm import RlmSettings
 from tpjb_ident.estimators.solved_windows import not_locked
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.campaign_solution import CampaignSolution
-from tpjb_ident.identification.point_means import (
-    MeansTask,
-    channel_windows,
-    clock_turns,
-    means_attenuation,
-    vectors,
-    window_times,
-)
+from tpjb_ident.identification.point_means import MeansTask, channel_windows, means_attenuation, vectors
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.identification.shared_changes import sources_of, total
 from tpjb_ident.phasors.run_data import RunPhasors
@@ -206,16 +199,10 @@ def _remarks(run: RunPhasors, share: PointShare) -> tuple[Condition, ...]:
 def _corrected(data: PointData, task: MeansTask, share: PointShare) -> PointData:
     """The point's windows as they would be at the set point, without what is in the readings beside the motion."""
     z, _ = channel_windows(data, task)
-    z = z * clock_turns(data, task, window_times(data))
     z = (z - share.shift[data.run_index]) / share.factor[data.run_index]
     D, F = vectors(z, data, task)
     F = F - np.einsum("nij,nj->ni", share.run_change[data.run_index], D)
     return replace(data, D=D, F=F)
-
-
-def own_method(method: str) -> str:
-    """A method that needs no instruments, the one asked for if it is such."""
-    return SOLVED if method == "iv" else method.partition(":")[0]
 
 
 def all_methods(

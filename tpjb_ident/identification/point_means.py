@@ -60,15 +60,13 @@ class MeansTask:
 def point_means(task: MeansTask, data: PointData) -> PointMeans:
     """Robust start and means of one point."""
     z, channels = channel_windows(data, task)
-    time = window_times(data)
-    z = z * clock_turns(data, task, time)
     present = np.array([[channel is not None for channel in run] for run in channels])
     D, F = vectors(z, data, task)
     table = phasor_table(D, F, data.run_index)
     weights, start, status = _robust_start(table)
     film = _film(task, data.mass)
     readings = Readings([sensor.device for sensor in task.sensors], film)
-    means = window_means(z, data.run_index, time, readings, weights, present)
+    means = window_means(z, data.run_index, _window_times(data), readings, weights, present)
     condition = displacement_condition(table.D, weights[table.valid])
     shaft, conditions = _shaft(data, means, task)
     residual = _residual_density(data, task, means, film)
@@ -131,7 +129,7 @@ def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple
 def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tuple[tuple[Channel | None, ...], ...]]:
     """Phasors of the windows channel by channel (n, m), NaN where there is none, and the channels of each run (g, m).
 
-    The drift of a channel's gain with the run's temperature is taken off as far as it is known.
+    The drift of a channel's gain with the run's temperature is taken off as far as it is known; what clocks run ahead, too.
     """
     rows: list[ComplexArray] = []
     described: list[list[Channel | None]] = []
@@ -155,7 +153,7 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
     living = []
     for g, run_channels in enumerate(described):
         living.append(tuple(c if alive[g, j] else None for j, c in enumerate(run_channels)))
-    return z, tuple(living)
+    return z * _clock_turns(data, task), tuple(living)
 
 
 def _without_dead(z: ComplexArray, task: MeansTask) -> ComplexArray:
@@ -188,16 +186,16 @@ def vectors(z: ComplexArray, data: PointData, task: MeansTask) -> tuple[ComplexA
     return plane["displacement"], force
 
 
-def window_times(data: PointData) -> FloatArray:
+def _window_times(data: PointData) -> FloatArray:
     """Middles of the windows of all runs, (n,) [s]."""
     return np.concatenate([run.start + 0.5 * run.length for run in data.runs])
 
 
-def clock_turns(data: PointData, task: MeansTask, time: FloatArray) -> ComplexArray:
+def _clock_turns(data: PointData, task: MeansTask) -> ComplexArray:
     """Unit phasors (n, m) that take off how far the devices' clocks have run ahead."""
     rates = np.array([task.rates.get(sensor.device, 0.0) for sensor in task.sensors])
     omega = 2 * np.pi * np.array([r.lines.excitation[i].frequency for r, i in zip(data.runs, data.lines)])
-    return np.asarray(np.exp(1j * np.multiply.outer(omega[data.run_index] * time, rates)))
+    return np.asarray(np.exp(1j * np.multiply.outer(omega[data.run_index] * _window_times(data), rates)))
 
 
 def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[Condition, ...]]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import find_peaks
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
@@ -105,7 +105,10 @@ def slower_channel(values: FloatArray, export_rate: float, speed: float = 0.0) -
     spectrum = np.fft.rfft((clean - clean.mean()) * np.hanning(n))
     size, agreement, chance = np.abs(spectrum), *_pair_agreement(spectrum)
     peaks = find_peaks(agreement)[0]
-    peaks = peaks[~_is_of_shaft(peaks * export_rate / n, speed, export_rate / n)]
+    # the shaft's own motion makes such sums of any other
+    step, orders = export_rate / n, np.array([1.0, 2.0]) * (speed > 0)
+    near_shaft = np.abs(peaks[:, None] * step - orders * speed) < orders * (SPEED_DRIFT + 2 * step)
+    peaks = peaks[~near_shaft.any(axis=1)]
     for k in peaks[chance[peaks] > _CLEAR].tolist():
         order = _filling_order(size, k)
         nearby = np.median(agreement[max(k - _BESIDE, 0) : k + _BESIDE + 1])
@@ -117,12 +120,6 @@ def slower_channel(values: FloatArray, export_rate: float, speed: float = 0.0) -
             even = abs(ratio - round(ratio)) < _EVEN * ratio
             return SlowerChannel(export_rate / round(ratio) if even else rate, export_rate, order)
     return None
-
-
-def _is_of_shaft(sums: FloatArray, speed: float, step: float) -> BoolArray:
-    """Which sums of frequencies (n,) [Hz] the shaft's own motion makes of any other, in bins of `step` [Hz]."""
-    orders = np.array([1.0, 2.0]) * (speed > 0)
-    return np.asarray((np.abs(sums[:, None] - orders * speed) < orders * (SPEED_DRIFT + 2 * step)).any(axis=1))
 
 
 def _clean_stretch(values: FloatArray) -> FloatArray:

@@ -139,7 +139,9 @@ def known_lines(
             continue
         if coincident:
             if line in strong or line.name in _NAMED:
-                conditions.append(_on_excitation(line, coincident[0]))
+                text = f"{line.name} at {line.frequency:g} Hz cannot be told from the excitation at "
+                text += f"{coincident[0].frequency:g} Hz; move the excitation by a few Hz"
+                conditions.append(Condition(f"{line.name} on excitation line", text))
         elif line in strong:
             if _is_apart(line, nuisance, 0.0 if line.name == "found" else spacing):
                 nuisance.append(line)
@@ -182,11 +184,3 @@ def _faint_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings)
             faint.append(Line("2X-f", abs(twice), _EXACT, 2 * np.sign(twice)))
             faint.append(Line("2f-X", abs(half), _EXACT, -np.sign(half)))
     return faint
-
-
-def _on_excitation(line: Line, excitation: Line) -> Condition:
-    return Condition(
-        f"{line.name} on excitation line",
-        f"{line.name} at {line.frequency:g} Hz cannot be told from the excitation at "
-        f"{excitation.frequency:g} Hz; move the excitation by a few Hz",
-    )

@@ -105,7 +105,9 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDiges
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
         observations = _observed(run, cached, phasors)
         phasors, dead = _without_dead(phasors, observations[0])
-        conditions = merged(phasors.conditions, dead, _repaired(run))
+        repairs = [f"{p.file}, {p.place}: {p.what}" for p in run.reader.problems() if p.severity == "warning"]
+        repaired = holding((repairs, "record-damaged", "; ".join(repairs)))
+        conditions = merged(phasors.conditions, dead, repaired)
         result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(cached, phasors))
         return digest(result, mean_temperatures(cached), run.sample_rate, observations)
 
@@ -124,12 +126,6 @@ def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, 
         report = Reporter(line_run, observed.report.findings, observed.report.doubts)
         observations.append(replace(observed, run=line_run, report=report))
     return tuple(observations)
-
-
-def _repaired(run: Run) -> tuple[Condition, ...]:
-    """What the reader had to repair in the record."""
-    repairs = [f"{p.file}, {p.place}: {p.what}" for p in run.reader.problems() if p.severity == "warning"]
-    return holding((repairs, "record-damaged", "; ".join(repairs)))
 
 
 def _without_dead(phasors: RunPhasors, observation: Observation) -> tuple[RunPhasors, tuple[Condition, ...]]:

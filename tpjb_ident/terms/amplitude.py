@@ -28,8 +28,8 @@ class Amplitude(FilmTerm):
 
     name = "amplitude"
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         motion = blocks.z[:, rig.of("displacement")]
         number = len(blocks.points)
         runs = np.maximum(totals(blocks.point, np.ones(len(blocks)), number), 1.0)

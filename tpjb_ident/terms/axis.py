@@ -13,8 +13,8 @@ class Axis(Additive):
 
     name = "axis"
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         self._rows = [j for j, sensor in enumerate(rig.sensors) if sensor.axis_uncertainty]
         self.parameters = tuple(
             Parameter(rig.sensors[j].name, "rad", rig.sensors[j].axis_uncertainty) for j in self._rows

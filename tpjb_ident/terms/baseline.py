@@ -16,8 +16,8 @@ class Baseline(FilmTerm):
     name = "baseline"
     never_estimated = True
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         self.group = np.zeros(len(blocks.points), dtype=np.intp)
         for omega in rig.bare.omega if rig.bare.known(blocks.omega).any() else ():
             self.parameters += numbered(f"{omega / (2 * np.pi):g} Hz", "1", [1.0] * NUMBERS)

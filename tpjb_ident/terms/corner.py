@@ -26,8 +26,8 @@ class Corner(Factor):
     name = "corner"
     sentence = "the {p.name}' low corner is {value:.2g} Hz (standard error {error:.2g} Hz)"
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         self._rows = []
         asked = {"cells": ("force", not rig.static), "accelerometers": ("acceleration", rig.out_of_step)}
         for name, (quantity, applies) in asked.items():

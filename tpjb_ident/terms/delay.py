@@ -22,9 +22,8 @@ class Delay(Factor):
     name = "delay"
     sentence = "{p.name} late by {value:.3g} ms (standard error {error:.2g} ms)"
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
-        self._omega = float(np.median(blocks.omega)) if len(blocks) else 1.0
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         deviations: dict[str, float] = {}
         for sensor in rig.sensors:
             if sensor.delay_uncertainty:

@@ -1,7 +1,5 @@
 """Gains of single sensors, as far as the manifest states their uncertainty: one number a sensor for the campaign."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray
@@ -20,8 +18,8 @@ class Gain(Factor):
     sentence = "{p.name} reads {value:+.2f} % (standard error {error:.2f} %)"
     scale = 100.0
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         self._places: list[tuple[int, int]] = []
         parameters = []
         for j, sensor in enumerate(rig.sensors):
@@ -46,10 +44,7 @@ class Gain(Factor):
         spread = {}
         for quantity, values in self._differing(fitted).items():
             spread[quantity] = float(np.sqrt(np.sum(np.square(values)) / max(len(values) - 1, 1)))
-        if not spread:
-            return None
-        wide = [max(spread.get(s.quantity, 0.0), s.uncertainty or 0.0) or None for s in sensors]
-        return tuple(replace(sensor, uncertainty=size) for sensor, size in zip(sensors, wide))
+        return tuple(sensor.doubted(spread.get(sensor.quantity, 0.0)) for sensor in sensors) if spread else None
 
     def _differing(self, fitted: Fitted) -> dict[str, list[float]]:
         """Gains by quantity, of those whose channels differ beyond what is stated."""

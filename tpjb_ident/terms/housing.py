@@ -53,9 +53,8 @@ class Housing(Term):
 
     name = "housing"
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
-        self._omega = float(np.median(blocks.omega)) if len(blocks) else 1.0
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         self._inertia = _inertia_share(rig, blocks)
         self._blocks = blocks
         usual, across, loss = _CELLS
@@ -224,7 +223,7 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
     design = np.stack([np.stack([x, none, y], axis=1), np.stack([none, y, x], axis=1)], axis=1)
     lines = np.round(np.log(blocks.omega) / _ONE_LINE)
     rows = rig.of("acceleration")
-    noise = np.sqrt(np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real)
+    noise = np.sqrt(blocks.noise_power(rows))
     lines[~(np.linalg.norm(acceleration, axis=1) > 2 * _CLEAR * noise)] = np.nan
     supports, places, left, judged = [], [], 0.0, 0.0
     usable = np.unique(lines[np.isfinite(lines)])

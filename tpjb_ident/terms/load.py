@@ -26,11 +26,11 @@ class Load(FilmTerm):
     name = "load miss"
     never_estimated = True
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         self.turn = LoadTurn(rig, blocks)
         self.group = self.turn.group
-        if not np.any(np.abs(blocks.miss) > 0):
+        if not np.any(blocks.miss):
             return
         for k, (direction, *_) in enumerate(self.turn.families):
             mine = self.group[blocks.point] == k

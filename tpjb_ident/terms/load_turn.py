@@ -28,8 +28,8 @@ class LoadTurn(FilmTerm):
     name = "load direction"
     always_estimated = True
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         keys = [p.static_key[1:] for p in blocks.points]
         self.families = list(dict.fromkeys(keys))
         self.group = np.array([self.families.index(key) for key in keys])

@@ -223,9 +223,8 @@ def fit_mains(D: ComplexArray, F: ComplexArray, pickup: Pickup, scatter: float) 
     covariance = (entries - mean).T @ ((entries - mean) * share[:, None])
     for weight, minimum in zip(share, minima):
         covariance = covariance + weight * inflation * minimum.covariance
-    best = minima[0].x
-    shift = mean - problem.entries(best)
-    return MainsFit(problem.vectors(best), shift, covariance, _PRIOR_DOF + spare, cost / spare)
+    vectors = problem.vectors(minima[0].x)
+    return MainsFit(vectors, mean - entries[0], covariance, _PRIOR_DOF + spare, cost / spare)
 
 
 def force_pickup(lines: Iterable[ComplexArray | None]) -> FloatArray:

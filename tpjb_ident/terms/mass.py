@@ -4,7 +4,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, force_rows
+from tpjb_ident.estimate.equation import State, force_rows, with_factor
 from tpjb_ident.estimate.term import Additive, Parameter
 
 
@@ -13,12 +13,12 @@ class Mass(Additive):
 
     name = "mass"
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         if rig.mass_uncertainty and rig.mass:
             self.parameters = (Parameter("housing", "1", rig.mass_uncertainty / rig.mass),)
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """-m a in the cells."""
         inertia = -self.rig.mass * state.u[:, 2:]
-        return np.asarray(state.factor_rows(force_rows(self.rig, blocks, inertia[:, :, None])))
+        return np.asarray(with_factor(state.factor, force_rows(self.rig, blocks, inertia[:, :, None])))

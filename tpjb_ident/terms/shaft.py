@@ -27,8 +27,8 @@ class Shaft(Additive):
     name = "shaft"
     always_estimated = True
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         on_line = np.isfinite(blocks.shaft)
         self.points = tuple(np.unique(blocks.point[on_line]).tolist())
         self._size = np.zeros((len(blocks.points), len(rig)))

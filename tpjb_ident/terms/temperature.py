@@ -18,8 +18,8 @@ class Temperature(Factor):
     sentence = "{p.name} reads {value:+.3f} % more per K (standard error {error:.3f} %)"
     scale = 0.1
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         measured = np.isfinite(blocks.temperature)
         self._reference = float(blocks.temperature[measured].mean()) if measured.any() else 0.0
         uncertain = [j for j, sensor in enumerate(rig.sensors) if sensor.temperature_coefficient_uncertainty]

@@ -19,8 +19,8 @@ class Tilt(Term):
 
     name = "tilt"
 
-    def __init__(self, rig: Rig, blocks: Blocks) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         planes = [sensor.plane if sensor.quantity == "displacement" else 0.0 for sensor in rig.sensors]
         self._plane = np.array(planes)
 
