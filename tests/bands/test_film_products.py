@@ -106,3 +106,12 @@ def test_the_orbit_at_shaft_speed_is_measured_and_is_no_slower_channel(tmp_path,
     assert not untrusted(band.quality)
     assert inside > 0.9
     assert half < (0.02 if excitation == "random" else 0.09)
+
+
+def test_runs_without_a_driven_line_tell_nothing():
+    """As after a period of which a part was lost."""
+    run = static_film(SOME_ODD, 0.0, 0.0, 1)[0]
+    silent = replace(run, disturbed=np.ones(len(run.frequencies), dtype=bool))
+    lines = film_products([silent, silent])
+    assert np.isnan(lines.change)
+    assert np.isnan(lines.scatter)

@@ -160,4 +160,4 @@ def _columns(omega: FloatArray, middle: float) -> ComplexArray:
     shape = over_frequency("K-C-M", np.zeros(len(omega), dtype=np.intp), omega, np.array([middle]))
     assert shape.columns is not None
     columns = shape.columns[:, :4] + 1j * shape.columns[:, 4:]
-    return np.asarray(columns.reshape(len(omega), 2, 2, -1))
+    return np.asarray(columns.reshape(len(omega), 2, 2, 12))
