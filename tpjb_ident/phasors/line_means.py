@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.phasors.run_data import RunPhasors, complex_median
 
 #: Lines nearer than this are one [Hz].
@@ -35,6 +35,12 @@ def film_lines(run: RunPhasors) -> tuple[FilmLines | None, ...]:
     if not len(run.record) or len(run.residual) < len(run.record):
         return tuple(None for _ in run.lines.excitation)
     displacement, force = run.plane("displacement", run.record), run.film_force(run.record)
+    # the square that rounding puts on a line is the sum over the channels
+    steps = np.diag(np.sqrt(len(run.rounding) * run.rounding)).astype(complex)
+
+    def noise(rows: ComplexArray) -> FloatArray:
+        return np.array([_mean_square(run.plane("displacement", rows)), _mean_square(run.film_force(rows))])
+
     result = []
     for i, driven in enumerate(run.lines.excitation):
         wanted = {"2f": 2 * driven.frequency, "3f": 3 * driven.frequency}
@@ -44,9 +50,8 @@ def film_lines(run: RunPhasors) -> tuple[FilmLines | None, ...]:
         for name, frequency in wanted.items():
             place = _alone(run, frequency, name)
             if place is not None:
-                bins = run.residual[place]
-                noise = _mean_square(run.plane("displacement", bins)), _mean_square(run.film_force(bins))
-                lines[name] = FilmLine(frequency / driven.frequency, displacement[place], force[place], *noise)
+                noises = noise(run.residual[place]) + noise(steps)
+                lines[name] = FilmLine(frequency / driven.frequency, displacement[place], force[place], *noises)
         result.append(FilmLines(float(np.linalg.norm(force[i])), lines))
     return tuple(result)
 

@@ -63,6 +63,7 @@ class RunPhasors:
     record: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex))
     #: by line of the whole record, (n_bins, n_channels) complex: residual in the bins around it
     residual: tuple[ComplexArray, ...] = ()
+    rounding: FloatArray = field(default_factory=lambda: np.empty(0))  #: (n_channels,), SI^2: by it on a line, at most
 
     @cached_property
     def displacement(self) -> PhasorBlock:

@@ -97,7 +97,7 @@ class _RunFit:
                 self.result = quick
         # the noise of a phasor of the whole record is less than that of its beginning
         residual = tuple(share * bins for bins in first.residual)
-        self.result = replace(self.result, record=first.record, residual=residual)
+        self.result = replace(self.result, record=first.record, residual=residual, rounding=first.rounding)
 
     def _lines(self, excitation: tuple[float, ...], speed: float, extra: tuple[float, ...]) -> LineSet:
         run, rate = self.run, self.run.sample_rate

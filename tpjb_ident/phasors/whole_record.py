@@ -22,6 +22,9 @@ from tpjb_ident.phasors.run_data import RunPhasors
 _BESIDE = (3, 14)
 #: and farther than this from all other lines.
 _CLEAR_OF = 1.2
+#: Share of the largest difference between readings below which one is a residue of arithmetic, no converter's step;
+#: largest square of a line by rounding, over the third power of the step over the amplitude (4 / pi^4 over 2^0.5).
+_NO_STEP, _LARGEST = 1e-6, 0.029
 #: Order of the polynomial that takes slow movements of the shaft along: a window has 1.
 _DRIFT_ORDER = 3
 
@@ -37,6 +40,7 @@ class WholeRecord:
     residual: FloatArray  #: (n_channels, n), SI: bad samples are zero
     rate: float
     start: float
+    rounding: FloatArray  #: (n_channels,), SI^2: largest square that rounding puts on a line
 
     @property
     def duration(self) -> float:
@@ -93,17 +97,25 @@ def fitted_whole(
     fit, residual = fitter.fit_with_residual(samples.rows[:, None], np.array([start]))
     z = np.full((len(shown), len(places)), np.nan + 0j)
     z[shown] = fit.z[0]
-    return WholeRecord(lines, places, z, 1 - fit.lost[0], residual[:, 0], rate, start)
+    return WholeRecord(lines, places, z, 1 - fit.lost[0], residual[:, 0], rate, start, _rounding(samples.rows))
+
+
+def _rounding(rows: FloatArray) -> FloatArray:
+    """Largest square that a converter's steps put on a line of readings (n_channels, n): of a Bessel function."""
+    moves = np.abs(np.diff(rows))
+    largest = np.nanmax(moves, axis=1, keepdims=True, initial=0.0)
+    step = np.where(moves > _NO_STEP * largest, moves, largest).min(axis=1)
+    return _LARGEST * step**3 / (np.fmax(np.std(rows, axis=1), step) + np.finfo(float).tiny)
 
 
 def with_record(result: RunPhasors, records: tuple[WholeRecord, ...]) -> RunPhasors:
     """The run with the phasors of its whole record, and what that leaves around every line."""
     channels = len(result.channels)
-    z = np.full((len(records[0].z), channels), np.nan + 0j)
+    z, rounding = np.full((len(records[0].z), channels), np.nan + 0j), np.zeros(channels)
     for record in records:
-        z[:, record.places] = record.z
+        z[:, record.places], rounding[record.places] = record.z, record.rounding
     residual = tuple(_residual_bins(records, i, channels) for i in range(len(z)))
-    return replace(result, record=z, residual=residual)
+    return replace(result, record=z, residual=residual, rounding=rounding)
 
 
 def _residual_bins(records: tuple[WholeRecord, ...], line: int, channels: int) -> ComplexArray:
@@ -112,7 +124,7 @@ def _residual_bins(records: tuple[WholeRecord, ...], line: int, channels: int) -
     frequencies = first.lines.whole_frequencies * first.duration
     offsets = np.arange(_BESIDE[0], _BESIDE[1] + 1)
     bins = round(frequencies[line]) + np.concatenate([-offsets[::-1], offsets])
-    free = np.abs(bins[:, None] - np.delete(frequencies, line)).min(axis=1, initial=np.inf) > _CLEAR_OF
+    free = np.abs(bins[:, None] - np.delete(frequencies, line)).min(axis=1) > _CLEAR_OF
     bins = bins[free & (bins > 0) & (bins < len(first.spectrum))]
     residual = np.full((len(bins), channels), np.nan + 0j)
     for record in records:
