@@ -10,10 +10,11 @@ from rigdata import load_campaign
 from rigdata.problem import RigDataError
 from tests.phasors.phasor_cases import place
 from tests.rigs import closed_form as cf
+from tpjb_ident.estimate.blocks import Sensor
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs.baseline import dry_test
-from tpjb_ident.runs.static_load import MAX_MISS, MAX_SIDEWAYS, load_conditions, load_misses
+from tpjb_ident.runs.static_load import MAX_MISS, MAX_SIDEWAYS, StaticLoads, load_conditions, load_misses
 
 
 def loaded(ratios, load=5000.0, direction=-90.0):
@@ -70,6 +71,20 @@ def test_cells_that_read_otherwise_in_half_of_the_runs_are_in_the_interval(tmp_p
         assert off[3] < 0.02 * h.real[3]
 
 
+@pytest.mark.slow
+def test_steps_of_a_converter_are_no_harmonics_of_the_film(tmp_path):
+    """Of 12 bits over 20 V, half as large as the motion."""
+    rig = cf.Rig(loads=(3000.0, 6000.0), seconds=2.4, unbalance=0.1)
+    steps = {"fault": lambda readings, rng, run: np.round(readings / 6e-7) * 6e-7}
+    path = cf.write_rig(tmp_path, rig, cf.with_entries(cf.channels_of(rig), "X1", **steps))
+    for point in identify(load_campaign(path)).points:
+        h = rig.film.h(np.array([point.point.excitation_hz]), point.point.static_load)[0].ravel()
+        off = np.abs(point.stiffness.vector - np.concatenate([h.real, h.imag]))
+        assert "film-not-linear" not in point.quality
+        assert (off < 2 * point.stiffness.half_width()).all()
+        assert (point.stiffness.half_width()[[0, 3]] < 0.1 * h.real[[0, 3]]).all()
+
+
 @pytest.mark.parametrize("common", [0.45, 2.2, 1.0j, -0.3])
 def test_cells_that_cannot_be_right_correct_nothing_but_are_told(common):
     (miss,), found = load_misses([loaded(common * np.array([0.98, 1.0, 1.02]))])
@@ -113,6 +128,26 @@ def test_loads_that_are_off_by_more_than_scatter_are_named_with_their_figure(siz
     assert found == named
     assert figure in "".join(c.detail for c in found)
     assert load_conditions(np.zeros(0, complex), 1.0 + 0j) == ()
+
+
+@pytest.mark.parametrize(
+    ("common", "gain", "turn"),
+    [
+        (1.005 * np.exp(0.04j), 0.003, 0.0),
+        (1.04, np.log(1.04) / 1.6, 0.0),
+        (1 / 1.04, np.log(1.04) / 1.6, 0.0),
+        (np.exp(-0.09j), 0.003, 0.09 / 1.6),
+        (0.0, 0.003, 0.0),
+    ],
+)  # fmt: skip
+def test_cells_are_as_uncertain_as_all_set_points_differ_from_them(common, gain, turn):
+    """Cells or actuators: one of them is wrong, and the records do not tell which."""
+    sensors = Sensor("X1A", "displacement", 0.005), Sensor("L1H", "force", 0.003), Sensor("L1V", "force", 0.2)
+    probe, cell, stated = StaticLoads([], complex(common)).doubted(sensors)
+    assert probe == sensors[0]
+    assert cell.uncertainty == pytest.approx(gain)
+    assert cell.axis_uncertainty == pytest.approx(turn)
+    assert stated.uncertainty == 0.2
 
 
 CARRIED = (4e7, 6e7)

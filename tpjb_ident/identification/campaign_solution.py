@@ -86,7 +86,7 @@ def solve_campaign(
         film = tuple(_film(data, point) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])
         blocks = campaign_blocks(points, means, loads.misses, bent, temperatures)
-        rig = campaign_rig(campaign, sensors, blocks, loads.common, bare)
+        rig = campaign_rig(campaign, loads.doubted(sensors), blocks, loads.common, bare)
         start = np.array([point.start for point in means]) - rig.bare.at(np.array([data.omega for data in points]))
         solution = solver(rig, blocks, start, rates).run()
         return CampaignSolution(rig, task, blocks, means, loads, film, start, solution, np.zeros_like(blocks.z))
@@ -98,12 +98,12 @@ def solve_campaign(
     if learnt is not last.rig:
         again = solver(learnt, blocks, start, rates).begun(last.solution).run()
         last = replace(last, rig=learnt, solution=again)
-    pickup, fits = _mains(points, digests, last.rig, blocks, last.solution) if correct else (None, {})
+    force = force_pickup([digest.mains_force for digest in digests])
+    pickup, fits = _mains(points, digests, last, force) if correct else (None, {})
     if fits:
         shift = _mains_readings(last.rig, blocks, fits)
         again = solver(last.rig, replace(blocks, z=blocks.z - shift), start, rates).run()
         last = replace(last, solution=again, mains_shift=shift, pickup=pickup, mains=fits)
-    force = force_pickup([digest.mains_force for digest in digests])
     in_cells = _in_cells(points, last.rig, blocks, force)
     return replace(last, in_cells=in_cells, cell_pickup=float(np.linalg.norm(force)))
 
@@ -114,13 +114,10 @@ def _film(data: PointData, point: PointMeans) -> FilmChange:
 
 
 def _mains(
-    points: Sequence[PointData],
-    digests: Sequence[RunDigest],
-    rig: Rig,
-    blocks: Blocks,
-    solution: Solution,
+    points: Sequence[PointData], digests: Sequence[RunDigest], solved: CampaignSolution, force: FloatArray
 ) -> tuple[Pickup | None, dict[int, MainsFit]]:
-    """Angles of the mains at every point on whose line it is."""
+    """Angles of the mains at every point on whose line it is; `force` (2,): mains in the cells [N]."""
+    rig, blocks, solution = solved.rig, solved.blocks, solved.solution
     coincident = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE)]
     if not coincident:
         return None, {}
@@ -133,7 +130,6 @@ def _mains(
     residual = F - np.einsum("nij,nj->ni", solution.h[blocks.point], D)
     share = np.sum(np.abs(residual) ** 2, axis=1) / 2 / np.sum(np.abs(F) ** 2, axis=1)
     typical = float(np.sqrt(np.nanmedian(share[free]) / np.log(2))) if free.any() else _LEAST_SCATTER
-    force = force_pickup([digest.mains_force for digest in digests])
     fits = {}
     for p in coincident:
         mine = blocks.point == p

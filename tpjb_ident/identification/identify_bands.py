@@ -96,7 +96,7 @@ def _solved(
     data, solutions = [], []
     for turn in range(2 if any(point.method == "hv" for point in points) else 1):
         data.append(band_blocks(points, sensors, loads.misses, temperatures, settings.clearance, turn))
-        rig = campaign_rig(campaign, sensors, data[-1].blocks, loads.common, bare)
+        rig = campaign_rig(campaign, loads.doubted(sensors), data[-1].blocks, loads.common, bare)
         solutions.append(solve_bands(rig, data[-1], settings.correct, rates))
     return SolvedBands(tuple(points), loads, data[0], tuple(solutions))
 

@@ -24,7 +24,9 @@ from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.estimate.blocks import Sensor
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
+from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 
 #: Misses beyond this share are no scatter: the set point or the cells are wrong.
 MAX_MISS = 0.05
@@ -32,6 +34,8 @@ MAX_MISS = 0.05
 _LARGEST_MISS = 0.3
 #: Beyond this direction [rad] they are no scatter either.
 MAX_SIDEWAYS = 0.05
+#: Miss of all runs alike beyond which the cells are not as certain as stated, or the actuators are not.
+_NOTICED = 0.01
 #: Beyond these ratios of the cells to the set points in all runs, a sensitivity or a set point is wrong, not a gain.
 _CONTRADICTS = (0.7, 1.4)
 #: Turned by more than this in all runs [rad], cells are inverted or exchanged, or the load acts elsewhere.
@@ -78,6 +82,13 @@ class StaticLoads:
         text = f"over the loads of the campaign the cells' mean holds a constant of {size:.0f} N at {angle:.0f} deg "
         text += f"(standard error {self.zero_error:.0f} N); it was taken off"
         return load_conditions(self.misses[point], self.common) + holding((size, "cells-not-tared", text))
+
+    def doubted(self, sensors: Sequence[Sensor]) -> tuple[Sensor, ...]:
+        """The sensors, cells as uncertain as all set points differ from them: either may be wrong."""
+        ratio = np.log(self.common or 1 + 0j)
+        sizes = np.abs([ratio.real, ratio.imag])
+        gain, turn = (CHANGE_AS_DEVIATION * sizes * (sizes > (_NOTICED, MAX_SIDEWAYS))).tolist()
+        return tuple(s.doubted(gain, turn) if s.quantity == "force" else s for s in sensors)
 
 
 def missed_load(misses: ComplexArray, members: Sequence[int]) -> complex:
@@ -144,13 +155,10 @@ def load_conditions(miss: ComplexArray, common: complex) -> tuple[Condition, ...
     """
     off, aside = (float(np.abs(part).max(initial=0.0)) for part in (miss.real, miss.imag))
     size, turn = abs(common), float(np.angle(common))
-    is_size = _CONTRADICTS[0] <= size <= _CONTRADICTS[1]
-    is_gain = is_size and abs(turn) <= _CONTRADICTS_TURN
-    one_run = f"points {np.degrees(aside):.1f} deg away from its set direction"
-    text = f"the static load by the cells points {np.degrees(turn):+.1f} deg away from its set direction in all runs"
+    is_gain = _CONTRADICTS[0] <= size <= _CONTRADICTS[1] and abs(turn) <= _CONTRADICTS_TURN
+    text = f"the static load by the cells is {size:.3g} times its set point and points {np.degrees(turn):+.1f} deg away"
     return holding(
         (off > MAX_MISS, "static-load-off", f"a run's measured static load is {100 * off:.1f} % off its set point"),
-        (aside > MAX_SIDEWAYS, "static-load-turned", f"a run's measured static load {one_run}"),
         (
             not size,
             "no-static-force",
@@ -158,22 +166,21 @@ def load_conditions(miss: ComplexArray, common: complex) -> tuple[Condition, ...
             'stated, the cells\' low corner, for which C is widened (filter = "butterworth 1 high 0.1 Hz")',
         ),
         (
-            size and not is_size,
+            size and not is_gain,
             "cells-contradict-set-points",
-            f"the cells read {size:.3g} times the static load of the set points in all runs: every "
-            "coefficient is off by about as much if their sensitivity is wrong",
+            f"{text} in all runs: a sensitivity is wrong, a cell inverted, or the cells are exchanged",
         ),
         (
-            is_size and not is_gain,
-            "cells-contradict-set-points",
-            f"{text}: a cell is inverted, or the cells are exchanged",
+            is_gain and max(aside, abs(turn)) > MAX_SIDEWAYS,
+            "static-load-turned",
+            f"{text} in all runs, in single ones by {np.degrees(aside):.1f} deg more; the cells' axes are taken as "
+            "uncertain as what all share",
         ),
-        (is_gain and abs(turn) > MAX_SIDEWAYS, "static-load-turned", text),
         (
-            is_gain and abs(size - 1) > 0.01,
+            is_gain and abs(size - 1) > _NOTICED,
             "cells-against-set-points",
-            f"the cells read {100 * (size - 1):+.2f} % against the set points in all runs alike "
-            "(gain of the cells or of the actuators' transducers)",
+            f"the cells read {100 * (size - 1):+.2f} % against the set points in all runs alike (gain of the cells or "
+            "of the actuators' transducers), and their gains are taken as uncertain as that",
         ),
     )
 
