@@ -129,7 +129,7 @@ def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple
 def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tuple[tuple[Channel | None, ...], ...]]:
     """Phasors of the windows channel by channel (n, m), NaN where there is none, and the channels of each run (g, m).
 
-    The drift of a channel's gain with the run's temperature is taken off as far as it is known; what clocks run ahead, too.
+    Off it are what clocks run ahead and, as far as it is known, the drift of a channel's gain with the temperature.
     """
     rows: list[ComplexArray] = []
     described: list[list[Channel | None]] = []
