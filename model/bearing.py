@@ -266,15 +266,9 @@ class Bearing:
         return f"<{type(self).__name__}: {self}>"
 
     def _repr_html_(self) -> str:
-        """In a notebook: what it is, and a row per pad."""
-        rows = []
-        for number, pad in enumerate(self.pads, 1):
-            angles = f"<td>{math.degrees(pad.pivot_angle):.4g}</td><td>{math.degrees(pad.arc):.4g}</td>"
-            sizes = f"<td>{1e6 * pad.assembled_clearance:.4g}</td><td>{pad.preload:.3g}</td>"
-            rows.append(f"<tr><td>#{number}</td>{angles}{sizes}</tr>")
-        titles = ("pad", "pivot, deg", "arc, deg", "Cb, µm", "preload")
-        head = "".join(f"<th>{title}</th>" for title in titles)
-        return f"<p>{html.escape(str(self))}</p><table><tr>{head}</tr>{''.join(rows)}</table>"
+        """In a notebook: what it is, and its pads by number."""
+        pads = "".join(f"<li>{html.escape(str(pad))}</li>" for pad in self.pads)
+        return f"<p>{html.escape(str(self))}</p><ol>{pads}</ol>"
 
     def with_pads(self, pads: tuple[Pad, ...]) -> Bearing:
         """Return a copy with other pads.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -77,19 +78,17 @@ class MeasuredPivot(_Law):
         points = np.asarray(self.deflection_points, float)
         if load.ndim != 1 or load.shape != points.shape or len(load) < 2:
             raise _PivotCurveError(f"load and deflection must be 1-D and alike, got {load.shape} and {points.shape}")
-        if not (np.all(np.isfinite(load)) and np.all(np.isfinite(points))):
-            raise _PivotCurveError("a pivot curve must be finite")
-        if np.any(np.diff(load) <= 0) or np.any(np.diff(points) <= 0):
-            raise _PivotCurveError("a pivot curve must rise strictly in load and deflection")
+        if load[0] != 0.0 or points[0] != 0.0:
+            load, points = np.append(0.0, load), np.append(0.0, points)
+        for name, values in (("load", load), ("deflection", points)):
+            for before, after in itertools.pairwise(values):
+                if not after > before:
+                    fault = f"{name} goes from {before:g} to {after:g}"
+                    raise _PivotCurveError(f"a pivot curve must rise strictly from zero: {fault}")
         with np.errstate(over="ignore"):  # an infinite slope is refused in the next line
             slopes = np.diff(points) / np.diff(load)
         if not np.all((slopes > 1e-100) & (slopes < 1e100)):
             raise _PivotCurveError("a pivot curve must have slopes that are numbers")
-        if load[0] != 0.0 or points[0] != 0.0:
-            load = np.concatenate([[0.0], load])
-            points = np.concatenate([[0.0], points])
-            if load[1] <= 0 or points[1] <= 0:
-                raise _PivotCurveError("a pivot curve must start at or above zero load and deflection")
         object.__setattr__(self, "load", load)
         object.__setattr__(self, "deflection_points", points)
         cubics = np.append(rising_cubics(load, points), np.zeros((4, 1)), axis=1)
@@ -111,5 +110,5 @@ class MeasuredPivot(_Law):
             return self
         deflections = np.diff(self.deflection_points)
         alone = np.maximum(deflections - compliance * np.diff(self.load), _LEAST_SHARE * deflections)
-        points = np.concatenate([[0.0], np.cumsum(alone)])
+        points = np.append(0.0, np.cumsum(alone))
         return replace(self, deflection_points=points)

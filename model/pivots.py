@@ -15,11 +15,16 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from model.bearing import Bearing, BearingError, Pivot
+from model.conditions import named
 from model.measured_pivot import FormulaPivot, MeasuredPivot
 from model.pad.pivot import CONSTANT, OTHER, RIGID, ROCKER, SPHERICAL
 from model.toml_text import read_page, read_table
 from rigdata.arrays import FloatArray
 from rigdata.near_names import hint
+from rigdata.problem import Condition
+
+#: Condition of a prediction.
+BEYOND_TEST = "pads {pads} press their pivots harder than the dry tests did"
 
 
 @runtime_checkable
@@ -32,48 +37,15 @@ class PivotLaw(Protocol):
         ...
 
     def deflection(self, load: float) -> float:
-        """delta(W) [m], for W >= 0 [N].
-
-        Parameters
-        ----------
-        load : float
-            Pad load [N], zero or positive.
-
-        Returns
-        -------
-        float
-            [m]
-        """
+        """delta(W) [m], for W >= 0 [N]."""
         ...
 
     def stiffness(self, load: float) -> float:
-        """Tangent dW/ddelta [N/m]; infinite for a rigid pivot.
-
-        Parameters
-        ----------
-        load : float
-            Pad load [N], zero or positive.
-
-        Returns
-        -------
-        float
-            [N/m]
-        """
+        """Tangent dW/ddelta [N/m]; infinite for a rigid pivot."""
         ...
 
     def vibration_stiffness(self, load: float) -> float:
-        """What small vibrations feel [N/m]: the tangent, unless the law says otherwise.
-
-        Parameters
-        ----------
-        load : float
-            Pad load [N], zero or positive.
-
-        Returns
-        -------
-        float
-            [N/m]
-        """
+        """What small vibrations feel [N/m]: the tangent, unless the law says otherwise."""
         ...
 
 
@@ -88,6 +60,11 @@ class ScaledPivot:
 
     law: PivotLaw
     stiffness_factor: float
+
+    @property
+    def valid_to(self) -> float:
+        """Largest load of the dry test of the law [N]."""
+        return getattr(self.law, "valid_to", math.inf)
 
     @property
     def name(self) -> str:
@@ -138,6 +115,13 @@ def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray]:
     for padded, curve in zip(table, curves, strict=True):
         padded[:, : curve.shape[1]] = curve
     return rows, table
+
+
+def pressed_beyond(laws: Sequence[PivotLaw], loads: FloatArray) -> tuple[Condition, ...]:
+    """Name the pads that press measured pivots harder than the dry tests did: `loads` (n,) [N]."""
+    tested = np.array([getattr(law, "valid_to", math.inf) for law in laws])
+    beyond = (np.flatnonzero(loads > tested) + 1).tolist()
+    return (named(BEYOND_TEST, beyond),) if beyond else ()
 
 
 def ask_laws(laws: Sequence[PivotLaw], rows: FloatArray, loads: FloatArray) -> None:
@@ -226,8 +210,9 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
     ['measured']
     """
     path = Path(path)
-    kind, missing = "A pivots.toml holds some hundred numbers", "`tpjb pivot CAMPAIGN` writes a pivots.toml."
-    text = read_page(path, BearingError, kind, missing, 20)
+    text = read_page(
+        path, BearingError, "A pivots.toml holds some hundred numbers", "`tpjb pivot CAMPAIGN` writes one.", 20
+    )
     data = read_table(text, path.name, "tpjb-pivots/1", BearingError)
     _refuse_unknown(data, _FILE_KEYS, path.name)
     tables = data.get("pads")
@@ -273,12 +258,15 @@ def _read_pad(table: Any, name: str, housing: bool) -> tuple[int, MeasuredPivot]
     place = f"{name}, pad {number}"
     _refuse_unknown(table, _PAD_KEYS, place)
     try:
-        low = _number(table.get("valid_from_N", 0.0), "valid_from_N")
-        high = _number(table.get("valid_to_N", math.inf), "valid_to_N")
-        if not 0.0 <= low < high:
-            raise ValueError(f"valid from {low:g} to {high:g} N")
         force = np.array([_number(value, "force_N") for value in table["force_N"]])
         points = np.array([_number(value, "deflection_m") for value in table["deflection_m"]])
+        for entry, value in enumerate(table.get("stiffness_N_per_m", ()), start=1):
+            if not _number(value, "stiffness_N_per_m") > 0.0:
+                raise ValueError(f"stiffness_N_per_m: entry {entry} is {value!r}, no stiffness")
+        low = _number(table.get("valid_from_N", 0.0), "valid_from_N")
+        high = _number(table.get("valid_to_N", force[-1]), "valid_to_N")
+        if not 0.0 <= low < high:
+            raise ValueError(f"valid from {low:g} to {high:g} N")
         law = MeasuredPivot(force, points, str(table.get("law", "measured")), housing, high)
     except (KeyError, TypeError, ValueError, OverflowError) as error:  # whole numbers of 400 digits overflow
         raise BearingError(f"{place}: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error

@@ -17,15 +17,16 @@ _MAY_BE_ABSENT = {"contact_length", "housing_diameter", "pivot_diameter", "spher
 
 def check_possible(bearing: Bearing) -> None:
     """Refuse a bearing with a number that no bearing has."""
-    _check(bearing, bearing.name)
-    _check(bearing.oil, "oil")
+    source = bearing.source or bearing.name
+    _check(bearing, source)
+    _check(bearing.oil, f"{source}, oil")
     checked: set[Any] = set()  # the pads of a bearing are of one make, as a rule
     for k, pad in enumerate(bearing.pads, start=1):
-        _check(pad, f"pad {k}")
+        _check(pad, f"{source}, pad {k}")
         parts = {"pivot": bearing.pivot_of(pad), "backing": pad.backing, "babbitt": pad.babbitt}
         for name, part in parts.items():
             if part not in checked:
-                _check(part, f"pad {k}, {name}")
+                _check(part, f"{source}, pad {k}, {name}")
                 checked.add(part)
 
 

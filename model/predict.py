@@ -14,7 +14,7 @@ from model.errors import ModelError, OptionError, check_known
 from model.growth import grown
 from model.mirror import MIRROR, mirrored, rotation_of, seen_by_shaft
 from model.options import Options
-from model.pivots import pivot_laws
+from model.pivots import pivot_laws, pressed_beyond
 from model.possible import check_possible
 from model.prediction import Prediction
 from model.setup import Mesh, Setup
@@ -122,9 +122,9 @@ def _mesh(mesh: Any) -> Mesh:
 
 
 def _number(value: Any, dimension: str, name: str) -> float:
-    if isinstance(value, bool):
-        raise _OperatingPointError(f"{name} must be a number, got {value!r}")
     try:
+        if isinstance(value, bool):
+            raise TypeError("a truth value")
         return float(_in_si(value, dimension, name))
     except TypeError as error:
         raise _OperatingPointError(f"{name} must be a number, got {value!r}") from error
@@ -157,6 +157,7 @@ def predict_setup(
     films = equilibrium.films
     position = in_rig(running, equilibrium.position)
     tilt = np.array([f.tilt for f in films])
+    pad_load = np.array([f.forces.force[0] if f.forces is not None else 0.0 for f in films])
     shape = (2, 2) if omega.ndim == 0 else (len(lines), 2, 2)
     return Prediction(
         load=load,
@@ -171,8 +172,8 @@ def predict_setup(
         load_reading=instruments.shown_load(force),
         tilt=-tilt if running.mirrored else tilt,
         deflection=np.array([f.deflection for f in films]),
-        pad_load=np.array([f.forces.force[0] if f.forces is not None else 0.0 for f in films]),
-        status=(*equilibrium.status, *regimes),
+        pad_load=pad_load,
+        status=(*equilibrium.status, *regimes, *pressed_beyond(setup.pivots, pad_load)),
         equilibrium=equilibrium,
         setup=setup,
         solver=predict_setup,

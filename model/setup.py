@@ -176,7 +176,7 @@ class Setup:
     @property
     def flexible_pads(self) -> bool:
         """Whether pads deform."""
-        return self.thermal in _BENDING or self.bending != 0.0
+        return self.bending_factor != 0.0
 
     @property
     def pads_follow(self) -> bool:
@@ -186,9 +186,7 @@ class Setup:
     @property
     def bending_factor(self) -> float:
         """Factor on the computed deformation (1 for ``tehd`` and ``thd`` with nothing else said)."""
-        if self.bending:
-            return self.bending
-        return 1.0 if self.thermal in _BENDING else 0.0
+        return self.bending or float(self.thermal in _BENDING)
 
     @property
     def growth(self) -> Growth | None:

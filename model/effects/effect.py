@@ -99,8 +99,7 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
     (Effect('pad_offset', pad=1, radial_offset=5e-06),)
     """
     path = Path(path)
-    missing = "Give the path of an effects file (TOML)."
-    text = read_page(path, EffectError, "An effects file is a page of text", missing)
+    text = read_page(path, EffectError, "An effects file is a page of text", "Give the path of an effects file (TOML).")
     tables = read_table(text, path.name, "tpjb-effects/1", EffectError).get("effects", [])
     if not isinstance(tables, list):
         raise EffectError(f"{path.name}: 'effects' must be a list of tables. Write [[effects]].")

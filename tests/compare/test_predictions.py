@@ -9,10 +9,9 @@ import pytest
 
 from model.bearing_file import load_bearing
 from model.effects import Effect
-from model.pivots import measured_pivots
 from model.predict import predict
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.compare.predictions import ModelSettings, predict_points, pressed_beyond, printed_formula
+from tpjb_ident.compare.predictions import ModelSettings, predict_points, printed_formula
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 from tpjb_ident.compare.summary import _clearance_sentence, _extrapolation_sentence
 from tpjb_ident.conditions import Condition
@@ -121,13 +120,6 @@ def test_thermal_growth_is_not_seen_by_the_cold_clearance(bearing):
     off = rig_truth(bearing, ModelSettings("kirk", "isothermal", (Effect("pad_offset", pad=2, radial_offset=3e-6),)))
     assert hot.clearance == pytest.approx([80e-6] * 5)
     assert off.clearance == pytest.approx([80e-6, 83e-6, 80e-6, 80e-6, 80e-6])
-
-
-@pytest.mark.parametrize(("loads", "beyond"), [((4e3, 4e3), False), ((4e3, 12e3), True)])
-def test_a_prediction_says_where_a_pivot_is_pressed_harder_than_in_its_dry_test(loads, beyond):
-    table = {"force_N": [500.0, 6000.0], "deflection_m": [1e-6, 9e-6]}
-    laws = measured_pivots([table | {"pad": k, "valid_to_N": top} for k, top in ((1, 5000.0), (2, 4800.0))], "dry")
-    assert pressed_beyond(laws, loads) == beyond
 
 
 def test_the_summary_claims_no_more_of_a_clearance_than_the_sweep_tells(bearing):

@@ -7,16 +7,21 @@ import math
 import numpy as np
 import pytest
 
+import tpjb_ident as ti
 from model.bearing import BearingError, Pivot
+from model.conditions import pads_of
 from model.measured_pivot import FormulaPivot, MeasuredPivot
 from model.pad.pivot import ROCKER as BY_ROCKER
 from model.pivots import (
+    BEYOND_TEST,
     RIGID_PIVOT,
     ScaledPivot,
     constant_pivot,
     formula_pivot,
     load_pivots,
+    measured_pivots,
     pivot_laws,
+    pressed_beyond,
 )
 
 E, NU = 206e9, 0.3
@@ -141,10 +146,10 @@ def test_measured_curve_of_a_formula_gives_its_stiffness_back():
     [
         ([0, 1, 1], [0, 1, 2], "rise strictly"),
         ([0, 1, 2], [0, 2, 1], "rise strictly"),
-        ([0, 1, math.nan], [0, 1, 2], "finite"),
+        ([0, 1, math.nan], [0, 1, 2], "load goes from 1 to nan"),
         ([1.0], [1.0], "1-D"),
         ([0, 1, 2], [0, 1], "alike"),
-        ([-1, 1, 2], [-2, 1, 2], "at or above zero"),
+        ([-1, 1, 2], [-2, 1, 2], "rise strictly from zero: load goes from 0 to -1"),
     ],
 )
 def test_impossible_curves_are_refused(load, points, message):
@@ -189,6 +194,28 @@ def test_file_is_read_pad_by_pad(tmp_path, rocker):
     assert len({*laws, *laws}) == 5
 
 
+@pytest.mark.parametrize("factor", [1.0, 0.5])
+@pytest.mark.parametrize(("loads", "pads"), [((4e3, 4e3), ()), ((4e3, 12e3), (2,)), ((9e3, 12e3), (1, 2))])
+def test_a_prediction_says_which_pivots_are_pressed_harder_than_in_their_dry_tests(loads, pads, factor):
+    table = {"force_N": [500.0, 6000.0], "deflection_m": [1e-6, 9e-6]}
+    laws = measured_pivots([table | {"pad": 1, "valid_to_N": 5000.0}, table | {"pad": 2}], "dry")
+    laws = [ScaledPivot(law, factor) if factor < 1.0 else law for law in laws]
+    conditions = pressed_beyond([*laws, RIGID_PIVOT], np.array([*loads, 1e6]))
+    assert [condition.pads for condition in conditions] == ([pads] if pads else [])
+    assert pads_of(BEYOND_TEST, conditions) == pads
+
+
+def test_predict_names_the_pads_that_press_measured_pivots_beyond_their_dry_tests(rocker, tmp_path):
+    """It said nothing, where `compare` did."""
+    path = tmp_path / "pivots.toml"
+    path.write_text(pivots_file("".join(pad_table(k) for k in range(1, 6))), encoding="utf-8")
+    prediction = ti.predict(rocker, load=6000.0, speed=140.0, pivots=path)
+    (beyond,) = (condition for condition in prediction.status if "dry tests" in condition)
+    assert beyond.pads == tuple(np.flatnonzero(prediction.pad_load > 1000.0) + 1)
+    assert 1 in beyond.pads
+    assert beyond.severity == "warning"
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -197,7 +224,10 @@ def test_file_is_read_pad_by_pad(tmp_path, rocker):
         (pivots_file(""), "no \\[\\[pads\\]\\]"),
         (pivots_file("".join(pad_table(k) for k in (1, 2, 4, 5))), "Measure pad #3"),
         (pivots_file("".join(pad_table(k) for k in range(1, 7))), "needs 1 to 5"),
-        (pivots_file(pad_table(1, force="[2.0, 1.0]")), "rise strictly"),
+        (pivots_file(pad_table(1, force="[2.0, 1.0]")), "pad 1: .* rise strictly from zero: load goes from 2 to 1"),
+        (pivots_file(pad_table(1) + "stiffness_N_per_m = [-5e8, 6e8]\n"), "stiffness_N_per_m: entry 1 is -5"),
+        (pivots_file(pad_table(1) + "stiffness_N_per_m = [5e8, 0.0]\n"), "stiffness_N_per_m: entry 2 is 0"),
+        (pivots_file(pad_table(1, deflection="[-1e-6, 2e-6]")), "deflection goes from 0 to -1e-06"),
         (pivots_file(pad_table(1, force='["a", "b"]')), "pad 1"),
         (pivots_file("[[pads]]\npad = 1\n"), "force_N"),
         (pivots_file('[[pads]]\npad = "one"\n'), "must be a number from 1"),

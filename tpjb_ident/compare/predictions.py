@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from model.bearing import Bearing
+from model.conditions import pads_of
 from model.effects import Effect
 from model.mirror import as_it_turns
 from model.options import Options
-from model.pivots import PivotLaw, measured_pivots, pivot_laws
+from model.pivots import BEYOND_TEST, PivotLaw, measured_pivots, pivot_laws
 from model.predict import predict
 from model.prediction import Prediction
 from model.toml_text import parse_toml
@@ -144,14 +145,9 @@ def _row(point: OperatingPoint, p: Prediction, index: int) -> dict[str, Any]:
         idle_pads=" ".join(str(n) for n in p.idle_pads),
         mesh_error=p.mesh_error,
         status="; ".join(p.status),
-        pivot_extrapolated=pressed_beyond(p.setup.pivots, p.pad_load),
+        pivot_extrapolated=bool(pads_of(BEYOND_TEST, p.status)),
     )
     return row
-
-
-def pressed_beyond(pivots: Sequence[PivotLaw], loads: Iterable[float]) -> bool:
-    """Whether a pad presses its pivot harder than the dry test of its law did."""
-    return any(load > getattr(law, "valid_to", math.inf) for law, load in zip(pivots, loads, strict=True))
 
 
 def _pad_columns(p: Prediction, number: int) -> dict[str, float]:

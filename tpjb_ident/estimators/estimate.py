@@ -26,6 +26,7 @@ from tpjb_ident.estimators.stiffness import DynamicStiffness
 
 #: Condition number of the displacement directions beyond which entries cannot be told apart.
 _MAX_CONDITION = 30.0
+_HUBER = RlmSettings()
 #: Share of windows without weight beyond which the answer needs a look.
 _MAX_REJECTED = 0.4
 #: A window counts as rejected below this weight.
@@ -84,35 +85,36 @@ def estimate_dynamic_stiffness(
     >>> print(np.round(est.k / 1e6, 3).diagonal(), np.round(est.c / 1e3, 3).diagonal())
     [300. 450.] [500. 700.]
     """
-    if method not in METHODS:
-        raise ArgumentError(unknown_name("method", method, METHODS))
-    if norm is not None and method != "rlm":
-        raise ArgumentError(f'norm={norm!r} belongs to method="rlm", not to {method!r}')
+    method, settings = method_of(f"{method}:{norm}" if norm else method)
     frequency = float(to_si(omega, "speed", "omega"))
-    if not (np.isfinite(frequency) and frequency > 0):
+    if not 0 < frequency < np.inf:
         raise ArgumentError(f"omega must be a positive number of rad/s, got {omega}")
     instruments = None if reference is None else getattr(reference, "magnitude", reference)
     if method == "iv" and reference is None:
         raise ArgumentError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')
     table = phasor_table(to_si(D, "length", "D"), to_si(F, "force", "F"), direction, instruments)
-    return estimate_table(table, frequency, method, RlmSettings(norm or "huber"))
+    return estimate_table(table, frequency, method, settings)
+
+
+def method_of(name: str) -> tuple[str, RlmSettings]:
+    """Method and norm of a name such as "rlm:tukey"; refused before anything is computed where one is not known."""
+    method, _, norm = name.partition(":")
+    if method not in METHODS:
+        raise ArgumentError(unknown_name("method", method, METHODS))
+    if norm and method != "rlm":
+        raise ArgumentError(f'norm={norm!r} belongs to method="rlm", not to {method!r}')
+    return method, RlmSettings(norm or "huber")
 
 
 def estimate_table(
     table: PhasorTable,
     omega: float,
     method: str,
-    rlm_settings: RlmSettings | None = None,
+    rlm_settings: RlmSettings = _HUBER,
     reference: DynamicStiffness | None = None,
 ) -> DynamicStiffness:
-    """As `estimate_dynamic_stiffness`, for a table that is already checked and scaled.
-
-    How windows and runs scatter is a matter of the records, not of a method: where a `known` estimate of the same
-    windows has it, its covariance stands.
-    """
-    if method not in METHODS:
-        raise ArgumentError(unknown_name("method", method, METHODS))
-    settings = replace(rlm_settings or RlmSettings(), quick=reference is not None)
+    """As `estimate_dynamic_stiffness`, of a table; how windows and runs scatter a `reference` estimate knows better."""
+    settings = replace(rlm_settings, quick=reference is not None)
     name = f"rlm:{settings.norm}" if method == "rlm" else method
     obstacles = _obstacles(table, method)
     if obstacles:
@@ -168,9 +170,8 @@ def _mm_eiv(table: PhasorTable, settings: RlmSettings) -> tuple[TableFit, Phasor
 def instrumental_fit(table: PhasorTable) -> tuple[TableFit, PhasorTable]:
     """Robust instrumental variables: reference channels against noise on the displacements.
 
-    All four measured phasors are regressed, robustly and jointly, on the two references; the noise of D then sits on
-    the left-hand side, where it does no harm: H = B_F B_D^-1. The table is that of what the references explain of D,
-    with F - h D as it was.
+    All four measured phasors are regressed, robustly and jointly, on the two references: H = B_F B_D^-1. The table is
+    that of what the references explain of D, with F - h D as it was.
     """
     if table.reference is None:
         raise ArgumentError('method "iv" needs reference phasors (n, 2), for instance the actuators\' command')

@@ -9,6 +9,7 @@ from rigdata.vector import zero_uncertainty
 from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.conditions import merged
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.estimators.estimate import method_of
 from tpjb_ident.identification.campaign_blocks import unstated
 from tpjb_ident.identification.campaign_solution import solve_campaign
 from tpjb_ident.identification.identify_bands import identify_bands
@@ -77,7 +78,8 @@ def identify(
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     report = progress or (lambda text, done, total: None)
     settings = _with_mains(replace(chosen, method=method or chosen.method), campaign)
-    dry = dry_test(campaign, settings.phasors, SOLVED if settings.method == "iv" else settings.method.partition(":")[0])
+    single, _ = method_of(settings.method)
+    dry = dry_test(campaign, settings.phasors, SOLVED if single == "iv" else single)
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
     bands = None
     if any(is_broadband(run) for run in runs):

@@ -7,9 +7,8 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.conditions import Condition, holding, merged
-from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions
+from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, method_of
 from tpjb_ident.estimators.r_matrix import phasor_table
-from tpjb_ident.estimators.rlm import RlmSettings
 from tpjb_ident.estimators.solved_windows import not_locked
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.campaign_solution import CampaignSolution
@@ -211,19 +210,16 @@ def all_methods(
     solved: dict[str, DynamicStiffness],
     reference: DynamicStiffness | None,
 ) -> dict[str, DynamicStiffness]:
-    """Every method that was asked for and applies, the default one in any case; those of `solved` are there already.
-
-    `known`: the solve of the campaign, whose scatter is that of all methods.
-    """
+    """Every method that was asked for and applies; those of `solved` are there, scatter is that of the `reference`."""
     drive = _nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
     estimates: dict[str, DynamicStiffness] = {}
     for name in dict.fromkeys((*settings.methods, settings.method)):
-        method, _, norm = name.partition(":")
+        method, norm = method_of(name)
         if name in solved:
             estimates[name] = solved[name]
         elif method != "iv" or drive is not None or settings.method == "iv":
-            estimates[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"), reference)
+            estimates[name] = estimate_table(table, data.omega, method, norm, reference)
     return estimates
 
 

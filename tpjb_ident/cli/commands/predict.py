@@ -65,7 +65,7 @@ def predict(
     state = f"{bad} did NOT converge" if bad else "all converged"
     c.print(f"{drawing.name}: {counted(len(frame), 'operating point')}, {state}.")
     c.next("export", c.target, "--to", "ross")
-    c.show_frame(drawing.name, frame, f"{POINT} {DIRECT} min_film_m", "prediction.csv")
+    c.show_frame(drawing.name, frame, f"{POINT} {DIRECT} min_film_m status", "prediction.csv")
     if bad:  # whether the bearing carries the load at all
         c.next("predict", bearing, "--load", load, "--speed", speed, "--pivots", "rigid", "--thermal", "isothermal")
         raise NotTrustedError(
@@ -92,7 +92,7 @@ def _predicted(c: Command, bearing: Bearing, points: list[OperatingPoint], setti
             rows = predict_points(bearing, points, settings, show)
     import pandas as pd
 
-    return pd.DataFrame(rows).drop(columns="pivot_extrapolated")
+    return pd.DataFrame(rows)
 
 
 def parse_physics(names: str | None, housing: str | None) -> Options:
