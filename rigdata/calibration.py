@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.units import (
+    LISTED,
     ZERO_CELSIUS,
     UnitError,
     is_bridge_ratio,
@@ -122,17 +123,7 @@ NO_RESPONSE = ChannelResponse()
 
 
 #: Dimension (key of `rigdata.units.SI_UNITS`) of what each quantity of a manifest measures.
-DIMENSIONS = {
-    "displacement": "length",
-    "force": "force",
-    "acceleration": "acceleration",
-    "temperature": "temperature difference",
-    "pressure": "pressure",
-    "speed": "speed",
-    "time": "time",
-}
-#: Quantities of which only the course counts, not the size: their readings stay as they are.
-UNCALIBRATED = ("command", "keyphasor")
+DIMENSIONS: dict[str, str] = LISTED["quantities"]
 #: Quantities with a direction in the bearing's plane.
 VECTOR_QUANTITIES = ("displacement", "force", "acceleration")
 #: Loggers write readings of this size and more for an overflow.

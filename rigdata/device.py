@@ -50,7 +50,7 @@ class Grid:
 
     length: int
     clock: str = ""  #: names the times; "" where they are counted, or there are none
-    rate: float = float("nan")  #: of the times [Hz]
+    rate: float = np.nan  #: of the times [Hz]
     label: str = ""
     begin: float = 0.0  #: first time [s]; NaN where it is missing
     times: int | None = None  #: of a time column that should serve it but has not its length
@@ -66,10 +66,10 @@ def rate_of_time(time: FloatArray) -> float:
     finite = time[np.isfinite(time)]
     span = min(1000, len(finite) // 4) or len(finite) - 1
     if span < 1:
-        return float("nan")
+        return np.nan
     step = float(np.median(finite[span:] - finite[:-span])) / span
     # Ten digits: as much as a column of rounded times holds; keeps 1000 Hz from being 999.9999999999.
-    return float(f"{1.0 / step:.10g}") if step > 0 else float("nan")
+    return float(f"{1.0 / step:.10g}") if step > 0 else np.nan
 
 
 def timed_grid(length: int, clock: str, time: FloatArray, label: str, stated: float | None) -> Grid:
@@ -113,7 +113,7 @@ def planned(
             others = max((grid.length for grid in shared), default=usual)
             faults[name] = f"has {timing.length} samples and no times, the others have {others}"
         else:
-            grids.setdefault((usual, ""), Grid(usual, "", run_rate or float("nan"))).channels.append(name)
+            grids.setdefault((usual, ""), Grid(usual, "", run_rate or np.nan)).channels.append(name)
     for name, rate in rates.items():
         faults[name] = _add_stated(grids, channels, name, timings[name].length, rate)
     return tuple(_own_first(grids.values(), channels)), {name: text for name, text in faults.items() if text}

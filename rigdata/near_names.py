@@ -18,8 +18,5 @@ def hint(name: object, choices: Iterable[str], listed: str = "Known:", cutoff: f
 
 
 def unknown_name(kind: str, name: object, choices: Iterable[str]) -> str:
-    """The refusal of a name that a registry does not hold, with the nearest one and all there are."""
-    names = list(choices)
-    near = nearest_name(name, names)
-    question = f"; did you mean {near!r}?" if near else ""
-    return f"unknown {kind} {name!r}{question} Known: {', '.join(names)}"
+    """The refusal of a name that a registry does not hold, with the nearest one, or all there are."""
+    return f"unknown {kind} {name!r}. {hint(name, choices)}"

@@ -24,10 +24,12 @@ ZERO_CELSIUS = 273.15
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?(?![0-9.,])")
 _TOKEN = re.compile(r"\s*(?:([A-Za-z_Ω%]{1,24})(?:(?:\^|\*\*)?([+-]?[1-6]))?(?![0-9])|([*/()])|(1)(?![0-9]))")
 _MAX_UNIT = 48
-_LISTED: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
+LISTED: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 #: SI unit of every dimension.
-SI_UNITS: dict[str, str] = _LISTED["si"]
-_SPELLINGS = str.maketrans(_LISTED["spellings"])
+SI_UNITS: dict[str, str] = LISTED["si"]
+#: Seconds of what loggers count times in.
+TIME_FACTORS: dict[str, float] = LISTED["times"]
+_SPELLINGS = str.maketrans(LISTED["spellings"])
 _DASHES = str.maketrans("\u2212\u2013", "--")  # a minus as word processors write it
 
 
@@ -56,7 +58,7 @@ class Unit:
 def common_units() -> dict[str, Unit]:
     """Units that need no pint, by name."""
     units = {}
-    for dimension, factors in _LISTED["common"].items():
+    for dimension, factors in LISTED["common"].items():
         powers = []
         for base in dimension.split():
             name, _, power = base.partition("^")
@@ -123,7 +125,7 @@ def _product(pieces: Iterator[re.Match[str]], text: str, dimension: str) -> Unit
             continue
         factor = _product(pieces, text, dimension) if symbol else Unit(1.0)
         if name:
-            aliases = _LISTED["aliases"]["any"] | _LISTED["aliases"].get(dimension, {})
+            aliases = LISTED["aliases"]["any"] | LISTED["aliases"].get(dimension, {})
             factor = _base(aliases.get(name, name)) ** int(power or 1)
             if dimension == "speed" and name in {"Hz", "kHz"}:  # of a shaft or a vibration: cycles
                 factor *= _base("revolution") ** int(power or 1)
@@ -148,7 +150,7 @@ def unit_factor(unit: str, dimension: str) -> float:
 
 
 def _example(dimension: str) -> str:
-    return str(_LISTED["examples"].get(dimension, SI_UNITS[dimension]))
+    return str(LISTED["examples"].get(dimension, SI_UNITS[dimension]))
 
 
 def split_quantity(value: object, dimension: str) -> tuple[float, str]:

@@ -13,10 +13,19 @@ import h5py
 import numpy as np
 import pytest
 
+from rigdata.readers.base import RecordFile
+from rigdata.readers.file_reader import read_contents
+from rigdata.readers.series import Series
+
 Columns = Mapping[str, Any]
 #: Channels that are sampled together: their times [s], and unit and values by name.
 Group = tuple[np.ndarray, Mapping[str, tuple[str, Any]]]
 _SEPARATORS = {"\t": "Tab", ",": "Comma", ";": "Semicolon"}
+
+
+def read_series(path: Path, file: str) -> list[Series]:
+    """Read every channel of a file without a manifest, each at its own times."""
+    return list(read_contents(RecordFile(path, file)).series)
 
 
 def write_columns(path: Path, columns: Columns) -> None:

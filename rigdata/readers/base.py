@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
@@ -30,18 +31,8 @@ SAMPLE = 8
 LEAST_RATE, MOST_RATE = 1e-6, 1e12
 #: Text in any national spelling.
 TEXT = (".csv", ".txt", ".asc", ".dat", ".tsv")
-#: Suffix -> module of `rigdata.readers`, its function, and the extra that brings its library.
-FORMATS = {
-    ".tdms": ("formats.loggers", "read_tdms", "tdms"),
-    ".lvm": ("text.lvm", "read_lvm", ""),
-    ".uff": ("formats.loggers", "read_uff", "uff"),
-    ".unv": ("formats.loggers", "read_uff", "uff"),
-    ".58": ("formats.loggers", "read_uff", "uff"),
-    ".mf4": ("formats.loggers", "read_mdf", "mdf"),
-    ".mdf": ("formats.loggers", "read_mdf", "mdf"),
-    ".mat": ("formats.mat", "read_mat", ""),
-    ".parquet": ("formats.loggers", "read_parquet", ""),
-}
+#: Module of `rigdata.readers`, its function, and the extra that brings its library, by suffix.
+FORMATS: dict[str, list[str]] = tomllib.loads(Path(__file__).with_name("formats.toml").read_text(encoding="utf-8"))
 #: Factors that differ by less are rounded ones of one unit.
 _SAME = 1e-3
 #: Longer texts are remarks.

@@ -18,11 +18,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.device import Grid, timed_grid
+from rigdata.device import RATE_MISS, Grid, timed_grid
 from rigdata.near_names import hint
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import FORMATS, Layout, RecordFile, RunReader, suffix_hint
-from rigdata.readers.series import SAME_STEP, Contents, Series, is_time, table, with_unique_names
+from rigdata.readers.series import SAME_STEP, Contents, is_time, table, with_unique_names
+from rigdata.units import TIME_FACTORS
 
 #: Larger files of a logger's format are rejected: they are read whole [bytes].
 LARGEST = 2**31
@@ -61,11 +62,6 @@ class ReadingCache:
     def nbytes(self) -> int:
         """Memory taken by all columns [bytes]."""
         return sum(int(getattr(value, "nbytes", 0)) for value in self._entries.values())
-
-
-def read_series(path: Path, file: str) -> list[Series]:
-    """Read every channel of a file without a manifest, each at its own times."""
-    return list(read_contents(RecordFile(path, file)).series)
 
 
 def read_contents(record: RecordFile) -> Contents:
@@ -157,6 +153,7 @@ class FileReader(RunReader):
                 if len(times) > _MOST_TIMES:
                     raise self.refuse("", f"has more than {_MOST_TIMES} different times", "Split the run")
                 grid = timed_grid(len(channel), clock, times[clock], channel.group, self.stated_rate)
+                self._refuse_other_unit(contents.clocks, grid.rate)
                 label = grid.label if is_time(grid.label) else f"{grid.rate:.6g} Hz"
                 timings[channel.name] = replace(grid, label=label)
         remedy = "Export it with its times, or correct sample_rate"
@@ -167,6 +164,17 @@ class FileReader(RunReader):
         values = {channel.name: channel.values for channel in series}
         units = {channel.name: channel.unit for channel in series}
         return _Columns(layout.grids, faults, values, times, units, contents.unread, contents.problems)
+
+    def _refuse_other_unit(self, clocks: Mapping[str, str], rate: float) -> None:
+        """Refuse times of no stated unit that miss the stated rate by what another unit differs from a second."""
+        ratio = (self.stated_rate or 0.0) / rate
+        others = {*TIME_FACTORS.values()} - {1.0}
+        if not any(clocks.values()) and any(abs(ratio * other - 1.0) <= RATE_MISS for other in others):
+            raise self.refuse(
+                f"column {', '.join(clocks)}",
+                f"its times, taken for seconds, make {rate:.4g} Hz, sample_rate is {self.stated_rate:g} Hz",
+                'State their unit: [channels.NAME] with quantity = "time", or give the run its own sample_rate',
+            )
 
     def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
         return self._layout().times[clock][start:stop].copy()

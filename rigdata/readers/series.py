@@ -17,6 +17,7 @@ from rigdata.calibration import OVERFLOW, Channels
 from rigdata.device import RATE_MISS, rate_of_time
 from rigdata.problem import Problem
 from rigdata.readers.base import RecordFile
+from rigdata.units import TIME_FACTORS
 
 #: Longer channels are in a file without a name, and are read from there in pieces [bytes].
 IN_MEMORY = 2**23
@@ -24,12 +25,10 @@ _WORDS = (
     r"date[ /_-]*time|date and time|datum[ /_+-]*(?:und )?(?:uhr)?zeit|time|zeit(?:stempel)?|temps|tempo|tiempo|uhrzeit"
     r"|timestamps?|elapsed ?time|relative ?time"
 )
-#: Seconds of what loggers count times in.
-TIME_FACTORS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 _UNITS = "|".join(TIME_FACTORS)
 # a lone t is a time, T and T1 are thermometers
 _TIME = re.compile(rf"(?:(?i:{_WORDS})\b|t\s*[\[(]|(?:(?i:{_WORDS})|t)(?:_(?:{_UNITS}))?$)")
-_TIME_UNIT = re.compile(rf"(?:[\[(]\s*|_)({_UNITS})\s*[\])]?$")
+_TIME_UNIT = re.compile(rf"[\[(/,\s_]({_UNITS})\s*[\])]?$")
 #: Two clocks whose samples differ by this share of a step count as one.
 SAME_STEP = 0.01
 
@@ -63,7 +62,7 @@ class Series:
     @property
     def rate(self) -> float:
         """Nominal sample rate [Hz]; NaN if the file knows no times."""
-        return float("nan") if self.time is None else rate_of_time(self.time)
+        return np.nan if self.time is None else rate_of_time(self.time)
 
 
 @dataclass(frozen=True)
@@ -156,10 +155,11 @@ def time_columns(names: Sequence[str], channels: Channels) -> list[int]:
 
 def serving(names: Sequence[str], clocks: Sequence[int], channels: Channels) -> list[int | None]:
     """Place of every column's time column: of the clock that it states, else the nearest without one to its left."""
+    stated = {name: channel.clock for name, channel in channels.items()}
     letters: dict[str, int] = {}
     plain: list[int] = []
     for i in clocks:
-        letter = _letter(names[i], channels)
+        letter = stated.get(names[i])
         if letter:
             letters[letter] = i
         else:
@@ -168,12 +168,8 @@ def serving(names: Sequence[str], clocks: Sequence[int], channels: Channels) -> 
     served: list[int | None] = []
     for i, name in enumerate(names):
         nearest = i if i in plain else nearest
-        served.append(letters.get(_letter(name, channels), nearest))
+        served.append(letters.get(stated.get(name, ""), nearest))
     return served
-
-
-def _letter(name: str, channels: Channels) -> str:
-    return channels[name].clock if name in channels else ""
 
 
 def table(contents: Contents, record: RecordFile) -> Contents:

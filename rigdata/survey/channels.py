@@ -16,6 +16,7 @@ from rigdata.units import UnitError, is_signal, parse_quantity, parse_unit
 
 #: Tables of `words.toml`.
 WORDS: dict[str, dict[str, str]] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+_SPELLINGS = str.maketrans(WORDS["spellings"])
 #: Units that a name may end with after an underscore; V, H and A there are directions and numbers of sensors.
 _SUFFIXES = "um|mm|mils?|k?N|lbf|m_s2|m/s2|mps2|g|deg[CF]|rpm|Hz|mV|bar|k?Pa|MPa|psi"
 _UNIT_IN_NAME = re.compile(rf"^(.*?)(?:\s*[(\[]([^)\]]{{1,12}})[)\]]|_({_SUFFIXES}))\s*$")
@@ -78,8 +79,7 @@ def guess_channel(name: str, unit: str) -> ChannelGuess:
 
 def usable_unit(unit: str) -> str:
     """Write a logger's unit so that a manifest can hold it; "" if it is none."""
-    text = unit.strip().replace("°", "deg").replace("µ", "u").replace("μ", "u").replace("²", "2")
-    text = re.sub(r"\s*/\s*", "/", text)
+    text = re.sub(r"\s*/\s*", "/", unit.strip().translate(_SPELLINGS))
     text = WORDS["units"].get(text.lower(), text)
     try:
         parse_unit(text)

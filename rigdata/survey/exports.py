@@ -10,10 +10,11 @@ from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import FORMATS, TEXT, RecordFile, suffix_hint
 from rigdata.readers.file_reader import read_contents
-from rigdata.readers.series import TIME_FACTORS, Series, with_unique_names
+from rigdata.readers.series import Series, with_unique_names
 from rigdata.readers.text.head import find_head
 from rigdata.safe_path import inside
 from rigdata.survey.channels import Entry, Tables
+from rigdata.units import TIME_FACTORS
 
 _MOST_FILES = 5000
 #: Slower records of a whole folder are none of a turning shaft [Hz].
@@ -37,7 +38,7 @@ class Export:
     @property
     def rate(self) -> float:
         """Rate of the fastest channel [Hz]; NaN if the file knows no times."""
-        return max((s.rate for s in self.series if s.rate > 0), default=float("nan"))
+        return max((s.rate for s in self.series if s.rate > 0), default=np.nan)
 
 
 def record_files(folder: Path) -> list[Path]:
@@ -86,7 +87,7 @@ def in_seconds(exports: Sequence[Export], described: Tables) -> tuple[list[Expor
     Nobody records a rig slower than the shaft turns: times that would say so are thousandths or millionths.
     """
     unstated = [export for export in exports if not export.states_times]
-    rate = max((export.rate for export in unstated), default=float("nan"))
+    rate = max((export.rate for export in unstated), default=np.nan)
     units = {name: Entry(stated, "file") for export in exports for name, stated in export.clocks.items()}
     open_ = {name for export in unstated for name in export.clocks}
     typed = {described[name].get("unit") for name in open_ if name in described}

@@ -22,8 +22,6 @@ _MOSTLY, _DRIVEN = 0.5, 0.05
 _BLOCK = 0.25
 #: How far a line may lie from a frequency that is stated or known, as a share.
 NEAR = 0.02
-#: Units of a tachometer, in Hz.
-_TURNS = {"rpm": 1.0 / 60.0, "Hz": 1.0, "1/s": 1.0, "rad/s": 1.0 / (2.0 * math.pi)}
 #: A number and what may be its unit in a file's name; a sign behind a letter is a hyphen.
 _NUMBER = r"(?<![\d.,])((?<![a-z0-9])[-+])?(\d+(?:[.,]\d+)?)[ _]?"
 
@@ -113,10 +111,9 @@ def _load_of(stem: str) -> tuple[Entry, str]:
 def _speed(export: Export, channels: Guesses, stem: str) -> Entry:
     """Shaft speed [Hz] by a tachometer in engineering units, else by the file's name."""
     for series in of_quantity(export, channels, "speed"):
-        guess = channels[series.name]
-        factor = _TURNS.get(guess.unit, guess.gain / (2.0 * math.pi))
+        factor = channels[series.name].gain / (2.0 * math.pi)
         good = series.values[np.isfinite(series.values)]
-        mean = float(np.median(good)) * factor if len(good) and math.isfinite(factor) else 0.0
+        mean = float(np.median(good)) * factor if len(good) else 0.0
         if mean > 0:
             return Entry(mean, "records", f"{mean:.4g} Hz by {series.name}")
     turns = _numbers_before(stem, r"rpm|u[-_]?min|1[-_]min")

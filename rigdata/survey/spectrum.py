@@ -51,7 +51,7 @@ def look_at(values: FloatArray, rate: float) -> Look:
     finite = values[good]
     empty = np.empty(0)
     if not len(finite):
-        nan = float("nan")
+        nan = np.nan
         return Look(len(values), len(values), nan, nan, nan, nan, empty, empty)
     frequency, amplitude = amplitude_spectrum(values, rate)
     return Look(

@@ -25,7 +25,7 @@ def test_every_combination_in_any_unit():
 def test_what_is_wrong_is_named():
     with pytest.raises(UnitError, match="points: load"):
         points_of({"load": U.Quantity(5, "m"), "speed": 138.0, "excitation": 157.0})
-    with pytest.raises(ArgumentError, match="did you mean 'speed'"):
+    with pytest.raises(ArgumentError, match="Did you mean 'speed'"):
         points_of({"load": 5000.0, "sped": 138.0, "excitation": 157.0})
     with pytest.raises(ArgumentError, match="excitation is missing"):
         points_of({"load": 5000.0, "speed": 138.0})

@@ -131,9 +131,9 @@ def test_missing_windows_keep_their_place_in_the_weights():
 def test_arguments_are_checked():
     D, F, label, _ = sample(11)
     assert set(SOLVERS) == set(METHODS)
-    with pytest.raises(ValueError, match="did you mean 'mm-eiv'"):
+    with pytest.raises(ValueError, match="Did you mean 'mm-eiv'"):
         estimate_dynamic_stiffness(D, F, OMEGA, label, method="mm-eif")
-    with pytest.raises(ValueError, match="did you mean 'huber'"):
+    with pytest.raises(ValueError, match="Did you mean 'huber'"):
         estimate_dynamic_stiffness(D, F, OMEGA, label, method="rlm", norm="hubert")
     with pytest.raises(ValueError, match="belongs to"):
         estimate_dynamic_stiffness(D, F, OMEGA, label, norm="huber")

@@ -104,7 +104,7 @@ def read(path: Path) -> str:
     """Read a file as whoever opens it would; what it is answered with."""
     from rigdata import load_campaign
     from rigdata.problem import RigDataError
-    from rigdata.readers.file_reader import read_series
+    from tests.foreign_files import read_series
 
     try:
         if path.suffix == ".h5":

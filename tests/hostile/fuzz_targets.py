@@ -182,7 +182,7 @@ def hdf5_target(folder: Path) -> Target:
 def foreign_target(folder: Path, suffix: str) -> Target:
     """One of the other loggers' formats."""
     from rigdata.problem import RigDataError
-    from rigdata.readers.file_reader import read_series
+    from tests.foreign_files import read_series
 
     path = folder / ("fuzzed.mat" if suffix == ".mat73" else f"fuzzed{suffix}")
     seed = folder / f"seed{suffix}"

@@ -12,8 +12,9 @@ import pytest
 from rigdata import load_campaign
 from rigdata.problem import RigDataError
 from rigdata.readers import base
-from rigdata.readers.file_reader import FileReader, read_series
+from rigdata.readers.file_reader import FileReader
 from rigdata.readers.series import Contents, Series
+from tests.foreign_files import read_series
 from tests.hostile import claims
 from tests.manifests import PROBES, manifest
 

@@ -10,8 +10,8 @@ from scipy.io import savemat
 
 from rigdata.problem import RigDataError
 from rigdata.readers import base
-from rigdata.readers.file_reader import read_series
 from rigdata.readers.formats.mat import check_mat5
+from tests.foreign_files import read_series
 
 TIME = np.arange(120) / 100.0
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from rigdata.problem import RigDataError
-from rigdata.readers.file_reader import read_series
 from rigdata.readers.formats import sandbox
 from rigdata.readers.series import Series
+from tests.foreign_files import read_series
 
 DAMAGED = Path(__file__).parent / "damaged"
 

@@ -16,7 +16,7 @@ from model.pivots import load_pivots
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from rigdata.readers.base import FORMATS
-from rigdata.readers.file_reader import read_series
+from tests.foreign_files import read_series
 from tests.manifests import PROBE, manifest, write_files, write_hdf5
 
 pytestmark = pytest.mark.slow

@@ -28,7 +28,7 @@ def test_the_amplitude_is_held_against_the_clearance_of_the_campaigns_bearing():
 
 
 def test_an_unknown_method_is_refused_before_anything_is_computed():
-    with pytest.raises(ValueError, match=r"identify: unknown method 'mm-eib'; did you mean 'mm-eiv'"):
+    with pytest.raises(ValueError, match=r"identify: unknown method 'mm-eib'\. Did you mean 'mm-eiv'"):
         ti.identify(DEMO, method="mm-eib", progress=pytest.fail)
 
 

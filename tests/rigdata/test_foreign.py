@@ -12,9 +12,9 @@ from scipy.io import savemat
 from rigdata import RigDataError, load_campaign
 from rigdata.readers import series
 from rigdata.readers.base import FORMATS
-from rigdata.readers.file_reader import FileReader, ReadingCache, read_series
+from rigdata.readers.file_reader import FileReader, ReadingCache
 from rigdata.readers.series import Contents, Series, equidistant, is_time, seconds, with_unique_names
-from tests.foreign_files import write_columns, write_data_set, write_groups, write_mat73
+from tests.foreign_files import read_series, write_columns, write_data_set, write_groups, write_mat73
 from tests.manifests import PROBE, SET_POINT, manifest, write_files
 from tpjb_ident.check.campaign import check_campaign
 

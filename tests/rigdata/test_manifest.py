@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from rigdata.calibration import DIMENSIONS, UNCALIBRATED
+from rigdata.calibration import DIMENSIONS
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, RUN, SHAFT
 from rigdata.manifest.manifest import MAX_MANIFEST, parse_manifest
 from rigdata.operating_point import ROTATIONS
@@ -232,7 +232,7 @@ def test_every_key_is_in_the_docs(checkout):
 def test_choices_of_the_table_are_those_of_the_code():
     choices = {field.key: tuple(field.choices) for field in (*SHAFT, *CHANNEL)}
     assert choices["rotation"] == ROTATIONS
-    assert choices["quantity"] == (*DIMENSIONS, *UNCALIBRATED, "ignore")
+    assert choices["quantity"] == (*DIMENSIONS, "command", "keyphasor", "ignore")
 
 
 @pytest.mark.parametrize("field", [f for f in CHANNEL + RUN + HOUSING + ACQUISITION if f.kind in SI_UNITS])

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from rigdata import RigDataError, load_campaign
-from rigdata.readers.file_reader import read_series
 from rigdata.readers.text.cells import stamp_seconds
 from rigdata.survey.exports import read_export
-from tests.foreign_files import lvm_text
+from tests.foreign_files import lvm_text, read_series
 from tests.manifests import PROBE, SET_POINT, manifest, write_files
 
 RATE, COUNT = 1000.0, 400

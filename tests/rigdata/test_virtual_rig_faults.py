@@ -154,7 +154,7 @@ def test_missing_values_are_nan_in_every_layout(campaign_of, layout):
 @pytest.mark.parametrize(
     ("fault", "layout", "says"),
     [
-        ({"kind": "swaped", "channel": "X1A", "other": "X1B"}, "", "did you mean 'swapped'"),
+        ({"kind": "swaped", "channel": "X1A", "other": "X1B"}, "", "Did you mean 'swapped'"),
         ({"kind": "dead"}, "", "needs channel"),
         ({"kind": "scaled", "channel": "X1A"}, "", "needs value"),
         ({"kind": "duplicate_run"}, "", "needs other"),

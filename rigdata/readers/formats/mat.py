@@ -19,7 +19,7 @@ from rigdata.readers.base import SAMPLE, refuse_claim
 from rigdata.readers.hdf5.guards import claimed_bytes, foreign_filters
 from rigdata.readers.series import Series, equidistant, is_time
 
-_RATES = ("fs", "sample_rate", "samplerate", "sample_rate_hz", "abtastrate")
+_RATES = re.compile(r"fs|sample_?rate|sample_rate_hz|abtastrate")
 #: Variables that name the columns of a matrix, and state their units.
 _NAMES = re.compile(r"name|label|header|kanal|channel|signal|voie|column")
 _UNITS = re.compile(r"unit|einheit|unite")
@@ -29,7 +29,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HEADER = 128
 #: Types of elements: variables, names, whole numbers, numbers of any size, and texts on top of these.
 _MATRIX, _COMPRESSED, _NAME, _WHOLE = frozenset({14}), 15, frozenset({1}), frozenset({5})
-_NUMBERS = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13})
+_NUMBERS = frozenset({*range(1, 8), 9, 12, 13})
 _TEXTS = _NUMBERS | {16, 17, 18}
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 4, 5, 16, 17
 _DEEPEST_ELEMENT = 32
@@ -65,7 +65,7 @@ def read_mat(path: Path) -> list[Series]:
         fault = f"holds no vector of at least {_SHORTEST} numbers, only {names}"
         raise refuse(path.name, "", fault, "Save the channels as vectors, or as a matrix")
     timed = {len(values) for name, values in vectors.items() if is_time(_last_part(name))}
-    rates = [value for name, value in scalars.items() if value > 0 and _last_part(name).lower() in _RATES]
+    rates = [value for name, value in scalars.items() if value > 0 and _RATES.fullmatch(_last_part(name).lower())]
     series = []
     for name, values in vectors.items():
         is_counted = rates and len(values) not in timed

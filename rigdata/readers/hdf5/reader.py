@@ -212,7 +212,7 @@ class Hdf5Reader(RunReader):
                 timings[name] = timed[same[0]] if same else Grid(lengths[name], times=lengths[names[i]])
         remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
         layout = self._planned(timings, run_rate, "dataset", remedy)
-        unserved = Grid(max(lengths.values()), "", run_rate or float("nan"))
+        unserved = Grid(max(lengths.values()), "", run_rate or np.nan)
         return _Members(layout.grids or (unserved,), layout.faults, members)
 
     def _seconds(self, group: Any, clock: str, start: int, stop: int) -> FloatArray:

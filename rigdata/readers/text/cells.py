@@ -24,6 +24,7 @@ _BOMS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+_MINUS = "\u2212"
 _ASCII = bytes(range(128)) + b"\x7f" * 128
 
 
@@ -87,9 +88,9 @@ def number_blocks(path: Path, encoding: str, delimiter: str) -> Iterator[bytes]:
             is_end = not block
             if decoder is not None:
                 block = decoder.decode(block, final=is_end).encode("utf-8", "replace")
-            text = begun_line + block.translate(_ASCII)
+            text = begun_line + block
             end = len(text) if is_end else (text.rfind(b"\n") + 1 or text.rfind(b"\r") + 1)
-            lines, begun_line = text[:end], text[end:]
+            lines, begun_line = text[:end].replace(_MINUS.encode(), b"-").translate(_ASCII), text[end:]
             if delimiter == " ":
                 trimmed = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", lines)
                 lines = re.sub(rb"[ \t]+", b"\t", trimmed)
@@ -101,7 +102,7 @@ def number_blocks(path: Path, encoding: str, delimiter: str) -> Iterator[bytes]:
                 raise pa.ArrowInvalid(f"a line is longer than {BLOCK >> 20} MB")
 
 
-_CLOCK = r"(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9}))?"
+_CLOCK = r"(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9}))?(?:\s?([AaPp])\.?[Mm]\.?)?"
 _ZONE = r"(?:\s?(?:Z|UTC|[+-]\d{2}:?\d{2}))?"
 #: Year first (ISO 8601), day first with points, day or month first with slashes, no date.
 _ISO = r"(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ]\s?"
@@ -110,6 +111,7 @@ _DATE = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[./]\d{1,2}[./]\d{4}")
 _DAY = 86400.0
 #: Ways in which loggers and spreadsheets write "no value".
 _MISSING_WORDS = """
+    n.a. n/v n.v. k.A. #NULL! #REF! #BEZUG! #NUM! #ZAHL! #NAME? ***** ******
     NaN nan NAN -NaN -nan -nan(ind) - -- --- ---- ----- * *** ? NA N/A n/a #N/A #NA #NV #VALUE! #WERT! #DIV/0!
     null NULL None none 1.#QNAN -1.#QNAN 1.#IND -1.#IND 1.#INF -1.#INF 1,#QNAN -1,#QNAN 1,#IND -1,#IND 1,#INF
     -1,#INF 1.#R OVL +OVL -OVL OL +OL -OL OVER OVERLOAD OVERFLOW Overflow INVALID Invalid ERR inf -inf +inf Inf
@@ -117,7 +119,9 @@ _MISSING_WORDS = """
 """
 MISSING = dict.fromkeys(["", *_MISSING_WORDS.split()])
 _NUMBER = {
-    mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
+    mark: re.compile(
+        rf"[+{_MINUS}-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?"
+    )
     for mark in ".,"
 }
 
@@ -164,12 +168,13 @@ def stamp_seconds(cells: Sequence[str | None]) -> tuple[FloatArray, int]:
 
 def _seconds(match: re.Match[str], days: dict[str, float]) -> float:
     """Seconds of a stamp; `days` holds those at which each date began."""
-    *date, hour, minute, second, fraction = match.groups()
+    *date, hour, minute, second, fraction, half = match.groups()
+    hours = int(hour) if not half else int(hour) % 12 + 12 * (half in "Pp")
     start = 0.0
     if any(date):
         text = "/".join(filter(None, date))
         if text not in days:
-            days[text] = float("nan")
+            days[text] = np.nan
             year, month, day = (int(part) for part in (date[:3] if date[0] else date[:2:-1]))
             for month_and_day in ((day, month), (month, day)):  # as it is written; where that is none, month first
                 with contextlib.suppress(ValueError):
@@ -177,7 +182,7 @@ def _seconds(match: re.Match[str], days: dict[str, float]) -> float:
         # counted from the first day: seconds since 1970 would cost the digits below a microsecond
         start = days[text] - next(iter(days.values()))
     fraction_seconds = float(f"0.{fraction}") if fraction else 0.0
-    return start + 3600.0 * int(hour) + 60.0 * int(minute) + int(second) + fraction_seconds
+    return start + 3600.0 * hours + 60.0 * int(minute) + int(second) + fraction_seconds
 
 
 def _spread(time: FloatArray) -> FloatArray:

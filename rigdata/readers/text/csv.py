@@ -11,7 +11,7 @@ from rigdata.arrays import FloatArray
 from rigdata.calibration import OVERFLOW
 from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_SAMPLES, RecordFile
-from rigdata.readers.series import Contents, GrowingChannel, Series, is_time, time_columns
+from rigdata.readers.series import Contents, GrowingChannel, Series, is_time, serving, time_columns
 from rigdata.readers.text.cells import (
     BLOCK,
     MISSING,
@@ -44,11 +44,20 @@ def read_text(record: RecordFile) -> Contents:
     if not channels:
         places = [i for i in range(len(names)) if i not in head.dates]
     columns, problems = read_table(head, places)
-    whole = length = len(columns[places[0]])
-    # spreadsheets write lines at the end that hold not even a time
-    while clocks and length and all(np.isnan(column[length - 1]) for column in columns.values()):
+    length = len(columns[places[0]])
+    timing = clocks if {*serving(names, clocks, channels)} == {*clocks} else places
+    # spreadsheets write lines at the end that hold no time, blank or of means and extremes
+    while clocks and length > 1 and all(np.isnan(columns[i][length - 1]) for i in timing):
         length -= 1
-    length = length or whole
+    if any(np.isfinite(column[length:]).any() for column in columns.values()):
+        problems += (
+            head.record.problem(
+                "warning",
+                f"line {head.data_line + length} and on",
+                "the last lines hold values and no time; taken without them",
+                "Nothing, if they are statistics",
+            ),
+        )
     if len(clocks) == 1:
         _check_times(head, clocks[0], columns[clocks[0]][:length])
     units = ["s" if i in head.stamps else unit for i, unit in enumerate(head.units)]
@@ -70,7 +79,7 @@ def _check_times(head: Head, clock: int, times: FloatArray) -> None:
         raise head.record.refuse(place, "holds no times", "Set its quantity to ignore")
     back = np.flatnonzero(np.diff(times[usable]) < 0)
     if len(back):
-        before, after = usable[back[0]], usable[back[0] + 1]
+        before, after = usable[back[0] : back[0] + 2]
         fault = f"time runs backwards ({times[before]:g}, then {times[after]:g})"
         raise head.record.refuse(f"line {head.data_line + int(after)}, {place}", fault, "Sort or split the run")
 
@@ -154,7 +163,7 @@ def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, 
                     if not numbers:
                         column, is_sound = _to_numbers(column, head.decimal)
                         bad |= set() if is_sound else {i}
-                    filled = pc.fill_null(column.cast(pa.float64()), float("nan"))
+                    filled = pc.fill_null(column.cast(pa.float64()), np.nan)
                     # `to_numpy` would import pandas in every worker
                     values = np.frombuffer(filled.buffers()[1], np.float64, len(filled), 8 * filled.offset)
                     numeric[i].write(values.tobytes())

@@ -31,7 +31,8 @@ from rigdata.readers.text.cells import (
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$")
 _RATE_TEXT = re.compile(r"\s+(?:\d+\s*)?-.*$")  # "Time  1 - default sample rate"
-_BRACKETS = re.compile(r"\s*[\[(].*[\])]\s*$")
+#: "X1A [V]", "X1A / V", "X1A, V": what follows a channel's name.
+_BEHIND = re.compile(r"\s*[\[(/,]\s*(.*?)[\])]?\s*$")
 #: Lines that are looked at to find the decimal mark and the columns of times of day.
 _SAMPLE = 200
 _MAX_UNIT_LINES = 5
@@ -69,6 +70,7 @@ class _NamesLine:
     line: int
     delimiter: str
     names: tuple[str, ...]
+    cells: tuple[str, ...]  #: as they are written, with units
     matched: int = 0  #: channels of the manifest among them
 
 
@@ -147,16 +149,16 @@ class _HeadFinder:
             if not any(name in self.lines[number] for name in self.channels):
                 continue
             for delimiter in delimiters:
-                names = []
-                for cell in split_line(self.lines[number], delimiter):
-                    short = _BRACKETS.sub("", cell)  # "X1A [V]" counts as X1A where the manifest knows only that
+                names, written = [], split_line(self.lines[number], delimiter)
+                for cell in written:
+                    short = _BEHIND.sub("", cell)  # "X1A [V]" counts as X1A where the manifest knows only that
                     names.append(short if cell not in self.channels and short in self.channels else cell)
                 matched = len(self.channels.intersection(names))
                 below = self.lines[number + 1 : number + 2 + _MAX_UNIT_LINES]
                 cells = itertools.chain.from_iterable(split_line(line, delimiter) for line in below)
                 rank = (matched, any(map(looks_like, cells)))
                 if matched and rank > best_rank:
-                    best, best_rank = _NamesLine(number + 1, delimiter, tuple(names), matched), rank
+                    best, best_rank = _NamesLine(number + 1, delimiter, tuple(names), tuple(written), matched), rank
             if best_rank == (len(self.channels), True):
                 break
         return best
@@ -173,7 +175,7 @@ class _HeadFinder:
         if not best:
             raise self._refuse(0, "no table of numbers begins in its first lines", "Is it a record?")
         if self.spec.names:
-            return _NamesLine(first, best, self.spec.names), first
+            return _NamesLine(first, best, self.spec.names, self.spec.names), first
         header, names = 0, [f"column{i + 1}" for i in range(width)]
         for number in range(first, max(first - 5, 0), -1):
             cells = split_line(self.lines[number - 1], best)
@@ -181,7 +183,7 @@ class _HeadFinder:
                 header, names = number, [*cells, ""][:width]
             elif cells:
                 break
-        return _NamesLine(header, best, tuple(names)), first
+        return _NamesLine(header, best, tuple(names), tuple(names)), first
 
     def _table_start(self, delimiter: str) -> tuple[int, int]:
         """First line of the first run of lines of numbers, and how many columns they have: 0 without any."""
@@ -240,9 +242,10 @@ class _HeadFinder:
             below = split_line(self.lines[line - 1], header.delimiter)
         units = []
         for i, name in enumerate(names):
-            bracket = _UNIT.search(name)
+            cell = "".join(header.cells[i : i + 1])
+            bracket = (_UNIT if cell == name else _BEHIND).search(cell)
             text = bracket[1] if bracket else "".join(below[i : i + 1])
-            units.append(text.strip().strip("[]()"))
+            units.append(text.strip("[]() "))
         return tuple(units)
 
 

@@ -92,7 +92,7 @@ class _LvmFile(io.TextIOBase):
         try:
             return float(cell.replace(self.decimal, "."))
         except ValueError:
-            return float("nan")
+            return np.nan
 
     def _cells(self, line: str) -> list[str]:
         return [cell.strip() for cell in line.split(self.separator)]
