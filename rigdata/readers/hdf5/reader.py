@@ -79,6 +79,10 @@ def _first_line(error: BaseException) -> str:
     return "it is cut off before its end" if "truncated file" in text else text[:160]
 
 
+#: Attributes by which writers turn stored counts into numbers.
+_SCALES = {"scale_factor", "scale", "gain", "slope"}
+
+
 @dataclass(frozen=True)
 class _Members(Layout):
     """What every request needs, cached until the file changes."""
@@ -153,6 +157,8 @@ class Hdf5Reader(RunReader):
             fault = "is not a dataset"
         elif dataset.dtype.kind not in "fiu" or dataset.ndim != 1:
             fault = f"has type {dataset.dtype} and shape {dataset.shape}, not 1-D numbers"
+        elif dataset.dtype.kind in "iu" and (scales := _SCALES.intersection(dataset.attrs)):
+            fault = f"holds counts, and its attribute {min(scales)} is not applied"
         elif dataset.shape[0] > MAX_SAMPLES:
             fault = f"claims {dataset.shape[0]} samples"
         elif dataset.is_virtual or dataset.external:
@@ -162,7 +168,7 @@ class Hdf5Reader(RunReader):
         elif chunk_bytes(dataset) > _MAX_CHUNK:
             fault = f"has chunks of {dataset.chunks[0]} samples"
         if fault:
-            remedy = "Store one 1-D dataset of numbers per channel in this file, packed by gzip at most"
+            remedy = "Store one 1-D dataset of physical numbers per channel in this file, packed by gzip at most"
             raise self.refuse(f"dataset {name}", fault, remedy)
         if _GROUP in self.opened_members:
             self.opened_members[name] = dataset

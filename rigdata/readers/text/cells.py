@@ -75,8 +75,7 @@ def number_blocks(path: Path, encoding: str, delimiter: str) -> Iterator[bytes]:
     """Whole lines of a text file in blocks for pyarrow: ASCII, runs of blanks that part cells a tab.
 
     Numbers, delimiters and line ends are ASCII; every other character has become DEL, since pyarrow takes all text
-    for UTF-8. It is given bytes, not a stream of Python's: its threads hold a stream beyond the last line, and let go
-    of it while the interpreter ends, which aborts the program.
+    for UTF-8. Its threads would hold a stream of Python's while the interpreter ends, which aborts the program.
     """
     import pyarrow as pa
 

@@ -50,14 +50,8 @@ def read_text(record: RecordFile) -> Contents:
     while clocks and length > 1 and all(np.isnan(columns[i][length - 1]) for i in timing):
         length -= 1
     if any(np.isfinite(column[length:]).any() for column in columns.values()):
-        problems += (
-            head.record.problem(
-                "warning",
-                f"line {head.data_line + length} and on",
-                "the last lines hold values and no time; taken without them",
-                "Nothing, if they are statistics",
-            ),
-        )
+        place, fault = f"line {head.data_line + length} and on", "values without a time; taken without these lines"
+        problems += (record.problem("warning", place, fault, "Nothing, if they are statistics"),)
     if len(clocks) == 1:
         _check_times(head, clocks[0], columns[clocks[0]][:length])
     units = ["s" if i in head.stamps else unit for i, unit in enumerate(head.units)]

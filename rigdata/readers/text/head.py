@@ -38,7 +38,6 @@ _SAMPLE = 200
 _MAX_UNIT_LINES = 5
 #: So many lines in a row must be numbers for a table to begin.
 _TABLE_LINES = 3
-_AGAIN = "Export the run again"
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ class _HeadFinder:
 
     def find(self) -> Head:
         if not any(map(str.strip, self.lines)):
-            raise self._refuse(0, f"holds no text, or no line ends within the first {HEAD >> 10} kB", _AGAIN)
+            raise self._refuse(0, f"no line of text ends within its first {HEAD >> 10} kB", "Export the run again")
         if self.channels and not self.spec.names:
             header = self._header_by_channels()
             first = self._first_sample(header)
@@ -106,8 +105,6 @@ class _HeadFinder:
         lines = (split_line(line, header.delimiter) for line in self.lines[first : first + _SAMPLE])
         sample = [cells for cells in lines if cells]
         cells = list(itertools.chain.from_iterable(sample))
-        if not any(looks_like(cell) or cell in MISSING for cell in cells):
-            raise self._refuse(header.line, "no samples follow the names", _AGAIN)
         decimal = self._decimal(cells)
         names = self._names_of_all_cells(header, sample)
         return Head(
