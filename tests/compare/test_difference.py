@@ -78,6 +78,13 @@ def test_sentences_name_the_largest_change_and_points_without_a_partner():
     first, *more = difference_sentences(apart)
     assert first == "a and b have no operating point in common."
     assert more[-1].startswith("Without a partner: a: 5 kN at -90°, shaft at 22 Hz (1320 rpm), 25 Hz; b: 6 kN")
+    more_points = side("b", TRUE)
+    both = pd.concat([more_points.coefficients.assign(static_load_N=load) for load in (6000.0, 7000.0)])
+    *_, last = difference_sentences(
+        difference_of(side("a", TRUE), replace(more_points, coefficients=both.reset_index(drop=True)))
+    )
+    assert last.count("b: ") == 1
+    assert "; b: 6 kN at -90°, shaft at 22 Hz (1320 rpm), 25 Hz; 7 kN at -90°" in last
     other = side("b", TRUE)
     mirrored = replace(other, coefficients=other.coefficients.assign(rotation="clockwise"))
     *_, last = difference_sentences(difference_of(side("a", TRUE), mirrored))

@@ -139,7 +139,8 @@ def _same_instrument(name: str, a: Side, b: Side) -> bool:
 
 def _alone(side: Side, used: IntArray) -> list[str]:
     alone = side.coefficients.drop(index=side.coefficients.index[used])
-    return [f"{side.name}: {point}" for point in described(alone)]
+    first, *others = described(alone) or [""]
+    return [f"{side.name}: {first}", *others] if first else []
 
 
 def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.DataFrame:
@@ -274,7 +275,7 @@ def difference_sentences(difference: Difference) -> tuple[str, ...]:
         is_static = difference.a.coefficients.empty and difference.b.coefficients.empty
         return sentences if is_static else (f"{a} and {b} have no operating point in common.", *sentences)
     head = f"From {a} to {b} {yes} of {number} coefficients changed beyond what both intervals allow"
-    rest = f"{no} are the same within {100 * _NO_CHANGE:g} %"
+    rest = f"{no} coefficients are the same within {100 * _NO_CHANGE:g} %"
     rest += f", of {number - yes - no} the records cannot tell." if number > yes + no else "."
     return (
         f"{head}, most of all {_largest_change(points)}." if yes else f"{head}.",

@@ -39,7 +39,7 @@ def write_watch_page(
     points = [p for p in snapshot.measured.points if not lacking(p)]
     page = Page(
         title=f"{snapshot.campaign.id}: while it is measured",
-        subtitle=f"{landed} of {len(snapshot.states)} runs have landed, {snapshot.count('repeat')} to be repeated, "
+        subtitle=f"{landed} of {len(snapshot.states)} runs are recorded, {snapshot.count('repeat')} to be repeated, "
         f"{snapshot.count('to run')} to run",
         answer=answer,
         more=more,

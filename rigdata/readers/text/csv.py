@@ -75,7 +75,11 @@ def _check_times(head: Head, clock: int, times: FloatArray) -> None:
     if len(back):
         before, after = usable[back[0] : back[0] + 2]
         fault = f"time runs backwards ({times[before]:g}, then {times[after]:g})"
-        raise head.record.refuse(f"line {head.data_line + int(after)}, {place}", fault, "Sort or split the run")
+        raise head.record.refuse(
+            f"line {head.data_line + int(after)}, {place}",
+            fault,
+            "Sort or split the run; where a clock was set back, export seconds",
+        )
 
 
 def read_table(head: Head, places: Sequence[int]) -> tuple[dict[int, FloatArray], tuple[Problem, ...]]:
