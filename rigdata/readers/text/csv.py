@@ -76,9 +76,7 @@ def _check_times(head: Head, clock: int, times: FloatArray) -> None:
         before, after = usable[back[0] : back[0] + 2]
         fault = f"time runs backwards ({times[before]:g}, then {times[after]:g})"
         raise head.record.refuse(
-            f"line {head.data_line + int(after)}, {place}",
-            fault,
-            "Sort or split the run; where a clock was set back, export seconds",
+            f"line {head.data_line + int(after)}, {place}", fault, "Sort, split, or export seconds"
         )
 
 
