@@ -168,8 +168,8 @@ class FileReader(RunReader):
     def _refuse_other_unit(self, clocks: Mapping[str, str], rate: float) -> None:
         """Refuse times of no stated unit that miss the stated rate by what another unit differs from a second."""
         ratio = (self.stated_rate or 0.0) / rate
-        others = {*TIME_FACTORS.values()} - {1.0}
-        if not any(clocks.values()) and any(abs(ratio * other - 1.0) <= RATE_MISS for other in others):
+        slips = (abs(ratio * factor - 1.0) <= RATE_MISS for factor in {*TIME_FACTORS.values()} - {1.0})
+        if not any(clocks.values()) and any(slips):
             raise self.refuse(
                 f"column {', '.join(clocks)}",
                 f"its times, taken for seconds, make {rate:.4g} Hz, sample_rate is {self.stated_rate:g} Hz",

@@ -80,7 +80,7 @@ def _first_line(error: BaseException) -> str:
 
 
 #: Attributes by which writers turn stored counts into numbers.
-_SCALES = {"scale_factor", "scale", "gain", "slope"}
+_SCALES = {"scale_factor", "scale", "gain"}
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,6 @@ _BOMS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-_MINUS = "\u2212"
 _ASCII = bytes(range(128)) + b"\x7f" * 128
 
 
@@ -89,7 +88,9 @@ def number_blocks(path: Path, encoding: str, delimiter: str) -> Iterator[bytes]:
                 block = decoder.decode(block, final=is_end).encode("utf-8", "replace")
             text = begun_line + block
             end = len(text) if is_end else (text.rfind(b"\n") + 1 or text.rfind(b"\r") + 1)
-            lines, begun_line = text[:end].replace(_MINUS.encode(), b"-").translate(_ASCII), text[end:]
+            lines, begun_line = text[:end], text[end:]
+            if not lines.isascii():
+                lines = lines.replace(b"\xe2\x88\x92", b"-").translate(_ASCII)  # the sign of U+2212
             if delimiter == " ":
                 trimmed = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", lines)
                 lines = re.sub(rb"[ \t]+", b"\t", trimmed)
@@ -118,9 +119,7 @@ _MISSING_WORDS = """
 """
 MISSING = dict.fromkeys(["", *_MISSING_WORDS.split()])
 _NUMBER = {
-    mark: re.compile(
-        rf"[+{_MINUS}-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?"
-    )
+    mark: re.compile(rf"[+−-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
     for mark in ".,"
 }
 

@@ -50,8 +50,10 @@ def read_text(record: RecordFile) -> Contents:
     while clocks and length > 1 and all(np.isnan(columns[i][length - 1]) for i in timing):
         length -= 1
     if any(np.isfinite(column[length:]).any() for column in columns.values()):
-        place, fault = f"line {head.data_line + length} and on", "values without a time; taken without these lines"
-        problems += (record.problem("warning", place, fault, "Nothing, if they are statistics"),)
+        fault = "values without a time; taken without these lines"
+        problems += (
+            record.problem("warning", f"line {head.data_line + length} and on", fault, "Are they statistics?"),
+        )
     if len(clocks) == 1:
         _check_times(head, clocks[0], columns[clocks[0]][:length])
     units = ["s" if i in head.stamps else unit for i, unit in enumerate(head.units)]
