@@ -44,6 +44,9 @@ _SWINGING = 0.3
 _EVEN = 1e-6
 #: Share to which a film whose heat follows is known, where only the sign of a determinant is asked for.
 _TOLD = 1e-4
+#: So many times the load at its fold no attitude carries that comes back from there: those carry less than the fold. A
+#: curve is of a coarse mesh and of oil that enters fresh.
+_BEYOND_FOLD = 2.0
 
 
 class Search:
@@ -273,12 +276,19 @@ class Search:
         return self._ended(code, memory)
 
     def _leave_unstable(self) -> bool:
-        """Move pads off attitudes that nothing holds, the part of a curve that comes back from its fold."""
+        """Move pads off attitudes that nothing holds, the part of a curve that comes back from its fold.
+
+        That is flatter than the fold and carries less. Pivots behind the middle of their arc have deep films that are
+        flatter too; what these carry tells them, without the heat that follows.
+        """
         moved = False
         for pad, film, curve in zip(self.pads.view(np.recarray), self.films, self.stack.curves, strict=True):
             if not pad.solved or not is_doubtful(self.case, pad, curve):
                 continue
             stiffness = pad.stiffness
+            deep = 0.0 < _BEYOND_FOLD * pad.attitudes[3, 0] < pad.force[0]
+            if deep and is_stable(self.case, pad, curve, stiffness):
+                continue
             if self.case.thermal in (ALONE, COUPLED):  # the temperature follows, and that is known
                 wedge = (float(pad.clearance), *pad.wedge.tolist())
                 stiffness = stiffness + heat_impedance(film.grid, film.work, wedge, self.running, 0.0, _TOLD).real

@@ -14,6 +14,7 @@ from model.measured_pivot import FormulaPivot, MeasuredPivot
 from model.pad.pivot import OTHER, compliance, deflection
 from model.pivots import RIGID_PIVOT, ScaledPivot, ask_laws, constant_pivot, encoded, formula_pivot
 from model.predict import predict
+from model.statics import search
 
 CURVE = MeasuredPivot(np.array([0.0, 500.0, 2000.0, 6000.0]), np.array([0.0, 2e-6, 5e-6, 1e-5]))
 
@@ -96,3 +97,15 @@ def test_a_pad_near_its_fold_that_only_a_frozen_film_calls_unstable_carries(sphe
     near = [predict(bearing, s * load, **point).position for s in (0.998, 1.002)]
     np.testing.assert_allclose(0.5 * (near[0] + near[1]), p.position, rtol=2e-3, atol=1e-12)
     assert 0.0 < float(np.hypot(*(near[1] - near[0]))) < 1e-6
+
+
+def test_a_loaded_pad_whose_pivot_is_behind_the_middle_is_in_no_doubt(rocker, monkeypatch):
+    # its wedge is flatter than that of its fold, as is what comes back from there; but that carries less than the fold
+    def asked(*arguments):
+        raise AssertionError("asked whether a pad is stable that carries many times the load at its fold")
+
+    monkeypatch.setattr(search, "heat_impedance", asked)
+    behind = rocker.with_pads(tuple(replace(pad, pivot_offset=0.6) for pad in rocker.pads))
+    p = predict(behind, 8000.0, -math.pi / 2, 2 * math.pi * 60, pivots="rigid")
+    assert p.converged, p.status
+    assert p.idle_pads == ()
