@@ -10,6 +10,7 @@ from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
 from tpjb_ident.diagnosis.verdict.held_out import HeldOut, Touched, held_out_gap
+from tpjb_ident.diagnosis.verdict.rules import look_alikes
 
 
 def held_out(before):
@@ -90,3 +91,11 @@ def test_how_a_tolerance_bends_is_no_gap_of_an_effect(contradicted):
     (touched,) = held_out_gap(run, fit).touched
     assert touched.unseen
     assert (touched.remaining > DiagnoseSettings().halved ** 2) == contradicted
+
+
+def test_a_group_of_look_alikes_begins_with_the_effect_that_is_listed():
+    # the most probable model need not hold the likeliest name: others stand beside that
+    model = SimpleNamespace(names=frozenset({"oil_viscosity"}), has_terms=False)
+    judgement = look_alikes(model, held_out(2.0), ("supply_temperature", "oil_viscosity", "viscosity_law"))
+    assert judgement.name == "ambiguous"
+    assert judgement.family == ("oil_viscosity", "supply_temperature", "viscosity_law")

@@ -54,7 +54,7 @@ def _of_model(
     if not comparison.is_tenable(model):
         return Judgement("unexplained", held, (_untenable(model),))
     if model.names != sure:
-        return _look_alikes(model, held, _family(comparison, sure, settings))
+        return look_alikes(model, held, _family(comparison, sure, settings))
     return _named(model, held, settings)
 
 
@@ -87,11 +87,13 @@ def _family(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSett
     return ()
 
 
-def _look_alikes(model: Fit, held: HeldOut, family: tuple[str, ...]) -> Judgement:
+def look_alikes(model: Fit, held: HeldOut, family: tuple[str, ...]) -> Judgement:
+    """The most probable model with what a campaign cannot tell from it, which sentences count from the second on."""
     if not family or model.has_terms:
         reason = "no effect, and no group of three, reaches the probability that a name takes"
         return Judgement("unexplained", held, (reason,))
-    return Judgement("ambiguous", held, (_shrunk(held),), family)
+    listed_first = tuple(sorted(family, key=lambda name: name not in model.names))
+    return Judgement("ambiguous", held, (_shrunk(held),), listed_first)
 
 
 def _named(model: Fit, held: HeldOut, settings: DiagnoseSettings) -> Judgement:
