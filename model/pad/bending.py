@@ -81,7 +81,7 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
         coarser.append(np.kron(corners, across[2]))
         flux.append(project @ solid.flux)
     shapes = _softest_shapes(compliance, area)
-    amplitudes = (shapes * area[:, None]).T
+    amplitudes = np.ascontiguousarray((shapes * area[:, None]).T)  # a search is compiled for one order of it
     return PadDeformation(
         compliance=compliance,
         gather=gather,
