@@ -1,7 +1,9 @@
 """The command line in this process, for tests that are not about its start-up."""
 
+import contextlib
 import functools
 import os
+from collections.abc import Iterator
 from typing import Any
 from unittest import mock
 
@@ -15,13 +17,27 @@ if (builder := getattr(typer.testing, "_get_command", None)) is not None:
     typer.testing._get_command = functools.cache(builder)
 
 
-def tpjb(*words: Any, app: typer.Typer = app, cores: int = 1) -> Any:
+#: Commands that draw, which need the pictures' module anyway.
+DRAWING = ("show", "pivot", "locus", "compare", "demo", "diagnose", "plan", "watch")
+
+
+@contextlib.contextmanager
+def coarse_pictures() -> Iterator[None]:
+    """Pictures of a quarter of the resolution, for tests that do not look at them: a third of a report's time."""
+    from tpjb_ident.report import figure
+
+    with mock.patch.object(figure, "_PNG_DPI", 40):
+        yield
+
+
+def tpjb(*words: Any, app: typer.Typer = app, cores: int = 1, sharp: bool = False) -> Any:
     """Run `tpjb words`, or another program of commands; its output, in long lines, exit code and exception.
 
     One core, unless more are asked for: a job beside the command would load everything once more, and the other core is
-    busy with other tests.
+    busy with other tests. Pictures are coarse unless they are to be `sharp`.
     """
-    with mock.patch.object(os, "sched_getaffinity", return_value=set(range(cores)), create=True):
+    coarse = coarse_pictures() if words[0] in DRAWING and not sharp else contextlib.nullcontext()
+    with coarse, mock.patch.object(os, "sched_getaffinity", return_value=set(range(cores)), create=True):
         return typer.testing.CliRunner(env={"COLUMNS": "400"}).invoke(app, [str(word) for word in words])
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import ended
+from tests.installed_wheel import shipped
 
 pytestmark = pytest.mark.slow
 
@@ -48,11 +48,9 @@ OVERFLOW = """
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory):
+def report(session_folder):
     """Report of `tpjb demo`."""
-    out = tmp_path_factory.mktemp("report") / "demo"
-    ended(0, "demo", "--quiet", "--out", out)
-    return out / "report.html"
+    return shipped(session_folder).report
 
 
 def test_it_renders_without_errors_and_loads_nothing(chromium, report):

@@ -19,7 +19,6 @@ from rigdata.campaign import load_campaign
 from tests.command_line import ended, tpjb
 from tpjb_ident.cli.commands.predict import parse_physics
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.report import figure
 from tpjb_ident.runtime import executors
 
 COMMANDS = ("check", "identify", "pivot", "locus", "predict", "compare", "diagnose", "plan", "verify",
@@ -192,7 +191,7 @@ COMPARE = ("--pivots", "rigid, kirk, measured", "--thermal", "isothermal")
 @pytest.fixture(scope="module")
 def compared(small_campaign, tmp_path_factory):
     out = tmp_path_factory.mktemp("compare") / "out"
-    return tpjb("compare", small_campaign, *COMPARE, "--out", out, cores=2), out
+    return tpjb("compare", small_campaign, *COMPARE, "--out", out, cores=2, sharp=True), out
 
 
 @pytest.mark.slow
@@ -317,8 +316,7 @@ def test_a_pipe_is_refused_not_waited_for(command, tmp_path):
 
 
 @pytest.mark.slow
-def test_plan_tells_floor_and_look_alikes_of_a_thin_campaign(rocker_file, tmp_path, monkeypatch):
-    monkeypatch.setattr(figure, "_PNG_DPI", 40)  # six matrices as sharp pictures would take longer than the plan
+def test_plan_tells_floor_and_look_alikes_of_a_thin_campaign(rocker_file, tmp_path):
     result = ended(
         0, "plan", rocker_file, "--load", "5 kN", "--excitation", "25 Hz", "--locus", 0, "--no-dry", "--push", 0,
         "--no-temperatures", "--data-sets", "--out", tmp_path / "out",

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import tpjb_ident as ti
+from tests.command_line import coarse_pictures
 from tests.structure.sources import ROOT, texts
 from tests.structure.test_docstrings import definitions, handed_on
 
@@ -54,7 +55,7 @@ def computed_once():
 
         return answer
 
-    with pytest.MonkeyPatch.context() as patch:
+    with coarse_pictures(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(identify, "identify", once(identify.identify))
         patch.setattr(comparison, "compare_campaign", once(comparison.compare_campaign))
         shared = once(campaign.diagnose_campaign)
