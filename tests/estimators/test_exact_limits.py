@@ -13,7 +13,6 @@ from tpjb_ident.estimate.statistics import (
     trimming_limits,
     trimming_weight,
 )
-from tpjb_ident.estimators.mm import mm_fit
 from tpjb_ident.estimators.r_matrix import real_rows
 from tpjb_ident.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
 
@@ -93,19 +92,3 @@ def test_rlm_of_two_axes_keeps_places_weights_and_freedom():
     np.testing.assert_array_equal(fit.covariance[np.ix_(rows, rows)], own.covariance)
     np.testing.assert_array_equal(fit.covariance[np.ix_(rows, [0, 1, 4, 5])], 0.0)
     np.testing.assert_array_equal(fit.h[1], own.params[:2] + 1j * own.params[2:])
-
-
-def test_mm_solves_its_own_estimating_equation():
-    """At the answer the weighted residuals are orthogonal to the regressors, and distances are those of the scatter."""
-    rng = np.random.default_rng(16)
-    X = complex_normal(rng, 60, 2)
-    Y = X @ H.T + 0.1 * complex_normal(rng, 60, 2)
-    Y[:15] += 5.0
-    fit = mm_fit(X, Y, np.repeat(np.arange(6), 10))
-    residual = Y - X @ fit.coefficients.T
-    equation = (fit.weights[:, None] * residual).T @ X.conj()
-    np.testing.assert_allclose(equation, 0.0, atol=1e-9)
-    own = 2 * np.einsum("na,ab,nb->n", residual.conj(), np.linalg.inv(fit.scatter), residual).real
-    np.testing.assert_allclose(fit.weights, bisquare_weight(np.sqrt(own), efficiency_constant(4)), atol=1e-9)
-    np.testing.assert_array_equal(fit.weights[:15], 0.0)
-    assert fit.conditions == ()

@@ -243,17 +243,6 @@ def test_excitations_outside_the_band_are_refused(frequencies):
     assert "harmonic 2" not in [n for n, _ in lines_of(known_lines((230.0,), 22.0, 1000.0))]
 
 
-def test_columns_are_phasors_and_a_straight_drift():
-    time = 3.0 + np.arange(400) / 1000.0
-    design = line_design(time, np.array([20.0, 35.0]))
-    z = np.array([1.0 - 2.0j, 0.5j])
-    wave = sum((a * np.exp(2j * np.pi * f * time)).real for a, f in zip(z, (20.0, 35.0), strict=True))
-    coefficients = np.array([z[0].real, z[0].imag, z[1].real, z[1].imag, 7.0, -3.0])
-    np.testing.assert_allclose(design @ coefficients, wave + 7.0 - 3.0 * np.linspace(-1, 1, 400), atol=1e-12)
-    assert line_design(time, np.array([20.0]), drift_order=0).shape == (400, 3)
-    assert np.isfinite(line_design(time[:1], np.array([20.0]))).all()
-
-
 def test_inflation_is_the_variance_of_a_phasor_over_that_of_the_line_alone():
     """One line over whole cycles: one; a neighbour half a beat away: from the Gram matrix of both."""
     for alone in ([20.0], [25.0, 20.0]):

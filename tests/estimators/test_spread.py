@@ -9,7 +9,7 @@ from tests.phasors.phasor_cases import H, complex_normal, windows
 from tests.seeds import first_quick
 from tpjb_ident.estimate.window_means import LOCKED, aligned
 from tpjb_ident.estimators.estimate import estimate_table
-from tpjb_ident.estimators.least_trimmed import Regression, distance2, evenly_chosen, robust_start
+from tpjb_ident.estimators.least_trimmed import Regression, evenly_chosen, robust_start
 from tpjb_ident.estimators.mm import mm_fit
 from tpjb_ident.estimators.r_matrix import complex_to_real_covariance, displacement_condition
 
@@ -28,29 +28,6 @@ def test_condition_is_the_ratio_of_the_axes():
     assert displacement_condition(np.array([[3.0, 0.0], [0.0, 1.0j]]), np.array([1.0, 9.0])) == pytest.approx(1.0)
     assert displacement_condition(np.array([[3.0, 1.0]])) == np.inf
     assert displacement_condition(np.array([[3.0, 1.0], [6.0, 2.0]])) == np.inf
-
-
-@pytest.mark.parametrize("q", [1, 2, 3])
-def test_sums_over_windows_are_those_of_matrices(q):
-    """Fits, scatters and distances of many weightings at once, each as a plain formula says."""
-    rng = np.random.default_rng(q)
-    X, Y = complex_normal(rng, 20, 2), complex_normal(rng, 20, q)
-    weights = rng.uniform(0, 1, (3, 20))
-    regression = Regression(X, Y)
-    fits = regression.fit(weights)
-    left = regression.residual(fits)
-    found = regression.scatter(left, weights)
-    far = distance2(left, found)
-    for k in range(3):
-        root = np.sqrt(weights[k])[:, None]
-        np.testing.assert_allclose(fits[k], np.linalg.lstsq(root * X, root * Y, rcond=None)[0].T, rtol=1e-9)
-        residual = Y - X @ fits[k].T
-        np.testing.assert_allclose(left[k], residual.T)
-        own = (weights[k][:, None] * residual).T @ residual.conj() / weights[k].sum()
-        np.testing.assert_allclose(found[k], own, rtol=1e-9, atol=1e-14)
-        by_hand = 2 * np.einsum("na,ab,nb->n", residual.conj(), np.linalg.inv(own), residual).real
-        np.testing.assert_allclose(far[k], by_hand, rtol=1e-7)
-    np.testing.assert_allclose(regression.scatter(Y.T, np.ones(20)), Y.T @ Y.conj() / 20, rtol=1e-9)
 
 
 def test_a_share_of_every_direction_is_looked_at():

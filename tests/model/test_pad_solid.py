@@ -11,8 +11,6 @@ import pytest
 from model.bearing import STEEL, Bearing, Material, Oil, Pad, Pivot
 from model.pad import operators as operators_module
 from model.pad import store as pad_store
-from model.pad.block_cholesky import SlabMatrix, factor, forward, solve
-from model.pad.line import Line, graded
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, pivot_face, sector_mesh
 from model.pad.operators import conduct, pad_operators
 from tests.pad_responses import PadResponse, pad_solid
@@ -49,76 +47,6 @@ def film_pressure(body: PadResponse) -> np.ndarray:
     return 3e6 * np.sin(np.pi * s)[:, None] * (1.0 - z**2)
 
 
-class TestLine:
-    def test_reproduces_polynomials_of_its_degree(self) -> None:
-        for degree in (1, 2, 3):
-            line = Line(np.array([0.0, 0.3, 1.0, 1.1]), degree)
-            x = np.linspace(0.0, 1.1, 37)
-            nodal = line.nodes**degree
-            np.testing.assert_allclose(line.tabulate(x) @ nodal, x**degree, atol=1e-13)
-            np.testing.assert_allclose(line.tabulate(x, 1) @ nodal, degree * x ** (degree - 1), atol=1e-12)
-
-    def test_matrix_integrates(self) -> None:
-        line = Line(np.array([1.0, 1.5, 3.0]))
-        f, g = line.nodes**2, line.nodes
-        weight = line.gauss[0]
-        assert f @ line.matrix(1, 0, weight) @ g == pytest.approx(2 * (3.0**4 - 1.0) / 4)
-
-    def test_rejects_what_is_no_line(self) -> None:
-        with pytest.raises(ValueError, match="strictly increasing"):
-            Line(np.array([0.0, 0.0, 1.0]))
-
-    def test_graded_meets_both_ends(self) -> None:
-        breaks = graded(2.0, 3.0, 7, 0.1, 0.01)
-        sizes = np.diff(breaks)
-        assert breaks[0] == 2.0
-        assert breaks[-1] == 3.0
-        assert sizes[0] == pytest.approx(0.1)
-        assert sizes[-1] == pytest.approx(0.01)
-
-    def test_graded_falls_back_to_equal_elements(self) -> None:
-        np.testing.assert_allclose(np.diff(graded(0.0, 1.0, 4, 5.0, 5.0)), 0.25)
-
-
-class TestBlockCholesky:
-    @staticmethod
-    def slabs(degree: int = 2) -> tuple[np.ndarray, SlabMatrix]:
-        """A sum of two Kronecker products on three elements, some of it held, and the same written out."""
-        rng = np.random.default_rng(20)
-        n, m = 3 * degree + 1, 4
-        arcs, sections = np.zeros((2, n, n)), rng.normal(size=(2, m, m))
-        for start in range(0, n - 1, degree):
-            arcs[:, start : start + degree + 1, start : start + degree + 1] += rng.normal(size=(2, degree + 1, 1))
-        arcs, sections = arcs + arcs.swapaxes(1, 2), sections + sections.swapaxes(1, 2)
-        arcs[1] += 30.0 * np.eye(n)
-        sections[1] += 10.0 * np.eye(m)
-        held = rng.random((n, m)) < 0.2
-        free = ~held.ravel()
-        dense = np.kron(arcs[0], sections[0]) + np.kron(arcs[1], sections[1])
-        return np.where(np.outer(free, free), dense, np.diag(~free)), SlabMatrix(arcs, sections, held, degree)
-
-    @pytest.mark.parametrize("degree", [1, 2, 3])
-    def test_solves_as_dense_algebra_does(self, degree: int) -> None:
-        dense, matrix = self.slabs(degree)
-        rhs = np.random.default_rng(1).normal(size=(len(matrix.held), 4, 3))
-        expected = np.linalg.solve(dense, rhs.reshape(-1, 3))
-        np.testing.assert_allclose(solve(matrix, rhs).reshape(-1, 3), expected, rtol=1e-12)
-
-    def test_growing_right_hand_sides(self) -> None:
-        dense, matrix = self.slabs()
-        unit = np.eye(len(dense))[:, ::4]
-        rhs = [np.array(unit[4 * at.start : 4 * at.stop, : at.stop], order="F") for at in matrix.elements]
-        y = np.zeros(unit.shape)
-        for at, block in zip(matrix.elements, forward(factor(matrix), rhs), strict=True):
-            y[4 * at.start : 4 * at.stop, : at.stop] = block
-        np.testing.assert_allclose(y.T @ y, np.linalg.inv(dense)[::4, ::4], rtol=1e-10)
-
-    def test_says_when_not_positive_definite(self) -> None:
-        matrix = SlabMatrix(np.ones((1, 1, 1)), -np.eye(2)[None], np.zeros((1, 2), dtype=bool), 1)
-        with pytest.raises(np.linalg.LinAlgError):
-            solve(matrix, np.ones((1, 2, 1)))
-
-
 class TestCompliance:
     @pytest.mark.parametrize("full", [False, True])
     def test_work_is_symmetric_and_never_negative(self, full: bool) -> None:
@@ -142,26 +70,6 @@ class TestCompliance:
         mirrored = full.bend(p[:, ::-1])
         np.testing.assert_allclose(got, mirrored[:, ::-1], rtol=1e-10, atol=1e-12 * got.max())
         assert got[0, -1] > 1.2 * got[0, 0]
-
-    def test_pad_is_mirror_symmetric_about_a_central_pivot(self) -> None:
-        body = solid()
-        p = film_pressure(body)
-        np.testing.assert_allclose(body.bend(p[::-1])[::-1], body.bend(p), rtol=1e-9)
-
-    def test_pressure_opens_the_pad(self) -> None:
-        u = solid().bend(film_pressure(solid()))
-        assert u.min() > 0.0
-        assert u[0, 0] > 2.0 * u[12, 0]
-        assert u[-1, 0] > 2.0 * u[12, 0]
-
-    def test_stiffer_pads_bend_less(self) -> None:
-        soft = film_pressure(solid())
-        hard = dataclasses.replace(
-            PAD,
-            backing=dataclasses.replace(STEEL, youngs_modulus=412e9),
-            babbitt=dataclasses.replace(PAD.babbitt, youngs_modulus=80e9),
-        )
-        np.testing.assert_allclose(solid(hard).bend(soft), 0.5 * solid().bend(soft), rtol=1e-9)
 
     def test_film_grid_hardly_matters(self) -> None:
         fine, coarse = solid(n_theta=49, n_z=13), solid(n_theta=25, n_z=7)
@@ -221,17 +129,6 @@ class TestHeat:
         assert total == pytest.approx(2.0 * heat.sum() * 5.0, rel=1e-9)
         assert body.pad_temperature(rise)[2].max() <= rise.max() * 1.01
 
-    def test_hot_lining_flattens_the_pad(self) -> None:
-        plain = solid(dataclasses.replace(PAD, babbitt=STEEL)).expand(np.ones((25, 7)))
-        lined = solid().expand(np.ones((25, 7)))
-        assert lined[0, 0] - lined[12, 0] > plain[0, 0] - plain[12, 0] + 0.1e-6
-
-    def test_pad_thickens_over_the_pivot(self) -> None:
-        """By alpha t per kelvin if free; by (1 + nu) / (1 - nu) times that where the face holds it sideways."""
-        pad = dataclasses.replace(PAD, babbitt=STEEL, back_convection=0.0)
-        grow = solid(pad).expand(np.ones((25, 7)))
-        assert 12e-6 * 16e-3 < -grow[12, 0] < 1.4 * 12e-6 * 16e-3
-
     def test_odd_temperatures_vanish_in_the_middle(self) -> None:
         body = solid(full=True)
         rise = np.ones((25, 1)) * body.film_z[None, :] / body.film_z[-1]
@@ -262,11 +159,6 @@ class TestGeometry:
         there[body.film_theta < offset.leading_edge + 0.5 * offset.arc] = 1e6
         u_long, u_short = body.bend(there), body.bend(there[::-1])
         assert u_long[0, 0] > 1.3 * u_short[-1, 0] > 0.0  # the longer wing is the softer one
-
-    def test_no_lining(self) -> None:
-        bare = dataclasses.replace(PAD, babbitt_thickness=0.0)
-        steel = dataclasses.replace(PAD, babbitt=STEEL)
-        np.testing.assert_allclose(solid(bare).bend(np.ones((25, 7))), solid(steel).bend(np.ones((25, 7))), rtol=0.03)
 
     def test_face_must_fit(self) -> None:
         with pytest.raises(ValueError, match="does not fit"):

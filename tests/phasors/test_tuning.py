@@ -8,7 +8,6 @@ import pytest
 
 from rigdata.operating_point import OperatingPoint
 from tests.phasors.phasor_cases import complex_normal, vector_channels
-from tpjb_ident.phasors import found_lines
 from tpjb_ident.phasors.channel_times import Samples
 from tpjb_ident.phasors.found_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
 from tpjb_ident.phasors.frequency import (
@@ -274,11 +273,3 @@ def test_no_more_lines_are_taken_than_can_be_fitted_the_lowest_first():
     extra, _ = lines_in(many)
     assert len(extra) == MAX_LINES == 10
     np.testing.assert_allclose(extra, [f for f, _ in many][:10], atol=0.03)
-
-
-def test_the_top_of_a_parabola_of_logarithms():
-    for top in (-0.4, 0.0, 0.3):
-        assert found_lines.vertex(np.exp(-((np.arange(-1, 2) - top) ** 2))) == pytest.approx(top)
-    assert found_lines.vertex(np.ones(3)) == 0.0
-    assert found_lines.vertex(np.array([2.0, 1.0, 2.0])) == 0.0
-    assert np.isfinite(found_lines.vertex(np.array([0.0, 1.0, 0.0])))

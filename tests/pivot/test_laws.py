@@ -110,14 +110,3 @@ def test_every_prior_lies_inside_its_bounds_and_is_proper():
         # a prior wider than its bounds would say nothing; one much narrower would decide for the data
         assert (spread < high - low).all()
         assert (spread > 0.05 * (high - low)).all() or law.name == "spline"
-
-
-@pytest.mark.parametrize("width", [0.02, 0.1, 0.3])
-def test_a_bilinear_law_s_slopes_are_those_of_its_shape(width):
-    """A seat or a shim that closes bends sharply, a soft one does not: the width is a number of the law."""
-    u, q = np.geomspace(0.05, 4.0, 60), np.array([np.log(0.3), 0.2, np.log(width)])
-    for shape in (LAWS["bilinear"].phi, LAWS["bilinear"].psi):
-        slopes = [(shape(u, q + step)[0] - shape(u, q - step)[0]) / 2e-6 for step in 1e-6 * np.eye(3)]
-        np.testing.assert_allclose(shape(u, q)[1], np.transpose(slopes), atol=2e-7)
-    steps = [LAWS["bilinear"].phi(u + step, q)[0] for step in (-1e-6, 1e-6)]
-    np.testing.assert_allclose((steps[1] - steps[0]) / 2e-6, LAWS["bilinear"].psi(u, q)[0], atol=1e-6)

@@ -134,6 +134,7 @@ CSV_ONLY = {
     "last line cut": (Fault("truncated_line", RUN), "warning", "cut off"),
     "file missing": (Fault("missing_file", RUN), "error", "not there"),
     "file empty": (Fault("empty_file", RUN), "error", "no samples"),
+    "column missing": (Fault("missing_channel", RUN, "L1V"), "error", "missing"),
 }
 
 

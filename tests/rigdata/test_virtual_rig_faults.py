@@ -10,7 +10,6 @@ from rigdata import virtual_rig as vr
 from rigdata.virtual_rig.faults import KINDS
 from tests.good_campaigns import CROSS_DAMPING as C
 from tests.good_campaigns import CROSS_STIFFNESS as K
-from tpjb_ident.check.campaign import check_campaign
 
 FIRST, SECOND = "d-05000-25-01", "d-05000-25-02"
 
@@ -123,22 +122,6 @@ def test_wrong_notes_are_in_the_manifest_only(campaign_of):
     assert wrong.run(SECOND).point.static_load == 10e3
     for name in (FIRST, SECOND, "p-2-up"):
         np.testing.assert_array_equal(wrong.run(name).record("X1A").values, right.run(name).record("X1A").values)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("layout", "kind", "channel"),
-    [
-        *((layout, "missing_channel", "L1V") for layout in ("hdf5", "csv-german")),
-        *((layout, kind, None) for layout in ("hdf5", "csv-german") for kind in ("missing_file", "empty_file")),
-        ("hdf5", "short_channel", "X1B"),
-        ("csv-german", "duplicate_column", "X1A"),
-        ("csv-german", "truncated_line", None),
-    ],
-)
-def test_the_reader_reports_file_faults_of_that_run_only(campaign_of, layout, kind, channel):
-    problems = check_campaign(campaign_of(rig(vr.Fault(kind, FIRST, channel), seconds=0.8), layout))
-    assert {p.run for p in problems} == {FIRST}
 
 
 LAYOUTS = [vr.Hdf5Layout(), *(vr.CsvLayout(missing=m, delimiter=";") for m in ("", "NaN", "-", "#N/A"))]
