@@ -37,8 +37,8 @@ def _has_docstring(node) -> bool:
 
 @pytest.fixture(scope="module", autouse=True)
 def computed_once():
-    """What several examples ask of the demo alike (K and C, comparison, diagnosis) is computed for the first."""
-    from tpjb_ident.compare import comparison
+    """What several examples ask of the demo alike (K and C, static tests, comparison, diagnosis) is computed once."""
+    from tpjb_ident.compare import comparison, static_tests
     from tpjb_ident.diagnosis import campaign, from_python
     from tpjb_ident.identification import identify
 
@@ -48,6 +48,7 @@ def computed_once():
         @functools.wraps(function)
         def answer(*given, **named):
             asked = [part for part in (*given, *named.values()) if part not in (None, campaign.Baseline())]
+            asked = [part for part in asked if not callable(part)]  # whom to tell of the progress
             key = f"{function.__name__} {[getattr(part, 'path', part) for part in asked]}"
             if key not in answers:
                 answers[key] = function(*given, **named)
@@ -56,7 +57,9 @@ def computed_once():
         return answer
 
     with coarse_pictures(), pytest.MonkeyPatch.context() as patch:
-        patch.setattr(identify, "identify", once(identify.identify))
+        for name, module in (("identify", identify), ("measure_static", static_tests)):
+            patch.setattr(module, name, once(getattr(module, name)))
+            patch.setattr(campaign, name, getattr(module, name))
         patch.setattr(comparison, "compare_campaign", once(comparison.compare_campaign))
         shared = once(campaign.diagnose_campaign)
         for module in (campaign, from_python):
