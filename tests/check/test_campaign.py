@@ -23,10 +23,10 @@ from tests.rigs.held_run import HeldReader, channels, run_of
 from tests.seeds import first_quick
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, merge, reach
-from tpjb_ident.check.lines import excitation_line, other_line, steady_level
+from tpjb_ident.check.lines import excitation_line, steady_level
 from tpjb_ident.check.observation import _at_rest
 from tpjb_ident.check.signals import check_signal, is_spare
-from tpjb_ident.check.wiring import definiteness, explanation, indefiniteness, plane_of, pointing, repairs
+from tpjb_ident.check.wiring import definiteness, explanation, indefiniteness, repairs
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.line_fit import LineFitter
@@ -60,25 +60,6 @@ def test_statistics_do_not_depend_on_the_blocks(values, cuts):
         assert getattr(whole, name) == getattr(pieces, name), name
     if whole.longest_flat > 1:
         assert (whole.longest_flat, whole.flat_start) == (pieces.longest_flat, pieces.flat_start)
-
-
-def test_longest_flat_stretch_is_counted():
-    statistics = seen([1.0, 2.0, 2.0], [2.0, 2.0, 3.0, 3.0])
-    assert (statistics.longest_flat, statistics.flat_start, statistics.repeats) == (4, 1, 4)
-
-
-def sine(n=2000, noise=0.0, step=3e-4):
-    rng = np.random.default_rng(4)
-    wave = 0.1 * np.sin(2 * np.pi * 25 * np.arange(n) / 1000.3) + noise * rng.normal(size=n)
-    return np.round(wave / step) * step
-
-
-@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-2])
-def test_sines_do_not_look_clipped_and_clipped_ones_do(noise):
-    wave = sine(noise=noise)
-    assert seen(wave).clipped_share() == 0.0
-    assert seen(np.clip(wave, -0.08, np.inf)).clipped_share() > 0.15
-    assert seen(np.clip(wave, -np.inf, 0.095)).clipped_share() > 0.05
 
 
 @pytest.mark.parametrize(("kind", "named"), [("dry_pivot", False), ("dynamic", True)])
@@ -138,17 +119,6 @@ def test_the_mean_of_a_run_without_excitation_leaves_the_shafts_lines_out():
     assert np.isnan(lines.phasor).all()
 
 
-def test_the_strongest_line_that_nobody_mentioned():
-    time = np.arange(4000) / 1000
-    wave = sum(a * np.sin(2 * np.pi * f * time) for a, f in ((1.0, 25.0), (5.0, 22.0), (0.5, 37.0), (2.0, 31.0)))
-    described = channels(("displacement", "force"))
-    noise = 0.01 * np.random.default_rng(3).normal(size=(4, 4000))
-    data = {name: wave + row for name, row in zip(described, noise, strict=True)}
-    assert other_line(run_phasors(run_of(HeldReader(data, 1000.0), described), 0.0)) == pytest.approx(31.0, abs=0.1)
-    data = {name: np.sin(2 * np.pi * 25 * time) + row for name, row in zip(described, noise, strict=True)}
-    assert math.isnan(other_line(run_phasors(run_of(HeldReader(data, 1000.0), described), 0.0)))
-
-
 @pytest.mark.parametrize("index", range(4))
 def test_wiring_faults_are_named(index):
     words, fault = list(repairs(PROBES))[index]
@@ -157,13 +127,6 @@ def test_wiring_faults_are_named(index):
     assert definiteness(measured) < 0.05
     hint = explanation(repairs(PROBES), lambda repair: indefiniteness(measured @ np.linalg.inv(repair)), 7.0)
     assert hint == f"; as if {words}"
-
-
-def test_wiring_guess_from_one_direction():
-    readings = np.array([-np.sin(c.axis) for c in PROBES])
-    wrong = plane_of(PROBES) @ (readings * [-1.0, 1.0])
-    assert "A had the wrong sign" in explanation(repairs(PROBES), pointing(wrong, -90.0, 8.0), 8.0, alike=2)
-    assert explanation(repairs(PROBES[:1]), pointing(wrong, -90.0, 8.0), 8.0, alike=2) == ""
 
 
 def make_run(name: str, kind: str = "dynamic") -> Run:

@@ -63,12 +63,19 @@ class CubicFilm:
     cube: float = 0.0
     square: float = 0.0
 
+    @functools.cached_property
+    def matrices(self) -> tuple[Array, Array, float]:
+        """K, C and the mean direct stiffness."""
+        k = np.array(self.film.k)
+        return k, np.array(self.film.c), float(np.trace(k)) / 2
+
     def force(self, d: Array, v: Array) -> Array:
         """Force on the housing (2, n)."""
-        k = np.array(self.film.k)
-        mean, size2 = np.trace(k) / 2, np.sum(d**2, axis=0) / self.clearance**2
-        curved = self.cube * size2 * d + self.square * size2 * self.clearance * np.array([[0.0], [1.0]])
-        return np.asarray(k @ d + np.array(self.film.c) @ v + mean * curved)
+        k, c, mean = self.matrices
+        size2 = (mean / self.clearance**2) * (d[0] * d[0] + d[1] * d[1])
+        pull = k @ d + c @ v + (self.cube * size2) * d
+        pull[1] += (self.square * self.clearance) * size2
+        return np.asarray(pull)
 
 
 def equilibrium(law: Law, load: Array) -> Array:
@@ -101,29 +108,34 @@ def march(law: Law, rig: cf.Rig, push: Array, steps: float = STEPS) -> dict[str,
     assert stiffest < 2.2 * steps, "the step is too long for this damping"
     standing, h, omega = rig.mount == "cells", 1 / steps, 2 * np.pi * rig.speed
     pull, springs = rig.loads[0] * unit_vector(rig.load_direction)[:, None], np.array(rig.springs)[:, None]
-    angles = np.linspace(0, 5, push.shape[2])
+    turns = 0.5 * h * omega * np.arange(len(push))[:, None] + np.linspace(0, 5, push.shape[2])
+    turning = rig.unbalance * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    # what acts from outside on shaft and housing, at half steps
+    on_shaft, on_housing = (pull + push + turning, np.zeros_like(push)) if standing else (turning, push - pull)
 
-    def rates(time: float, force: Array, s: Array) -> Array:
-        film = law.force(s[0] - s[2], s[1] - s[3])
-        turning = rig.unbalance * np.array([np.cos(omega * time + angles), np.sin(omega * time + angles)])
+    def rates(k: int, s: Array) -> Array:
+        film, change = law.force(s[0] - s[2], s[1] - s[3]), np.empty_like(s)
+        change[0], change[2] = s[1], s[3]
         if standing:
-            shaft, housing = pull + force + turning - film, film - springs * s[2] - CELL_DAMPING * s[3]
+            change[1], change[3] = on_shaft[k] - film, film - springs * s[2] - CELL_DAMPING * s[3]
         else:
-            shaft, housing = turning - SHAFT_SPRING * s[0] - SHAFT_DAMPING * s[1] - film, film + force - pull
-        return np.array([s[1], shaft / rig.shaft_mass, s[3], housing / rig.mass])
+            held = SHAFT_SPRING * s[0] + SHAFT_DAMPING * s[1]
+            change[1], change[3] = on_shaft[k] - held - film, film + on_housing[k]
+        change[1] /= rig.shaft_mass
+        change[3] /= rig.mass
+        return change
 
     state = np.zeros((4, 2, push.shape[2]))
     state[2] = pull / springs if standing else -pull / SHAFT_SPRING - equilibrium(law, pull[:, 0])[:, None]
     state[0] = state[2] + equilibrium(law, pull[:, 0])[:, None]
     states = []
-    for i in range((len(push) - 1) // 2):
-        time, middle = i * h, push[2 * i + 1]
-        first = rates(time, push[2 * i], state)
+    for k in range(0, len(push) - 2, 2):
+        first = rates(k, state)
         states.append(np.concatenate([state, first[3:]]))
-        second = rates(time + h / 2, middle, state + h / 2 * first)
-        third = rates(time + h / 2, middle, state + h / 2 * second)
-        fourth = rates(time + h, push[2 * i + 2], state + h * third)
-        state = state + h / 6 * (first + 2 * second + 2 * third + fourth)
+        second = rates(k + 1, state + h / 2 * first)
+        third = rates(k + 1, state + h / 2 * second)
+        fourth = rates(k + 2, state + h * third)
+        state = state + h / 6 * (first + 2 * (second + third) + fourth)
     shaft, shaft_speed, housing, housing_speed, acceleration = np.moveaxis(np.array(states), 1, 0)
     force = springs * housing + CELL_DAMPING * housing_speed if standing else -push[0:-1:2]
     motion = {"displacement": shaft - housing, "force": force, "acceleration": acceleration, "command": push[0:-1:2]}
