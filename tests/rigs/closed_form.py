@@ -159,7 +159,9 @@ def band_course(rig: Rig, t: Array, rng: np.random.Generator) -> Array:
         return np.fft.irfft(np.fft.rfft(rng.standard_normal(len(t))) * power, len(t))
     if rig.excitation == "multisine":
         tones = tones_of(rig)
-        return np.asarray(np.cos(2 * np.pi * np.outer(t, tones) + rng.uniform(0, 6.28, len(tones))).sum(axis=1))
+        one = t[: round(FINE)] if (tones % 1 == 0).all() else t  # whole hertz: the first second comes again and again
+        waves = np.cos(2 * np.pi * np.outer(one, tones) + rng.uniform(0, 6.28, len(tones)))
+        return np.resize(waves.sum(axis=1), len(t))
     if rig.excitation == "sweep":
         begin, end = rig.share[0] * rig.seconds, rig.share[1] * rig.seconds
         part = np.clip((t - begin) / (end - begin), 0, 1)
