@@ -13,8 +13,11 @@ from model.effects import Effect
 from model.film.faces import conductances
 from model.film.reynolds import solve_film
 from model.film.slopes import shape_slopes
+from model.pivots import pivot_laws
 from model.predict import predict
 from tests.pad_responses import pad_solid
+from model.setup import Setup
+from model.statics.search import Search
 
 SPEED = 2 * math.pi * 22
 
@@ -41,6 +44,15 @@ def test_deformation_is_what_pressure_and_heat_ask_for(bearing, load):
 def test_pads_of_one_shape_share_their_matrices(bearing):
     films = predict(bearing, 5000.0, speed=SPEED, thermal="tehd").equilibrium.films
     assert len({id(f.deformation) for f in films}) == 1
+
+
+@pytest.mark.slow
+def test_the_matrices_of_a_search_stand_in_one_order(bearing):
+    """Another one of any of them is another signature, for which a process compiles the search for half a minute."""
+    setup = Setup(bearing, pivot_laws("kirk", bearing), "tehd")
+    bodies = Search(setup, np.array([0.0, -5000.0]), SPEED).problem.bodies
+    assert bodies is not None
+    assert [name for name, values in bodies._asdict().items() if not values.flags.c_contiguous] == []
 
 
 def test_pressure_slopes_by_shape_are_finite_differences(bearing):
