@@ -12,7 +12,7 @@ from rigdata.arrays import FloatArray, IntArray
 from rigdata.problem import refuse
 from rigdata.vector import directions
 from tpjb_ident.clearance.polygon import SideFit, alike, corners, find_centre, fit_sides, gain_ratio
-from tpjb_ident.clearance.sweep import ContactIntervals, read_sweep
+from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
@@ -186,12 +186,12 @@ def measure_run(
 ) -> ClearancePolygon:
     """Measure the polygon of one run; parameters as `measure_clearance`."""
     angles, run = np.asarray(pivot_angles, dtype=float), live_run(run)
-    contact = read_sweep(run, angles)
-    pads = np.flatnonzero(np.bincount(contact.pad, minlength=len(angles)) >= _FEWEST_BLOCKS)
-    if len(pads) < 3:
-        what = f"clearance run {run.id} reaches {len(pads)} of {len(angles)} pads"
-        raise refuse(run.file, "record", what, "Check pad angles and channels", run.id)
-    fit = fit_sides(contact, angles, pads, curves)
+    contact, fit = _read_sides(run, angles, curves, LARGEST_DEFLECTION)
+    if fit.deflection.max() > LARGEST_DEFLECTION:  # pads that seemed not to be touched were
+        contact, fit = _read_sides(run, angles, curves, float(fit.deflection.max()))
+    if fit.deflection.min() < -LARGEST_DEFLECTION:
+        what = f"sees the shaft {-1e6 * fit.deflection.min():.0f} µm further out where it is pushed less"
+        raise refuse(run.file, "record", f"clearance run {run.id} {what}", "Keep shaft and probes still", run.id)
     polygon = _polygon(run, contact, angles, fit)
     probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
     ratio, differ = _gains_differ(probes, polygon)
@@ -204,6 +204,18 @@ def measure_run(
     polygon = replace(polygon, relative_calibration=np.array(calibration))
     status = (*_status(fit, polygon), *differ, *_extrapolated(contact.push, curves))
     return replace(polygon, status=status)
+
+
+def _read_sides(
+    run: Run, angles: FloatArray, curves: Sequence[PivotCurve] | None, deflection: float
+) -> tuple[ContactIntervals, SideFit]:
+    """Averages and sides of a sweep whose pivots deflect by so much [m] at most."""
+    contact = read_sweep(run, angles, deflection)
+    pads = np.flatnonzero(np.bincount(contact.pad, minlength=len(angles)) >= _FEWEST_BLOCKS)
+    if len(pads) < 3:
+        what = f"clearance run {run.id} reaches {len(pads)} of {len(angles)} pads"
+        raise refuse(run.file, "record", what, "Check pad angles and channels", run.id)
+    return contact, fit_sides(contact, angles, pads, curves)
 
 
 def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideFit) -> ClearancePolygon:

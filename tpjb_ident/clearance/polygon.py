@@ -31,7 +31,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.vector import directions
-from tpjb_ident.clearance.sweep import ContactIntervals
+from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.phasors.bad_samples import robust_deviation
@@ -39,6 +39,7 @@ from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_nois
 from tpjb_ident.pivot.curve import PivotCurve
 
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
+_DEVIATES = 2.0  # such widths from which a pad stands off clearly
 _DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
 _TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
 _SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
@@ -69,9 +70,18 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
     weights = np.ones(len(angles))
     if len(angles) > 4:  # Huber's, with the bend at the measurement error: absolute beyond it, square within
         weights = reweighted(design, distances, lambda u: huber_weight(u, 1.0), error, 1e-12, 400)[1]
-    gain = np.asarray(np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights), dtype=float)
+        residual = np.abs(distances - design @ _gain(design, weights) @ distances)
+        equal = np.where(residual > _DEVIATES * error, 0.0, weights)
+        # the pull of a pad that clearly stands off, however bounded, would shift the others
+        weights = equal if np.linalg.matrix_rank(design * equal[:, None], 1e-3) == 3 else weights
+    gain = _gain(design, weights)
     solution = gain @ distances
     return Centre(solution[:2], float(solution[2]), gain, *_explanations(design, distances, solution))
+
+
+def _gain(design: FloatArray, weights: FloatArray) -> FloatArray:
+    """Solution (3,) of weighted least squares per distance, (3, n)."""
+    return np.asarray(np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights), dtype=float)
 
 
 def _explanations(design: FloatArray, distances: FloatArray, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -178,7 +188,7 @@ def fit_sides(
     used, place = contact.take(usable), place[usable]
     noise = _noise(used, place)
     carried = _pivot_deflection(curves or (), used.pad, used.load)
-    whitener = _whitener(used, angles, noise, _SLIDING * carried * used.alone)
+    whitener = _whitener(used, angles, noise, np.hypot(_SLIDING * carried * used.alone, used.level_error))
     r, of_pad = len(pads), (used.pad[:, None] == pads).astype(float)
     full = _pivot_deflection(curves or (), pads, np.full(r, used.push))
     columns, precision, mean = _pivot_terms(used, of_pad, carried, None if curves is None else full)
@@ -188,6 +198,7 @@ def fit_sides(
     distance, tilt, pivots = np.split(beta, [r, 2 * r])
     _, tilt_se, errors = np.split(np.sqrt(np.diag(covariance)), [r, 2 * r])
     distances, deflection, deflection_se = covariance[:r, :r], pivots[:r], errors[:r]
+    distances = distances + used.level_error**2 * np.eye(r)  # a shaft that lies in a corner reads one step for long
     scale = scale_se = np.nan
     if curves is not None:
         scale, scale_se = float(pivots[-1]), float(errors[-1])
@@ -220,7 +231,7 @@ def _pivot_terms(
     w = np.maximum(contact.load, 0.0) / contact.push
     bend = np.cbrt(w) ** 2 - w
     if full is None:
-        precision = np.r_[np.zeros(of_pad.shape[1]), _CURVATURE_SPREAD**-2]
+        precision = np.r_[np.full(of_pad.shape[1], LARGEST_DEFLECTION**-2), _CURVATURE_SPREAD**-2]
         return np.column_stack([of_pad * w[:, None], bend]), precision, np.zeros(len(precision))
     columns = np.column_stack([of_pad @ full * bend, carried])
     return columns, np.array([_SHAPE_SPREAD, _SCALE_SPREAD]) ** -2, np.array([0.0, 1.0])

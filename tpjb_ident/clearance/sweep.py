@@ -11,12 +11,20 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions
 from tpjb_ident.phasors.bad_samples import robust_deviation
-from tpjb_ident.phasors.slow_samples import REMEDY, contradictions, piece_means, slow_samples, spare_slopes
+from tpjb_ident.phasors.slow_samples import (
+    REMEDY,
+    contradictions,
+    level_error,
+    piece_means,
+    slow_samples,
+    spare_slopes,
+)
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run
@@ -24,10 +32,11 @@ if TYPE_CHECKING:
 
 _BLOCK = 0.1  # [s]; five mains periods
 _CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its deflection
-_SHORTEST = 5  # samples in a piece
+_SHORTEST = 5  # samples in a piece, where a whole one has as many
 _MOVING = 2.0  # robust standard deviations of the speed in corners above which the shaft is still on its way
-_LARGEST_DEFLECTION = 6.0e-6  # [m], of a pivot under the push load where no curve says it
-_TURN_NEEDED = 2.0 * np.pi * 0.97
+LARGEST_DEFLECTION = 6.0e-6  # [m], of a pivot under the push load where no curve says it
+_RELEASED = 0.1  # of the push: below it the load has no direction
+_LARGEST_GAP = np.radians(60.0)  # between directions of the load: half of it from a pad's own, both corners are beyond
 
 
 @dataclass(frozen=True)
@@ -42,10 +51,11 @@ class ContactIntervals:
     load: FloatArray  #: that the pad carries [N]
     alone: BoolArray  #: no other pad was touched
     push: float  #: of the sweep [N]
+    level_error: float  #: of a place where the shaft lies still between two steps of a converter [m]
 
     def take(self, chosen: BoolArray) -> ContactIntervals:
         """The averages where `chosen` (m,) is true."""
-        columns = {f.name: getattr(self, f.name)[chosen] for f in fields(self) if f.name != "push"}
+        columns = {f.name: getattr(self, f.name)[chosen] for f in fields(self)[:-2]}
         return replace(self, **columns)
 
 
@@ -62,12 +72,14 @@ def sweep_samples(run: Run) -> tuple[FloatArray, FloatArray, FloatArray]:
     return time[good], load, position
 
 
-def read_sweep(run: Run, angles: FloatArray) -> ContactIntervals:
-    """Read a live run of kind ``clearance``; angles (n,) [rad] of the pads."""
+def read_sweep(run: Run, angles: FloatArray, deflection: float = LARGEST_DEFLECTION) -> ContactIntervals:
+    """Read a live run of kind ``clearance``; angles (n,) [rad] of the pads, largest deflection of a pivot [m]."""
     time, load, position = sweep_samples(run)
     # whole turns of a shaft that turns: its runout averages out
     turn = 2.0 * np.pi / run.point.shaft_speed if run.point.shaft_speed > 0.0 else _BLOCK
-    return _average(time, load, position, angles, float(turn * max(round(_BLOCK / turn), 1)))
+    return _average(
+        time, load, position, angles, float(turn * max(round(_BLOCK / turn), 1)), _CONTACT_DEPTH + deflection
+    )
 
 
 def _refused(run: Run, what: str, cure: str) -> RigDataError:
@@ -79,10 +91,12 @@ def _check_turn(run: Run, load: FloatArray, position: FloatArray) -> None:
     step = max(1, len(load) // 400)
     whole = len(load) // step * step
     pushed, place = (part[:whole].reshape(-1, step, 2).mean(axis=1) @ [1.0, 1j] for part in (load, position))
-    angle = np.unwrap(np.angle(pushed))
-    if np.ptp(angle) < _TURN_NEEDED:
-        what = f"turns its load through {np.degrees(np.ptp(angle)):.0f} deg only"
-        raise _refused(run, what, "Sweep the load once around, 360 deg or more")
+    angle = np.angle(pushed)
+    covered = np.sort(angle[np.abs(pushed) > _RELEASED * np.median(np.abs(pushed))])
+    gap = float(np.diff(covered, append=covered[0] + 2.0 * np.pi).max())
+    if gap > _LARGEST_GAP:
+        what = f"turns its load through {360.0 - np.degrees(gap):.0f} deg only"
+        raise _refused(run, what, "Sweep the load once around, 360 deg")
     place = place - 0.5 * (place.real.max() + place.real.min() + 1j * (place.imag.max() + place.imag.min()))
     in_load_frame = np.mean(place * np.exp(-1j * angle))
     lag, coherence = np.angle(in_load_frame), abs(in_load_frame) / max(np.abs(place).mean(), 1e-300)
@@ -110,23 +124,24 @@ def _carried(load: FloatArray, angles: FloatArray, touched: BoolArray) -> FloatA
 
 
 def _average(
-    time: FloatArray, load: FloatArray, position: FloatArray, angles: FloatArray, length: float
+    time: FloatArray, load: FloatArray, position: FloatArray, angles: FloatArray, length: float, depth: float
 ) -> ContactIntervals:
-    """Average per pad over pieces of `length` [s] in which the same pads are touched."""
+    """Average per pad over pieces of `length` [s] in which the same pads are touched, within `depth` [m]."""
     # the shaft touches a pad within some micrometres of where it was farthest out
-    outward = position @ directions(angles).T
-    touched = np.asarray(outward > np.quantile(outward, 0.995, axis=0) - (_CONTACT_DEPTH + _LARGEST_DEFLECTION))
+    period = float(time[-1] - time[0]) / (len(time) - 1)
+    samples = max(round(length / period), 1)
+    outward = uniform_filter1d(position, samples, axis=0) @ directions(angles).T
+    touched = np.asarray(outward > np.quantile(outward, 0.995, axis=0) - depth)
     carried = _carried(load, angles, touched)
     state = touched @ (1 << np.arange(len(angles)))
     piece = np.floor((time - time[0]) / length).astype(int)
     cuts = np.flatnonzero((np.diff(state) != 0) | (np.diff(piece) != 0)) + 1
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(time)]
-    long = (stops - starts) >= _SHORTEST
+    long = (stops - starts) >= min(_SHORTEST, samples)
     starts, stops = starts[long], stops[long]
     columns = np.column_stack([time, position, np.nan_to_num(carried), np.isnan(carried)])
     means = piece_means(columns, starts, stops)
     moment, place, (pad_load, lost) = means[:, 0], means[:, 1:3], np.split(means[:, 3:], 2, axis=1)
-    period = float(time[-1] - time[0]) / (len(time) - 1)
     pads_touched = touched[starts]
     settled = _settled(moment, place, pads_touched)[:, None]
     row, pad = np.nonzero(pads_touched & ~(lost > 0.0) & settled)
@@ -140,6 +155,7 @@ def _average(
         load=pad_load[row, pad],
         alone=pads_touched[row].sum(axis=1) == 1,
         push=float(np.median(np.hypot(*load.T))),
+        level_error=level_error(position),
     )
 
 

@@ -8,6 +8,7 @@ corners of every ramp.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -31,6 +32,7 @@ _SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is
 _NOTHING = 1e-15  # [m] or [N]: below what any sensor knows
 _LONGEST_GLITCH, _LONGEST = 0.25, 60  # [s], samples
 _THRESHOLD = 7.0  # noise standard deviations beyond both medians
+_UNDITHERED = 0.3  # share of samples that differ from the one before, below which noise does not reach a step
 _SHORTEST = 50  # samples
 _TIMES_EXPECTED = 10.0
 _NOISE_FREE = (
@@ -141,6 +143,12 @@ def converter_step(x: FloatArray) -> tuple[float, float]:
     moves = np.abs(np.diff(x))
     steps = moves[moves > 1e-6 * np.ptp(x)]
     return (float(np.median(steps)), len(steps) / len(moves)) if len(steps) else (0.0, 0.0)
+
+
+def level_error(displacement: FloatArray) -> float:
+    """Error of a level [m] that stands between two steps of the converter, where no noise dithers it."""
+    steps = [step for step, share in map(converter_step, displacement.T) if share < _UNDITHERED]
+    return max(steps, default=0.0) / math.sqrt(6.0)
 
 
 def live_run(run: Run) -> Run:

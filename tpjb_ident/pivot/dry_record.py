@@ -16,7 +16,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import RigDataError, refuse
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
-from tpjb_ident.phasors.slow_samples import converter_step, live_run, slow_samples, spare_slopes
+from tpjb_ident.phasors.slow_samples import level_error, live_run, slow_samples, spare_slopes
 from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, cut_blocks, find_holds, sticking
 from tpjb_ident.pivot.pickup import PickupSignature, measure_pickup
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 _FEWEST_SAMPLES = 50
 _MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
 _FEWEST_BLOCKS = 8
-_UNDITHERED = 0.3  # share of samples that differ from the one before, below which noise does not reach a step
 _DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
 _FREE = 10.0  # times the compliance of the upper loads: no contact gives so much at a hundredth of the load
 _NOTABLE_WAY = 0.1  # of the deflection at the largest load: a shorter free way is left to the contact loss of the laws
@@ -108,7 +107,7 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         blocks=blocks,
         good=np.ones(len(blocks), dtype=bool),
         lost=lost,
-        quantisation=_quantisation(place),
+        quantisation=level_error(place),
         pickup=pickup,
         load_direction=load_direction(blocks),
         slopes=spare_slopes(run, axes[:1]),
@@ -150,12 +149,6 @@ def _push(load: FloatArray) -> FloatArray:
 def _refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
     """Error that names the run, the place, the trouble and the cure."""
     return refuse(run.file, place, f"run {run.id} {what}", cure, run.id)
-
-
-def _quantisation(displacement: FloatArray) -> float:
-    """Error of a level [m] that stands between two steps of the converter, where no noise dithers it."""
-    steps = [step for step, share in map(converter_step, displacement.T) if share < _UNDITHERED]
-    return max(steps, default=0.0) / math.sqrt(6.0)
 
 
 def axial_channels(run: Run) -> dict[str, Channel]:

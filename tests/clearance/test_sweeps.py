@@ -1,0 +1,110 @@
+"""Sweeps of other hands and loggers: a shaft against springs, in closed steps, by no program of this project."""
+
+import numpy as np
+import pytest
+
+from rigdata.campaign import load_campaign
+from rigdata.problem import RigDataError
+from rigdata.vector import directions
+from tests.clearance.cases import ANGLES
+from tpjb_ident.clearance.measure import measure_clearance
+
+PUSH, CENTRE = 300.0, (40e-6, -25e-6)
+MANIFEST = """schema = "tpjb-rig/1"
+id = "sweep"
+bearing = "bearing.toml"
+[housing]
+mass = "30 kg"
+[acquisition]
+sample_rate = "{rate:g} Hz"
+[channels.X1]
+quantity = "displacement"
+axis = "45 deg"
+unit = "um"
+[channels.X2]
+quantity = "displacement"
+axis = "135 deg"
+unit = "um"
+[channels.L1]
+quantity = "force"
+axis = "0 deg"
+unit = "N"
+[channels.L2]
+quantity = "force"
+axis = "90 deg"
+unit = "N"
+[[runs]]
+id = "c-1"
+file = "c-1.csv"
+kind = "clearance"
+static_load = "300 N"
+"""
+
+
+def pushed(force, clearance, stiffness):
+    """Place (n, 2) of a shaft that pads of (k,) clearances hold, pivots as the power 1.5 of their deflection."""
+    normals, spring = directions(ANGLES), PUSH / (PUSH / stiffness) ** 1.5
+    place = np.outer(np.ones(len(force)), [0.0, 0.0])
+    for _ in range(200):
+        over = np.maximum(place @ normals.T - clearance, 0.0)
+        missing = force - spring * over**1.5 @ normals
+        tangent = np.einsum("nk,ki,kj->nij", 1.5 * spring * np.sqrt(over), normals, normals) + 1e4 * np.eye(2)
+        step = np.linalg.solve(tangent, missing[:, :, None])[:, :, 0]
+        place += step * np.minimum(1.0, 5e-6 / np.maximum(np.linalg.norm(step, axis=1), 1e-30))[:, None]
+    return place
+
+
+def sweep(
+    folder, rate=50.0, seconds=60.0, turns=1.0, steps=0, noise=0.2e-6, stiffness=3e8, runout=0.0, off=0.0, step=0
+):
+    """A campaign of one sweep, and the pads' clearances (5,) [m]; `step` [m] of the probes' converter."""
+    rng = np.random.default_rng(20)
+    time = np.arange(seconds * rate) / rate
+    share = time / time[-1]
+    angle = -0.5 * np.pi + 2 * np.pi * turns * (
+        np.minimum(np.floor(share * steps), steps - 1) / steps if steps else share
+    )
+    force = PUSH * np.column_stack([np.cos(angle), np.sin(angle)])
+    clearance = 80e-6 + np.array([0.0, off, 0.0, 0.0, 0.0])
+    probes = (pushed(force, clearance, stiffness) + CENTRE) @ directions(np.radians([45.0, 135.0])).T
+    probes += runout * np.column_stack([np.sin(33.0 * share + 0.3), np.cos(33.0 * share + 0.3)])
+    probes += noise * rng.standard_normal(probes.shape)
+    probes = np.round(probes / step) * step if step else probes
+    cells = force + 3.0 * rng.standard_normal(force.shape)
+    columns = np.column_stack([1e6 * probes, cells])
+    np.savetxt(folder / "c-1.csv", columns, "%.6g", delimiter=",", header="X1,X2,L1,L2", comments="")
+    (folder / "campaign.toml").write_text(MANIFEST.format(rate=rate), encoding="utf-8")
+    (folder / "bearing.toml").write_text("", encoding="utf-8")
+    return load_campaign(folder), clearance
+
+
+GOOD = {
+    "continuous": {},
+    "one pad off": {"off": 12e-6},
+    "holds of 15 deg": {"steps": 24},
+    "nine tenths of a turn": {"turns": 0.9},
+    "a reading a second": {"rate": 1.0, "seconds": 240.0},
+    "holds, two readings a second": {"rate": 2.0, "seconds": 180.0, "steps": 36},
+    "noise of 3 um": {"noise": 3e-6},
+    "soft pivots": {"stiffness": 3e7},
+    "a converter of 5 um": {"noise": 5e-8, "step": 5e-6},
+}
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_clearances_of_unusual_sweeps_lie_in_their_intervals(tmp_path, name):
+    campaign, clearance = sweep(tmp_path, **GOOD[name])
+    measured = measure_clearance(campaign, ANGLES)
+    assert np.all(np.abs(measured.clearance - clearance) < 3.0 * measured.clearance_se)
+    coarse = GOOD[name].get("step", 0.0)
+    assert np.all(measured.clearance_se < np.maximum(0.5e-6, 0.5 * coarse))
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [("turns its load through", {"turns": 0.6}), ("further out where it is pushed less", {"runout": 4e-6})],
+)
+def test_a_half_turn_and_a_shaft_that_was_turned_are_refused(tmp_path, name, change):
+    campaign, _ = sweep(tmp_path, **change)
+    with pytest.raises(RigDataError, match=name):
+        measure_clearance(campaign, ANGLES)
