@@ -50,7 +50,8 @@ def test_left_out_odd_lines_tell_the_change_of_h_and_the_scatter_of_lines(seed):
     assert lines.change == pytest.approx(1.3 * 3e-3, rel=0.5)
     driven = runs[0].driven & np.isin(np.arange(1, 81), SOME_ODD)
     off = runs[0].F[0, driven, 0] / runs[0].D[0, driven, 0] / STIFFNESS - 1
-    assert lines.scatter == pytest.approx(1.3 * np.sqrt(2) * np.std(off), rel=0.6)
+    assert np.median(lines.scatter[0, driven, 0]) == pytest.approx(1.3 * np.sqrt(2) * np.std(off), rel=0.6)
+    assert lines.scatter[0, driven, 1].max() < 0.01 * lines.scatter[0, driven, 0].min()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -60,13 +61,13 @@ def test_sums_of_two_scatter_lines_and_stand_in_where_all_odd_lines_are_driven(s
     assert even.change == pytest.approx(1.3 * 3 * 0.75 * 0.02**2, rel=0.5)
     every = film_products(static_film(np.arange(6, 70), 1e-3, 0.02, seed))
     assert every.even
-    assert every.scatter > 2 * even.scatter
+    assert np.median(every.scatter[0, ODD - 1, 0]) > 2 * np.median(even.scatter[0, ODD - 1, 0])
 
 
 def test_a_linear_film_makes_nothing():
     lines = film_products(static_film(SOME_ODD, 0.0, 0.0, 1))
     assert lines.change < 1e-5
-    assert lines.scatter < 1e-4
+    assert lines.scatter[0, SOME_ODD - 1].max() < 1e-4
 
 
 def band_of(tmp_path, rig, without="none"):

@@ -143,6 +143,7 @@ def made(case: Case, seed: int = 0) -> tuple[Rig, Blocks, np.ndarray]:
             miss=miss[:, 0] + 1j * miss[:, 1],
             miss_error=np.zeros(n),
             shaft=shaft,
+            uneven=np.zeros((n, 2)),
             bent=np.full(len(points), case.bent_told),
         ),
         np.array([film(p.static_load, p.excitation) for p in points]),

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.optimize import nnls
 from scipy.signal import fftconvolve
 
@@ -32,6 +33,8 @@ _ON_LINE = 1.0
 _ACROSS = 0.2
 #: Kappa over kappa_2^2 / h.
 _STANDS_IN = 0.75
+#: Lines whose noise is taken together, and standard deviations from which products stand above it.
+_NEIGHBOURS, _CLEAR = 9, 5.0
 #: Rounds in which powers, each as uncertain as it is large, are weighed.
 _ROUNDS = 4
 
@@ -41,57 +44,84 @@ class FilmProducts:
     """What the film's curvature does to a band's result; NaN where no line tells."""
 
     change: float  #: share by which the band's own motion may change H
-    scatter: float  #: of a driven line's film force, relative, alike in all repeats
+    scatter: FloatArray  #: (n_runs, n_bins, 2): along X and Y over a line's film force, alike in all repeats
     orbit: float  #: share by which the shaft's orbit may change H
     turning: float  #: relative scatter of a line's film force that differs from run to run with the shaft's angle
     even: bool  #: whether sums of two driven lines fall on driven ones
+    seen: bool = True  #: whether undriven lines show products above their noise; else what that could hide stands above
 
 
 def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
-    """What the lines of a point's runs tell."""
+    """What the lines of a point's runs tell; of a period, those beyond the band as well."""
+    untold = np.full((len(runs), len(runs[0].frequencies), 2), np.nan)
+    within, runs = runs[0].frequencies, [run.wide or run for run in runs]
     driven = np.all([run.driven & ~run.disturbed for run in runs], axis=0)
     film = _film(runs, driven)
     turned = [film.at_turned(runs, order) for order in (1, 2)]
     orbit = ALLOWED_CHANGE * CHANGE_BY_ORBIT * turned[1]
     if runs[0].period is None or not driven.any():
-        return FilmProducts(np.nan, np.nan, orbit, 0.0, True)
-    shaft = orbit, float(np.linalg.norm([_falls_on_lines(runs[0], n) * size for n, size in enumerate(turned, 1)]))
-    undriven = ~np.any([run.driven | run.disturbed for run in runs], axis=0)
+        return FilmProducts(np.nan, untold, orbit, 0.0, True)
     number = np.round(runs[0].frequencies * runs[0].period).astype(int)
-    motion = np.mean([np.sum(np.abs(run.D.mean(axis=0)) ** 2, axis=1) * run.driven for run in runs], axis=0)
-    sums = np.stack(_sums(number, motion / 4), axis=1)
-    reached = sums > _REACHED * np.median(sums[driven | undriven], axis=0)
+    beside = [np.isin(number, _beside_shaft(runs[0], order)) for order in (1, 2)]
+    falls_on_lines = [bool((driven & places).any()) for places in beside]
+    shaft = orbit, float(np.linalg.norm(np.multiply(falls_on_lines, turned)))
+    undriven = ~np.any([*beside, *(run.driven | run.disturbed for run in runs)], axis=0)
+    motion = [np.sum(np.abs(run.D.mean(axis=0)) ** 2, axis=1) * run.driven for run in runs]
+    sums = np.array([np.stack(_sums(number, power / 4), axis=1) for power in motion])
+    usual = sums.mean(axis=0)
+    reached = usual > _REACHED * np.median(usual[driven | undriven], axis=0)
     undriven &= reached.any(axis=1)
     even = bool(reached[driven, 0].mean() > 0.5)
     if undriven.sum() < _LEAST_LINES:
-        return FilmProducts(np.nan, np.nan, *shaft, even)
-    square, cube = _curvature(sums[undriven] * [8.0, 24.0], film.excess(runs, undriven))  # of amplitudes' squares, 4 S
-    stiffness = np.sqrt(film.force / motion[driven].mean())
+        return FilmProducts(np.nan, untold, *shaft, even)
+    sums *= [8.0, 24.0]  # of amplitudes' squares, 4 S
+    told = sums[:, undriven], *film.excess(runs, undriven)
+    curvature, clear = _hidden(*told)
+    seen = bool(clear.max() > _CLEAR)
+    if seen:
+        curvature = np.array([[_curvature(part, *axis) for axis in zip(*axes)] for part, *axes in zip(*told)])
+    square, cube = curvature.sum(axis=1).mean(axis=0)
+    stiffness = np.sqrt(film.force / np.mean(motion, axis=0)[driven].mean())
     cube = max(cube, (_STANDS_IN * square / stiffness) ** 2)
     change = 3 * np.sqrt(cube) * max(run.rms for run in runs) ** 2 / stiffness
-    scatter = np.sqrt((sums[driven] @ [8 * square, 24 * cube]).mean() / film.force)
-    return FilmProducts(ALLOWED_CHANGE * float(change), ALLOWED_CHANGE * float(scatter), *shaft, even)
+    force = np.array([np.sum(np.abs(run.F.mean(axis=0)) ** 2, axis=1) for run in runs])
+    scatter = np.sqrt(np.einsum("rnk,rak->rna", sums, curvature) / np.maximum(force, 1e-300)[:, :, None])
+    scatter = scatter[:, np.searchsorted(runs[0].frequencies, within - 0.5 / runs[0].period)]
+    return FilmProducts(ALLOWED_CHANGE * float(change), ALLOWED_CHANGE * scatter, *shaft, even, seen)
 
 
-def _falls_on_lines(run: RunSpectra, order: int) -> bool:
-    """Whether the shaft turns with the period, so that what stands at n X - f is on driven lines."""
+def _hidden(sums: FloatArray, power: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Squares of kappa_2 and kappa that noise hides, and how clearly lines stand above it, (n_runs, 2, 2) each.
+
+    Of lines (n_runs, n, 2) as `_curvature` takes them, `power`, `noise` (n_runs, 2, n).
+    """
+    weight = 1 / np.maximum(noise, 1e-12 * np.abs(power).max()) ** 2
+    error = 1 / np.sqrt(np.maximum(np.einsum("rnk,ran->rak", sums**2, weight), 1e-300))
+    return 2 * error, np.einsum("rnk,ran,ran->rak", sums, weight, power) * error
+
+
+def _beside_shaft(run: RunSpectra, order: int) -> IntArray:
+    """Numbers of the lines n X + f and n X - f of every driven f, of a shaft that turns with the period; else none."""
     assert run.period is not None
     turns = order * run.shaft * run.period
     if not turns or abs(turns - round(turns)) * len(run.phasors.start) > _ON_LINE:
-        return False
-    number = np.round(run.frequencies[run.driven] * run.period)
-    return bool(np.isin(np.abs(round(turns) - number), number).any())
+        return np.zeros(0, dtype=int)
+    number = np.round(run.frequencies[run.driven] * run.period).astype(int)
+    return np.abs(round(turns) + np.concatenate([number, -number]))
 
 
-def _curvature(sums: FloatArray, power: FloatArray) -> tuple[float, float]:
-    """Squares of kappa_2 and kappa by powers (n,) at some lines, as `sums` (n, 2) of two and three lines make them."""
+def _curvature(sums: FloatArray, power: FloatArray, noise: FloatArray) -> tuple[float, float]:
+    """Squares of kappa_2 and kappa by powers (n,) at some lines, as `sums` (n, 2) of two and three lines make them.
+
+    `noise` (n,): of the powers, which are besides as uncertain as they are large.
+    """
     size = np.maximum(sums.max(axis=0), np.finfo(float).tiny)
-    expected = np.ones(len(power))
+    unit = max(float(np.abs(power).max()), 1e-300)
+    fitted = np.full(len(power), unit)
     for _ in range(_ROUNDS):
+        expected = np.maximum((fitted + noise) / unit, 1e-3)
         numbers = nnls(sums / size / expected[:, None], power / expected)[0]
         fitted = sums / size @ numbers
-        largest = max(fitted.max(), 1e-300)
-        expected = np.maximum(fitted / largest, 1e-3)
     square, cube = numbers / size
     return float(square), float(cube)
 
@@ -120,14 +150,18 @@ class _Film:
         h = _columns(2 * np.pi * frequencies, self.middle) @ self.numbers
         return np.asarray(F - np.einsum("kij,wkj->wki", h, D))
 
-    def excess(self, runs: Sequence[RunSpectra], places: BoolArray) -> FloatArray:
-        """Mean square of the runs' unexplained force at some bins without its noise, (n,) [N^2]."""
-        squares = []
+    def excess(self, runs: Sequence[RunSpectra], places: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Square of every run's unexplained force at some bins along X and Y without its noise, and that noise.
+
+        Both (n_runs, 2, n) [N^2].
+        """
+        squares, noises = [], []
         for run in runs:
             force = self.unexplained(run.D[:, places], run.F[:, places], run.frequencies[places])
-            noise = np.sum(np.var(force, axis=0, ddof=1), axis=1) / len(force)
-            squares.append(np.sum(np.abs(force.mean(axis=0)) ** 2, axis=1) - noise)
-        return np.asarray(np.mean(squares, axis=0))
+            noise = np.var(force, axis=0, ddof=1) / len(force)
+            squares.append((np.abs(force.mean(axis=0)) ** 2 - noise).T)
+            noises.append(median_filter(noise, (_NEIGHBOURS, 1), mode="nearest").T)  # few windows tell a line's badly
+        return np.array(squares), np.array(noises)
 
     def at_turned(self, runs: Sequence[RunSpectra], order: int) -> float:
         """Force at f - nX that goes with a run's motion at f, over the force at f; zero where noise explains it."""

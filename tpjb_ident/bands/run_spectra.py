@@ -31,6 +31,8 @@ _LEFT = 0.5
 #: Share of a period's largest line, in motion, force or command, from which another one is driven; below it those of
 #: the command are, one after the other, down to a step by so much, or to so little.
 _DRIVEN, _STEP, _NOTHING = 0.1, 3.0, 1e-3
+#: Lines of a period are looked at up to so many times the band's upper end.
+_WIDE = 1.4
 #: Kinds that may repeat themselves, and whose records may begin and end in motion; a hammer waits for rest.
 OPEN_ENDS = ("multisine", "random", "sweep")
 
@@ -54,6 +56,9 @@ class RunSpectra:
     peak: float = 0.0  #: m: largest motion
     one_sided: float = 0.0  #: 1 where what drives goes to one side only, 0 where to both alike
     by_time: RunSpectra | None = field(default=None, repr=False)  #: of the record times the time from its middle [s]
+    wide: RunSpectra | None = field(
+        default=None, repr=False
+    )  #: of a period, beyond the band too: film fills lines there
     #: by order n the phasors (1, n_bins, ..) of the record turned n times as fast as the shaft: at f, what is at f - nX
     turned: dict[int, RunPhasors] = field(default_factory=dict, repr=False)
 
@@ -125,26 +130,29 @@ def run_spectra(
     clean = without_disturbances(cut, lines, None if period is None else length)
     places = _places(clean.rate, length, band)
 
-    def transformed(record: Samples) -> tuple[RunPhasors, ComplexArray | None]:
+    def transformed(record: Samples, places: IntArray) -> tuple[RunPhasors, ComplexArray | None]:
         phasors = _phasors(run, record, _bins(record.rows, length, places), places, samples.rows.mean(axis=1))
         command = None if record.command is None else _bins(record.command, length, places)
         return compensated(replace(phasors, housing_mass=housing_mass), run, slower, settings.delays), command
 
-    phasors, command = transformed(clean)
-    spectra = RunSpectra(
-        replace(phasors, conditions=merged(samples.conditions, slower_condition(slower))),
-        command,
-        bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
-        lines,
-        None if period is None else length / clean.rate,
-        temperatures,
-        *_motion(clean),
-    )
-    spectra = _turned(spectra, clean, places)
+    def spectra_of(places: IntArray) -> RunSpectra:
+        phasors, command = transformed(clean, places)
+        spectra = RunSpectra(
+            replace(phasors, conditions=merged(samples.conditions, slower_condition(slower))),
+            command,
+            bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
+            lines,
+            None if period is None else length / clean.rate,
+            temperatures,
+            *_motion(clean),
+        )
+        return _turned(spectra, clean, places)
+
+    spectra = spectra_of(places)
     if period is not None:
-        return spectra
+        return replace(spectra, wide=spectra_of(_places(clean.rate, length, (0.0, _WIDE * band[1]))))
     time = (np.arange(clean.length) - 0.5 * (clean.length - 1)) / clean.rate  # from the middle of the record
-    phasors, command = transformed(clean.mapped(lambda rows: rows * time))
+    phasors, command = transformed(clean.mapped(lambda rows: rows * time), places)
     return replace(spectra, by_time=replace(spectra, phasors=phasors, command=command))
 
 

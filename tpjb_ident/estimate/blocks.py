@@ -117,6 +117,7 @@ class Blocks:
     miss: ComplexArray  #: (n,): static load against its set point, relative size + i turn [rad]
     miss_error: FloatArray  #: (n,): standard error of the run's own mean load, relative
     shaft: ComplexArray  #: (n,): unit phasor of what turns with the shaft; NaN where the line is not the shaft's
+    uneven: FloatArray  #: (n, 2): scatter of the film's force along X and Y that no repeat averages away, relative
     bent: FloatArray  #: (P,): share of H by which the amplitude of the motion may change it, by the film's harmonics
 
     def __len__(self) -> int:
@@ -144,7 +145,14 @@ def stacked(
     usual: dict[str, Any] = dict.fromkeys(("z", "slope"), np.zeros(m, complex)) | dict.fromkeys(("point", "run"), 0)
     usual |= {"omega": 0.0, "present": np.zeros(m, dtype=bool), "along": np.zeros((m, 2)), "dof": 1.0, "windows": 1.0}
     usual |= {"calibration": np.zeros(m, dtype=int), "noise": np.zeros((m, m), complex), "slope_noise": np.eye(m) + 0j}
-    usual |= {"time": 0.0, "temperature": np.nan, "miss": 0j, "miss_error": 0.0, "shaft": np.nan + 0j}
+    usual |= {
+        "time": 0.0,
+        "temperature": np.nan,
+        "miss": 0j,
+        "miss_error": 0.0,
+        "shaft": np.nan + 0j,
+        "uneven": np.zeros(2),
+    }
     columns = {
         name: np.array([row.get(name, value) for row in rows], np.asarray(value).dtype).reshape(-1, *np.shape(value))
         for name, value in usual.items()

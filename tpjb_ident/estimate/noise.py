@@ -86,7 +86,7 @@ def _force_effects(blocks: Blocks, state: State, scatter: FloatArray) -> Complex
 
 
 def scatter_patterns(blocks: Blocks, state: State, size: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Forces (n, 2) along X and along Y, `size` (n,) of the film's force each [N]."""
+    """Forces (n, 2) along X and along Y, `size` (n,) of the film's force each, or (n, 2) [N]."""
     force = np.einsum("nij,nj->ni", state.at_run(blocks), state.u[:, :2])
-    length = (size * np.linalg.norm(force, axis=1))[:, None]
+    length = (size if size.ndim > 1 else size[:, None]) * np.linalg.norm(force, axis=1)[:, None]
     return length * np.array([1.0 + 0j, 0.0]), length * np.array([0.0 + 0j, 1.0])

@@ -40,8 +40,7 @@ class BandBlocks:
     driven: BoolArray  #: (L,): whether an excitation stands above the noise
     clear: BoolArray  #: (L,): whether it does so by far in both directions
     bent: FloatArray  #: (B,): share by which the motion may change H
-    uneven: FloatArray  #: (B,): relative scatter of the lines' film force that no repeat averages away
-    turning: FloatArray  #: (B,): the same that differs from run to run with the shaft's angle
+    turning: FloatArray  #: (B,): relative scatter of the film's force from run to run with the shaft's angle
 
 
 def band_blocks(
@@ -60,7 +59,8 @@ def band_blocks(
     calibrations: list[list[Hashable]] = [[] for _ in sensors]
     operating: list[OperatingPoint] = []
     runs: list[str] = []
-    for b, (point, miss) in enumerate(zip(points, misses)):
+    films = [_film(point, clearance) for point in points]
+    for b, (point, miss, (_, uneven, _)) in enumerate(zip(points, misses, films)):
         operating += [replace(point.point, excitation=2 * np.pi * round(f, 2)) for f in point.plan.middles.tolist()]
         for members in point.members:
             spectra = [point.spectra[r] for r in members]
@@ -70,8 +70,10 @@ def band_blocks(
             row = {"calibration": calibration_numbers(channels, calibrations), "along": axes_of(channels)}
             row |= {"run": len(runs), "temperature": warmth, "miss": missed_load(miss, members)}
             for place, response in enumerate(_run_rows(point, spectra, channels, warmth, turn)):
+                bins = point.plan.bins[place]
                 at = {"point": groups[b] + place, "omega": 2 * np.pi * point.plan.middles[place]}
-                is_driven = spectra[0].driven[point.plan.bins[place]].any()
+                at["uneven"] = uneven[members[0], bins].mean(axis=0)
+                is_driven = spectra[0].driven[bins].any()
                 rows += [values | row | at for values in response if is_driven]
             runs.append(", ".join(names))
     blocks = stacked(operating, runs, len(sensors), rows)
@@ -82,7 +84,7 @@ def band_blocks(
     strong = _strengths(Rig(sensors, 1.0), blocks, line[blocks.point], len(driven)) > STRONG
     band = np.repeat(np.arange(len(points)), np.diff(lines))
     quiet = np.array([point.method == "hv" for point in points])[band]
-    bent, repeated, turning = np.array([_film(point, clearance) for point in points]).T
+    bent, _, turning = zip(*films)
     return BandBlocks(
         blocks.part(np.flatnonzero(driven[line[blocks.point]])),
         2 * np.pi * np.concatenate([plan.middles for plan in plans]),
@@ -91,14 +93,13 @@ def band_blocks(
         2 * np.pi * np.concatenate([plan.frequencies for plan in plans]),
         driven,
         np.where(quiet, np.nan_to_num(coherent) > _LEAST_COHERENCE, strong),
-        bent,
-        np.hypot(repeated, turning),
-        turning,
+        np.array(bent),
+        np.array(turning),
     )
 
 
-def _film(point: BandPoint, clearance: float | None) -> tuple[float, float, float]:
-    """What a film that is not linear may do to H, to lines of one phase set alike in all runs, and in each run."""
+def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray, float]:
+    """What a film that is not linear may do to H, to every line (n_runs, n_bins, 2), and to lines run by run."""
     periodic = point.method == "periods"
     # two tones make nothing of one another that falls on them
     pair = periodic and max(s.driven.sum() for s in point.spectra) < 3
@@ -106,13 +107,16 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, float, floa
     repeats = np.sqrt(max(len(point.spectra), 2) / 2) if periodic and not pair and one_phase_set(point.spectra) else 0.0
     film = film_products(point.spectra)
     change, scatter = film.change, film.scatter
-    if np.isnan(change) and clearance:
+    if not film.seen and not clearance:
+        change, scatter = 0.0, np.zeros_like(scatter)
+    if (np.isnan(change) or not film.seen) and clearance:
         rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
         one_sided = max(s.one_sided for s in point.spectra)
-        change = band_change("pair" if pair else point.group.kind, rms, peak, one_sided)
-        scatter = line_scatter(rms) if film.even else change
-    change, scatter = np.nan_to_num([change, scatter])
-    return worth_stating(change + film.orbit), scatter * repeats, film.turning
+        stated = band_change("pair" if pair else point.group.kind, rms, peak, one_sided)
+        scatter = np.fmin(scatter, (line_scatter(rms) if film.even else stated) / np.sqrt(2))
+        change = np.fmin(change, stated)
+    uneven = np.hypot(repeats * np.nan_to_num(scatter), film.turning / np.sqrt(2))
+    return worth_stating(float(np.nan_to_num(change)) + film.orbit), uneven, film.turning
 
 
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:

@@ -119,7 +119,7 @@ class _Task:
     def with_gains(self, deviation: FloatArray) -> _Task:
         """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
         rig, blocks = self.rig, self.data.blocks
-        film = Distortion(rig, blocks, self.data.bent, self.data.band[self.data.line], self.data.uneven)
+        film = Distortion(rig, blocks, self.data.bent, self.data.band[self.data.line])
         prepared = [RunGain(rig, blocks, deviation), film, Clock(rig, blocks, self.taken_off)]
         return replace(self, terms=tuple(campaign_terms(rig, blocks, self.correct, prepared)))
 

@@ -39,25 +39,17 @@ def line_scatter(rms: float) -> float:
 class Distortion(FilmTerm):
     """Real and imaginary parts of H of every band, each changed by its own share, which no run tells; lines scatter.
 
-    `share`, `scatter` by band, `band` (P,) of every point.
+    `share` by band, `band` (P,) of every point.
     """
 
     name = "distortion"
     never_estimated = True
 
-    def __init__(
-        self,
-        rig: Rig,
-        blocks: Blocks,
-        share: FloatArray | None = None,
-        band: IntArray | None = None,
-        scatter: FloatArray | None = None,
-    ) -> None:
+    def __init__(self, rig: Rig, blocks: Blocks, share: FloatArray | None = None, band: IntArray | None = None) -> None:
         super().__init__(rig, blocks)
-        self._scatter = scatter
-        self._band = np.zeros(len(blocks.points), dtype=np.intp) if band is None else band
+        band = np.zeros(len(blocks.points), dtype=np.intp) if band is None else band
         share = np.zeros(1) if share is None else share
-        self.group = np.where(share > 0, np.cumsum(share > 0) - 1, -1)[self._band]
+        self.group = np.where(share > 0, np.cumsum(share > 0) - 1, -1)[band]
         for b in np.flatnonzero(share):
             self.parameters += numbered(f"band {b + 1}", "1", [CHANGE_AS_DEVIATION * float(share[b])] * NUMBERS)
 
@@ -67,7 +59,7 @@ class Distortion(FilmTerm):
 
     def random_effects(self, blocks: Blocks, state: State) -> ComplexArray | None:
         """The film's force at every line of one phase set, along X and Y: cells and housing answer to it alike."""
-        if self._scatter is None or not self._scatter.any():
+        if not blocks.uneven.any():
             return None
-        size = self._scatter[self._band[blocks.point]] / np.sqrt(2)
-        return film_force_rows(self.rig, blocks, state, np.stack(scatter_patterns(blocks, state, size), axis=2))
+        patterns = np.stack(scatter_patterns(blocks, state, blocks.uneven), axis=2)
+        return film_force_rows(self.rig, blocks, state, patterns)
