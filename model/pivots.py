@@ -37,15 +37,48 @@ class PivotLaw(Protocol):
         ...
 
     def deflection(self, load: float) -> float:
-        """delta(W) [m], for W >= 0 [N]."""
+        """delta(W) [m], for W >= 0 [N].
+
+        Parameters
+        ----------
+        load : float
+            Pad load [N], zero or positive.
+
+        Returns
+        -------
+        float
+            [m]
+        """
         ...
 
     def stiffness(self, load: float) -> float:
-        """Tangent dW/ddelta [N/m]; infinite for a rigid pivot."""
+        """Tangent dW/ddelta [N/m]; infinite for a rigid pivot.
+
+        Parameters
+        ----------
+        load : float
+            Pad load [N], zero or positive.
+
+        Returns
+        -------
+        float
+            [N/m]
+        """
         ...
 
     def vibration_stiffness(self, load: float) -> float:
-        """What small vibrations feel [N/m]: the tangent, unless the law says otherwise."""
+        """What small vibrations feel [N/m]: the tangent, unless the law says otherwise.
+
+        Parameters
+        ----------
+        load : float
+            Pad load [N], zero or positive.
+
+        Returns
+        -------
+        float
+            [N/m]
+        """
         ...
 
 

@@ -15,9 +15,9 @@ from model.film.reynolds import solve_film
 from model.film.slopes import shape_slopes
 from model.pivots import pivot_laws
 from model.predict import predict
-from tests.pad_responses import pad_solid
 from model.setup import Setup
 from model.statics.search import Search
+from tests.pad_responses import pad_solid
 
 SPEED = 2 * math.pi * 22
 
