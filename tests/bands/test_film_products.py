@@ -115,4 +115,4 @@ def test_runs_without_a_driven_line_tell_nothing():
     silent = replace(run, disturbed=np.ones(len(run.frequencies), dtype=bool))
     lines = film_products([silent, silent])
     assert np.isnan(lines.change)
-    assert np.isnan(lines.scatter)
+    assert np.isnan(lines.scatter).all()

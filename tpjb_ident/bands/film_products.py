@@ -53,14 +53,14 @@ class FilmProducts:
 
 def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
     """What the lines of a point's runs tell; of a period, those beyond the band as well."""
-    untold = np.full((len(runs), len(runs[0].frequencies), 2), np.nan)
+    unknown = np.full((len(runs), len(runs[0].frequencies), 2), np.nan)
     within, runs = runs[0].frequencies, [run.wide or run for run in runs]
     driven = np.all([run.driven & ~run.disturbed for run in runs], axis=0)
     film = _film(runs, driven)
     turned = [film.at_turned(runs, order) for order in (1, 2)]
     orbit = ALLOWED_CHANGE * CHANGE_BY_ORBIT * turned[1]
     if runs[0].period is None or not driven.any():
-        return FilmProducts(np.nan, untold, orbit, 0.0, True)
+        return FilmProducts(np.nan, unknown, orbit, 0.0, True)
     number = np.round(runs[0].frequencies * runs[0].period).astype(int)
     beside = [np.isin(number, _beside_shaft(runs[0], order)) for order in (1, 2)]
     falls_on_lines = [bool((driven & places).any()) for places in beside]
@@ -73,13 +73,13 @@ def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
     undriven &= reached.any(axis=1)
     even = bool(reached[driven, 0].mean() > 0.5)
     if undriven.sum() < _LEAST_LINES:
-        return FilmProducts(np.nan, untold, *shaft, even)
+        return FilmProducts(np.nan, unknown, *shaft, even)
     sums *= [8.0, 24.0]  # of amplitudes' squares, 4 S
-    told = sums[:, undriven], *film.excess(runs, undriven)
-    curvature, clear = _hidden(*told)
+    shown = sums[:, undriven], *film.excess(runs, undriven)
+    curvature, clear = _hidden(*shown)
     seen = bool(clear.max() > _CLEAR)
     if seen:
-        curvature = np.array([[_curvature(part, *axis) for axis in zip(*axes)] for part, *axes in zip(*told)])
+        curvature = np.array([[_curvature(part, *axis) for axis in zip(*axes)] for part, *axes in zip(*shown)])
     square, cube = curvature.sum(axis=1).mean(axis=0)
     stiffness = np.sqrt(film.force / np.mean(motion, axis=0)[driven].mean())
     cube = max(cube, (_STANDS_IN * square / stiffness) ** 2)

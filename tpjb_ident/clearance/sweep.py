@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions
-from tpjb_ident.phasors.bad_samples import robust_deviation
+from tpjb_ident.phasors.bad_samples import robust_deviation, white_noise
 from tpjb_ident.phasors.slow_samples import (
     REMEDY,
     contradictions,
@@ -130,7 +130,8 @@ def _average(
     # the shaft touches a pad within some micrometres of where it was farthest out
     period = float(time[-1] - time[0]) / (len(time) - 1)
     samples = max(round(length / period), 1)
-    outward = uniform_filter1d(position, samples, axis=0) @ directions(angles).T
+    noisy = (max(map(white_noise, position.T)) / (0.5 * _CONTACT_DEPTH)) ** 2
+    outward = uniform_filter1d(position, int(np.clip(noisy, 1, samples)), axis=0) @ directions(angles).T
     touched = np.asarray(outward > np.quantile(outward, 0.995, axis=0) - depth)
     carried = _carried(load, angles, touched)
     state = touched @ (1 << np.arange(len(angles)))

@@ -78,8 +78,7 @@ def identify(
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     report = progress or (lambda text, done, total: None)
     settings = _with_mains(replace(chosen, method=method or chosen.method), campaign)
-    single, _ = method_of(settings.method)
-    dry = dry_test(campaign, settings.phasors, SOLVED if single == "iv" else single)
+    dry = dry_test(campaign, settings.phasors, _without_instruments(settings.method))
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
     bands = None
     if any(is_broadband(run) for run in runs):
@@ -91,6 +90,12 @@ def identify(
     identification = identification if bands is None else _joined(identification, bands)
     identification = replace(identification, points=with_frequency_outliers(identification.points))
     return _with_zero_uncertainty(identification, campaign)
+
+
+def _without_instruments(name: str) -> str:
+    """The method of a name, or the default one where it needs a command; an unknown one is refused."""
+    method, _ = method_of(name)
+    return SOLVED if method == "iv" else method
 
 
 def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -> Identification:
