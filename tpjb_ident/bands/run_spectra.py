@@ -137,7 +137,7 @@ def run_spectra(
 
     def spectra_of(places: IntArray) -> RunSpectra:
         phasors, command = transformed(clean, places)
-        spectra = RunSpectra(
+        return RunSpectra(
             replace(phasors, conditions=merged(samples.conditions, slower_condition(slower))),
             command,
             bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
@@ -146,11 +146,12 @@ def run_spectra(
             temperatures,
             *_motion(clean),
         )
-        return _turned(spectra, clean, places)
 
     spectra = spectra_of(places)
     if period is not None:
-        return replace(spectra, wide=spectra_of(_places(clean.rate, length, (0.0, _WIDE * band[1]))))
+        beyond = _places(clean.rate, length, (0.0, _WIDE * band[1]))
+        return replace(spectra, wide=_turned(spectra_of(beyond), clean, beyond))
+    spectra = _turned(spectra, clean, places)
     time = (np.arange(clean.length) - 0.5 * (clean.length - 1)) / clean.rate  # from the middle of the record
     phasors, command = transformed(clean.mapped(lambda rows: rows * time), places)
     return replace(spectra, by_time=replace(spectra, phasors=phasors, command=command))
