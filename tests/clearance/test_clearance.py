@@ -179,13 +179,13 @@ def test_unequal_probes_are_made_alike_and_their_difference_is_in_the_interval(o
 def test_a_sweep_of_three_or_four_pads_says_what_it_leaves_open(whole):
     found = measure_run(whole[0].of_kind("clearance")[0], ANGLES)
     sides = SimpleNamespace(pads=np.arange(3), distance=found.clearance[:3], covariance=np.eye(3) * 1e-16)
-    assert "only their mean" in _inseparable(sides, found)
+    assert "only their mean" in _inseparable(sides, found, 0)
     square = replace(found, angles=np.radians([-90.0, 0.0, 90.0, 180.0]), clearance=found.clearance[:4])
     square = replace(square, relative_calibration=np.zeros(4))
     sides = SimpleNamespace(pads=np.arange(4), distance=np.array([80, 80, 88, 80]) * 1e-6, covariance=np.eye(4) * 1e-16)
-    assert "nothing tells which: pad #1 +8.0 µm, pad #2 -8.0 µm, pad #3 +8.0 µm" in _inseparable(sides, square)
+    assert "nothing tells which: pad #1 +8.0 µm, pad #2 -8.0 µm, pad #3 +8.0 µm" in _inseparable(sides, square, 0)
     sides.distance = np.full(4, 80e-6)
-    assert _inseparable(sides, square) == ""
+    assert _inseparable(sides, square, 0) == ""
 
 
 def test_a_clean_sweep_is_measured_to_a_tenth_of_a_micrometre(opened):

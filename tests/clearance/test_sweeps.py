@@ -55,7 +55,17 @@ def pushed(force, clearance, stiffness):
 
 
 def sweep(
-    folder, rate=50.0, seconds=60.0, turns=1.0, steps=0, noise=0.2e-6, stiffness=3e8, runout=0.0, off=0.0, step=0
+    folder,
+    rate=50.0,
+    seconds=60.0,
+    turns=1.0,
+    steps=0,
+    noise=0.2e-6,
+    stiffness=3e8,
+    runout=0.0,
+    off=0.0,
+    last=0.0,
+    step=0,
 ):
     """A campaign of one sweep, and the pads' clearances (5,) [m]; `step` [m] of the probes' converter."""
     rng = np.random.default_rng(20)
@@ -65,7 +75,7 @@ def sweep(
         np.minimum(np.floor(share * steps), steps - 1) / steps if steps else share
     )
     force = PUSH * np.column_stack([np.cos(angle), np.sin(angle)])
-    clearance = 80e-6 + np.array([0.0, off, 0.0, 0.0, 0.0])
+    clearance = 80e-6 + np.array([0.0, off, 0.0, 0.0, last])
     probes = (pushed(force, clearance, stiffness) + CENTRE) @ directions(np.radians([45.0, 135.0])).T
     probes += runout * np.column_stack([np.sin(33.0 * share + 0.3), np.cos(33.0 * share + 0.3)])
     probes += noise * rng.standard_normal(probes.shape)
@@ -108,3 +118,14 @@ def test_a_half_turn_and_a_shaft_that_was_turned_are_refused(tmp_path, name, cha
     campaign, _ = sweep(tmp_path, **change)
     with pytest.raises(RigDataError, match=name):
         measure_clearance(campaign, ANGLES)
+
+
+def test_two_of_five_pads_that_deviate_leave_the_centre_open(tmp_path):
+    """A centre elsewhere explains the sweep with other deviations; they are right but for a shift of all."""
+    campaign, clearance = sweep(tmp_path, off=9e-6, last=-7e-6)
+    measured = measure_clearance(campaign, ANGLES)
+    (text,) = [condition.detail for condition in measured.status if condition == "pads-not-separable"]
+    assert "2 of 5 deviate" in text
+    error, normals = measured.clearance - clearance, directions(ANGLES)
+    shift = np.linalg.lstsq(normals, error, rcond=None)[0]
+    assert np.abs(error - normals @ shift).max() < 0.2e-6

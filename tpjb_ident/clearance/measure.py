@@ -304,7 +304,7 @@ def _status(fit: SideFit, polygon: ClearancePolygon) -> tuple[Condition, ...]:
     is_turned = abs(turn) > max(_IRREGULAR * np.sqrt(np.mean(fit.tilt_se**2) / len(fit.pads)), 5e-3)
     return holding(
         (missing, "pads-not-reached", missing),
-        (inseparable := _inseparable(fit, polygon), "pads-not-separable", inseparable),
+        (inseparable := _inseparable(fit, polygon, len(deviating)), "pads-not-separable", inseparable),
         (np.isnan(fit.scale), "give-from-sweep", "no pivot curves, zero load extrapolated from the sweep alone"),
         (disagrees, "pivots-disagree", give),
         (listed, "irregular", f"{listed} from the median of all: worn, damaged or wrongly assembled"),
@@ -318,10 +318,15 @@ def _offsets(pads: IntArray, offsets: FloatArray) -> str:
     return ", ".join(f"pad #{pad + 1} {1e6 * offset:+.1f} µm" for pad, offset in zip(pads, offsets, strict=True))
 
 
-def _inseparable(fit: SideFit, polygon: ClearancePolygon) -> str:
-    """What the sides of three or four pads leave open; empty where they are alike or there are more of them."""
+def _inseparable(fit: SideFit, polygon: ClearancePolygon, deviating: int) -> str:
+    """What the sides leave open of which so many deviate; empty where four or more are alike, or all of four are."""
     if len(fit.pads) == 3:
         return "three pads fit every centre: equal clearances are assumed, only their mean is measured"
+    if len(fit.pads) > 4:
+        text = (
+            f"{deviating} of {len(fit.pads)} deviate: a centre elsewhere, with other deviations, fits the sweep as well"
+        )
+        return text if len(fit.pads) - deviating < 4 else ""
     suspects = find_centre(polygon.angles[fit.pads], fit.distance, fit.covariance).suspects
     gains = (polygon.relative_calibration * polygon.clearance)[fit.pads]
     error = np.sqrt(np.trace(fit.covariance) + np.sum(gains**2))

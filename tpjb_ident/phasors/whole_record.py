@@ -25,6 +25,8 @@ _CLEAR_OF = 1.2
 #: Share of the largest difference between readings below which one is a residue of arithmetic, no converter's step;
 #: largest square of a line by rounding, over the third power of the step over the amplitude (4 / pi^4 over 2^0.5).
 _NO_STEP, _LARGEST = 1e-6, 0.029
+#: Deviation of white noise over the median size of its second differences.
+_WHITE = 1.4826 / np.sqrt(6)
 #: Order of the polynomial that takes slow movements of the shaft along: a window has 1.
 _DRIFT_ORDER = 3
 
@@ -101,11 +103,16 @@ def fitted_whole(
 
 
 def _rounding(rows: FloatArray) -> FloatArray:
-    """Largest square that a converter's steps put on a line of readings (n_channels, n): of a Bessel function."""
+    """Largest square that a converter's steps put on a line of readings (n_channels, n): of a Bessel function.
+
+    Noise dithers them: of one of half a step nothing is left.
+    """
     moves = np.abs(np.diff(rows))
     largest = np.nanmax(moves, axis=1, keepdims=True, initial=0.0)
-    step = np.where(moves > _NO_STEP * largest, moves, largest).min(axis=1)
-    return _LARGEST * step**3 / (np.fmax(np.std(rows, axis=1), step) + np.finfo(float).tiny)
+    step = np.where(moves > _NO_STEP * largest, moves, largest).min(axis=1) + np.finfo(float).tiny
+    noise = _WHITE * np.nanmedian(np.abs(np.diff(rows, 2)), axis=1)
+    dithered = np.exp(-((2 * np.pi * noise / step) ** 2))
+    return np.asarray(_LARGEST * dithered * step**3 / np.fmax(np.std(rows, axis=1), step))
 
 
 def with_record(result: RunPhasors, records: tuple[WholeRecord, ...]) -> RunPhasors:
@@ -124,7 +131,7 @@ def _residual_bins(records: tuple[WholeRecord, ...], line: int, channels: int) -
     frequencies = first.lines.whole_frequencies * first.duration
     offsets = np.arange(_BESIDE[0], _BESIDE[1] + 1)
     bins = round(frequencies[line]) + np.concatenate([-offsets[::-1], offsets])
-    free = np.abs(bins[:, None] - np.delete(frequencies, line)).min(axis=1) > _CLEAR_OF
+    free = np.abs(bins[:, None] - np.delete(frequencies, line)).min(axis=1, initial=np.inf) > _CLEAR_OF
     bins = bins[free & (bins > 0) & (bins < len(first.spectrum))]
     residual = np.full((len(bins), channels), np.nan + 0j)
     for record in records:
