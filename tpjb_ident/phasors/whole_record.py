@@ -110,7 +110,7 @@ def _rounding(rows: FloatArray) -> FloatArray:
     moves = np.abs(np.diff(rows))
     largest = np.nanmax(moves, axis=1, keepdims=True, initial=0.0)
     step = np.where(moves > _NO_STEP * largest, moves, largest).min(axis=1) + np.finfo(float).tiny
-    noise = _WHITE * np.nanmedian(np.abs(np.diff(rows, 2)), axis=1)
+    noise = _WHITE * np.median(np.nan_to_num(np.abs(np.diff(rows, 2))), axis=1)
     dithered = np.exp(-((2 * np.pi * noise / step) ** 2))
     return np.asarray(_LARGEST * dithered * step**3 / np.fmax(np.std(rows, axis=1), step))
 
