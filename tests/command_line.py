@@ -18,7 +18,7 @@ if (builder := getattr(typer.testing, "_get_command", None)) is not None:
 
 
 #: Commands that draw, which need the pictures' module anyway.
-DRAWING = ("show", "pivot", "locus", "compare", "demo", "diagnose", "plan", "watch")
+DRAWING = ("show", "pivot", "locus", "compare", "demo", "diagnose", "plan", "watch", "rerun")
 
 
 @contextlib.contextmanager
