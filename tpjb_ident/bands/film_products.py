@@ -48,7 +48,7 @@ class FilmProducts:
     orbit: float  #: share by which the shaft's orbit may change H
     turning: float  #: relative scatter of a line's film force that differs from run to run with the shaft's angle
     even: bool  #: whether sums of two driven lines fall on driven ones
-    seen: bool = True  #: whether undriven lines show products above their noise; else what that could hide stands above
+    seen: bool = False  #: whether undriven lines show products above their noise; else what that could hide is given
 
 
 def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:

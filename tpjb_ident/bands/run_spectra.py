@@ -58,7 +58,7 @@ class RunSpectra:
     by_time: RunSpectra | None = field(default=None, repr=False)  #: of the record times the time from its middle [s]
     wide: RunSpectra | None = field(
         default=None, repr=False
-    )  #: of a period, beyond the band too: film fills lines there
+    )  #: of a period, and beyond the band, where the film answers
     #: by order n the phasors (1, n_bins, ..) of the record turned n times as fast as the shaft: at f, what is at f - nX
     turned: dict[int, RunPhasors] = field(default_factory=dict, repr=False)
 
@@ -128,7 +128,7 @@ def run_spectra(
     if period is not None:
         length, cut, width = round(period), resampled(driven, period, band[1]), LEFT_OUT_OF_PERIOD
     clean = without_disturbances(cut, lines, None if period is None else length)
-    places = _places(clean.rate, length, band)
+    places, motion = _places(clean.rate, length, band), _motion(clean)
 
     def transformed(record: Samples, places: IntArray) -> tuple[RunPhasors, ComplexArray | None]:
         phasors = _phasors(run, record, _bins(record.rows, length, places), places, samples.rows.mean(axis=1))
@@ -144,7 +144,7 @@ def run_spectra(
             lines,
             None if period is None else length / clean.rate,
             temperatures,
-            *_motion(clean),
+            *motion,
         )
 
     spectra = spectra_of(places)

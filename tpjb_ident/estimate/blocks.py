@@ -123,6 +123,11 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.point)
 
+    @property
+    def usual_omega(self) -> float:
+        """Median frequency of the blocks [rad/s]; one where there are none."""
+        return float(np.median(self.omega)) if len(self) else 1.0
+
     def noise_power(self, rows: IntArray) -> FloatArray:
         """Sum of the noise's variances of some sensors, (n,)."""
         return np.einsum("njj->n", self.noise[:, rows][:, :, rows]).real

@@ -92,7 +92,6 @@ class Term:
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         self.rig = rig
-        self._omega = float(np.median(blocks.omega)) if len(blocks) else 1.0
         self.parameters: tuple[Parameter, ...] = ()
         self.points: tuple[int, ...] = ()
         self.prepare(rig, blocks)

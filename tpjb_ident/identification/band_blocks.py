@@ -109,14 +109,14 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
     change, scatter = film.change, film.scatter
     if not film.seen and not clearance:
         change, scatter = 0.0, np.zeros_like(scatter)
-    if (np.isnan(change) or not film.seen) and clearance:
+    elif not film.seen:
         rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
         one_sided = max(s.one_sided for s in point.spectra)
         stated = band_change("pair" if pair else point.group.kind, rms, peak, one_sided)
         scatter = np.fmin(scatter, (line_scatter(rms) if film.even else stated) / np.sqrt(2))
         change = np.fmin(change, stated)
-    uneven = np.hypot(repeats * np.nan_to_num(scatter), film.turning / np.sqrt(2))
-    return worth_stating(float(np.nan_to_num(change)) + film.orbit), uneven, film.turning
+    uneven = np.hypot(repeats * scatter, film.turning / np.sqrt(2))
+    return worth_stating(change + film.orbit), uneven, film.turning
 
 
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:

@@ -12,6 +12,7 @@ from scipy.ndimage import median_filter
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.run import Run
+from tpjb_ident.phasors.bad_samples import white_noise
 from tpjb_ident.phasors.channel_times import Samples, device_readers
 from tpjb_ident.phasors.frequency import exact_frequencies
 from tpjb_ident.phasors.line_fit import LineFitter
@@ -25,8 +26,6 @@ _CLEAR_OF = 1.2
 #: Share of the largest difference between readings below which one is a residue of arithmetic, no converter's step;
 #: largest square of a line by rounding, over the third power of the step over the amplitude (4 / pi^4 over 2^0.5).
 _NO_STEP, _LARGEST = 1e-6, 0.029
-#: Deviation of white noise over the median size of its second differences.
-_WHITE = 1.4826 / np.sqrt(6)
 #: Order of the polynomial that takes slow movements of the shaft along: a window has 1.
 _DRIFT_ORDER = 3
 
@@ -110,7 +109,7 @@ def _rounding(rows: FloatArray) -> FloatArray:
     moves = np.abs(np.diff(rows))
     largest = np.nanmax(moves, axis=1, keepdims=True, initial=0.0)
     step = np.where(moves > _NO_STEP * largest, moves, largest).min(axis=1) + np.finfo(float).tiny
-    noise = _WHITE * np.median(np.nan_to_num(np.abs(np.diff(rows, 2))), axis=1)
+    noise = np.array([white_noise(row) for row in np.nan_to_num(rows)])
     dithered = np.exp(-((2 * np.pi * noise / step) ** 2))
     return np.asarray(_LARGEST * dithered * step**3 / np.fmax(np.std(rows, axis=1), step))
 

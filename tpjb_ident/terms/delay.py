@@ -24,6 +24,7 @@ class Delay(Factor):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
+        self._omega = blocks.usual_omega
         deviations: dict[str, float] = {}
         for sensor in rig.sensors:
             if sensor.delay_uncertainty:

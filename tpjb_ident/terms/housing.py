@@ -55,6 +55,7 @@ class Housing(Term):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
+        self._omega = blocks.usual_omega
         self._inertia = _inertia_share(rig, blocks)
         self._blocks = blocks
         usual, across, loss = _CELLS

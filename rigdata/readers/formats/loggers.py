@@ -15,8 +15,8 @@ from rigdata.readers.series import Series, equidistant, is_time, seconds, to_tem
 
 #: Function types of data set 58 that are records over time.
 _GENERAL, _TIME_RESPONSE = 0, 1
-#: Directions of data set 58 by their numbers, from -3 to 3.
-_DIRECTIONS = ("", "+X", "+Y", "+Z", "-Z", "-Y", "-X")
+#: Directions of data set 58 by their numbers.
+_DIRECTIONS: dict[Any, str] = {1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z"}
 
 
 def read_tdms(path: Path) -> list[Series]:
@@ -109,10 +109,10 @@ def _record_name(data: dict[str, Any], index: int) -> str:
         text = str(data.get(key) or "").strip()
         if text and text.upper() != "NONE":
             return text
-    node, code = data.get("rsp_node"), data.get("rsp_dir", 0)
+    node, code = data.get("rsp_node"), data.get("rsp_dir")
     if not node:
         return f"set {index + 1}"
-    return f"Rsp {node}{_DIRECTIONS[code] if code in range(-3, 4) else ''}"
+    return f"Rsp {node}{_DIRECTIONS.get(code, '')}"
 
 
 def read_mdf(path: Path) -> list[Series]:
