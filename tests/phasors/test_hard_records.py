@@ -7,6 +7,7 @@ import pytest
 
 from rigdata.device import Device
 from tests.rigs.held_run import POINT, HeldReader, channels, run_of
+from tpjb_ident.phasors.frequency import DRIFT
 from tpjb_ident.phasors.run_phasors import run_phasors
 
 RATE, SECONDS = 2000.0, 4.0
@@ -74,17 +75,28 @@ def test_isolated_bad_samples_take_nothing_with_them():
     assert result.lost[:, [1, 2, 4, 5]].max() == 0.0
 
 
-@pytest.mark.parametrize("distance", [0.4, -0.3, 0.8])
-def test_a_line_beside_the_drive_is_found_and_fitted_along(distance):
+# a strong one's beat looks like a drive off its set point, and like a shaft that changes its speed
+@pytest.mark.parametrize(("distance", "share"), [(0.4, 0.12), (-0.3, 0.12), (0.8, 0.12), (-0.35, 0.8), (0.6, 0.9)])
+def test_a_line_beside_the_drive_is_found_and_fitted_along(distance, share):
     data = record()
     for name in ("FX", "FY", "DX", "DY"):
-        other = 0.12 * abs(Z[name]) * np.cos(2 * np.pi * (25.0 + distance) * TIME + 0.7)
+        other = share * abs(Z[name]) * np.cos(2 * np.pi * (25.0 + distance) * TIME + 0.7)
         data[name] = data[name] + other
     result = phasors_of(data)
     assert error(result) < 2e-3
     assert "unexpected lines" in result.conditions
     found = [line.frequency for line in result.lines.nuisance if line.name == "found"]
     assert found == [pytest.approx(25.0 + distance, abs=0.01)]
+    assert result.lines.driven == pytest.approx((25.0,), abs=0.01)
+    assert not {"excitation off set point", DRIFT} & {str(condition) for condition in result.conditions}
+
+
+@pytest.mark.parametrize("off", [0.1, 0.4, 1.5])
+def test_a_drive_off_its_set_point_is_one_line_and_turns_no_shaft(off):
+    result = phasors_of(record(drive=25.0 + off))
+    assert error(result) < 1e-2  # a hundredth of a turn is no error of the frequency; all channels share it
+    assert result.lines.driven == pytest.approx((25.0 + off,), abs=2e-3)
+    assert {str(condition) for condition in result.conditions} == {"excitation off set point"}
 
 
 def test_a_drive_that_grows_or_wanders_is_no_second_line():

@@ -251,6 +251,9 @@ def test_how_h_turns_with_the_load_s_direction_is_learnt_from_the_runs_own_misse
     assert (np.abs(turn.value - turning) < 4 * turn.deviation).all()
     assert held(solution, truth)
     without = solved(rig, blocks, truth, without=(LoadTurn,))
+    # a turn that all runs miss does what the runs' own turns do
+    turned, plausible = (each.shares["load miss"][:, 1:3, 1:3].trace(axis1=1, axis2=2) for each in (solution, without))
+    assert not np.allclose(turned, plausible, rtol=0.05)
     gain = np.abs(without.h - truth).max(axis=(1, 2)) / np.abs(solution.h - truth).max(axis=(1, 2))
     assert np.median(gain) > 2
 

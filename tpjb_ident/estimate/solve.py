@@ -290,16 +290,18 @@ class Solver:
         fitted, shares = {}, {}
         for term in self.terms:
             if term.points:
-                posterior = (
-                    self.by_point.of(term, last.by_point.deviation),
-                    self.by_point.of(term, last.by_point.estimated),
-                )
+                table, deviation, estimated = self.by_point, last.by_point.deviation, last.by_point.estimated
+            else:
+                table, deviation, estimated = self.shared, last.deviation[None], last.estimated[None]
+            posterior = table.of(term, deviation), table.of(term, estimated)
+            fitted[term.name] = Fitted(self._value(term), *posterior, self.housing_noise)
+        for term in self.terms:
+            if term.points:
                 share = last.point_share(self.by_point.chosen(term))
             else:
-                posterior = (self.shared.of(term, last.deviation[None]), self.shared.of(term, last.estimated[None]))
-                part = factors[self.shared.chosen(term)[0]]
-                share = np.einsum("qpa,qpb->pab", part, part)
-            fitted[term.name] = Fitted(self._value(term), *posterior, self.housing_noise)
+                chosen = self.shared.chosen(term)[0]
+                factors[chosen] *= term.learnt_share(fitted)[:, None, None]
+                share = np.einsum("qpa,qpb->pab", factors[chosen], factors[chosen])
             shares[term.name] = share * self.unit**2
         weight = self.scatter.weights
         chi_square = totals(self.group, weight * fit.chi_square, groups)

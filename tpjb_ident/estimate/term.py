@@ -4,7 +4,7 @@ A term speaks of readings. It knows nothing of residuals, weights or points, nor
 A user's own term is a subclass handed to `tpjb_ident.estimate.solve`; docs/design.md has a worked example.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,6 +122,10 @@ class Term:
     def slope_columns(self, blocks: Blocks, reading: ComplexArray) -> ComplexArray:
         """Change of the readings' slope over time [1/s] per unit of every parameter, (n, m, q); `reading` (n, m)."""
         return np.zeros((*reading.shape, len(self.parameters)), complex)
+
+    def learnt_share(self, fitted: Mapping[str, Fitted]) -> FloatArray:
+        """What is left of the priors by what other terms have `fitted`, (q,): of parameters that no record tells."""
+        return np.ones(len(self.parameters))
 
     def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
         """The sensors as uncertain as the records show them; None where they are as stated."""

@@ -8,6 +8,7 @@ slow change, one more line explains what is left.
 """
 
 import numpy as np
+from scipy.optimize import minimize
 from scipy.signal import find_peaks
 
 from rigdata.arrays import ComplexArray, FloatArray
@@ -95,7 +96,7 @@ def vertex(three: FloatArray) -> float:
 
 
 #: Windows that tell a line beside the excitation from its slow change, at least.
-_LEAST = 8
+_LEAST = 6
 #: Windows that its slow change and a line take of them,
 _TAKEN = 4
 #: distances from the excitation at which a line is looked for [1 / record length],
@@ -106,47 +107,57 @@ _CLEAR_POWER = 25.0
 _LEFT = 0.004
 
 
-def near_line(result: RunPhasors, driven: int, duration: float, rate: float) -> float | None:
-    """Frequency [Hz] of a line close beside an excitation line of a record of `duration` [s]; None where there is none.
+def near_line(result: RunPhasors, driven: int, duration: float, rate: float) -> tuple[float, float] | None:
+    """Frequencies [Hz] of an excitation line of a record of `duration` [s] and of a line close beside it, if there is.
 
-    Its beat shows in the windows' phasors.
+    Its beat shows in the windows' phasors. A drive that is off its set point, or changes slowly, has none.
     """
     frequency = result.lines.excitation[driven].frequency
-    distances = np.abs(np.delete(result.lines.frequencies, driven) - frequency) * duration
+    others = (np.delete(result.lines.frequencies, driven) - frequency) * duration
     noise = phasor_noise(result, rate)
     live = np.isfinite(noise)
     z = result.z[:, driven, live] / noise[live]
     good = np.isfinite(z).all(axis=1)
-    if (distances < _FARTHEST).any() or good.sum() < _LEAST or not live.any():
+    if good.sum() < _LEAST or not live.any():
         return None
     windows, time = z[good], (result.start[good] + 0.5 * result.length) / duration
-    remainder, shift, power = _best(windows, time)
     count, channels = windows.shape
-    amplitude = float(np.median(np.linalg.norm(windows, axis=1)))
-    spare = count - _TAKEN
-    clear = power > _CLEAR_POWER * channels and remainder - count * channels < _LEFT * spare * power
-    return frequency + shift / duration if clear and power > count * (MIN_SHARE * amplitude) ** 2 else None
+    smallest = max(
+        _CLEAR_POWER * channels, count * (MIN_SHARE * float(np.median(np.linalg.norm(windows, axis=1)))) ** 2
+    )
+    if float(_left(windows, time, np.zeros((1, 1)))[0]) < smallest:
+        return None
+    # beyond half a turn from window to window phases say nothing
+    alone = _least(windows, time, np.arange(-0.45 * count, 0.45 * count, _STEP)[:, None])
+    distances = np.arange(-_FARTHEST, _FARTHEST, _STEP)
+    for drive in (0.0, float(alone[0])):
+        apart = np.abs(np.subtract.outer(drive + distances, np.append(drive, others))).min(axis=1) >= _NEAREST
+        pair = _least(windows, time, drive + np.multiply.outer(distances[apart], [0.0, 1.0]))
+        if drive:
+            pair = minimize(lambda places: _left(windows, time, places[None])[0], pair, method="Nelder-Mead").x
+        remainder = float(_left(windows, time, pair[None])[0])
+        power = float(_left(windows, time, np.array([alone, pair[:1]])).min()) - remainder
+        if power > smallest and remainder - count * channels < _LEFT * (count - _TAKEN) * power:
+            exact, near = (frequency + pair / duration).tolist()
+            return exact, near
+    return None
 
 
-def _best(windows: ComplexArray, time: FloatArray) -> tuple[float, float, float]:
-    """Power that is left beside the line that explains most, its distance [1 / record length], its power.
+def _left(windows: ComplexArray, time: FloatArray, places: FloatArray) -> FloatArray:
+    """Power that a drive which changes slowly, and a steady line beside it, leave of windows (n, m), (k,).
 
-    `windows` (n, m), `time` (n,) over the record's length.
+    `time` (n,) over the record's length, `places` (k, 1 or 2) of drive and line from the set point [1 / record length].
     """
-    steady = np.linalg.qr(np.vander(time - 0.5, 3) + 0j)[0]
-    unsteady = windows - steady @ (steady.conj().T @ windows)
-    total = float(np.sum(np.abs(unsteady) ** 2))
+    waves = np.exp(2j * np.pi * time[:, None] * places[:, None, :])
+    basis = np.linalg.qr(np.concatenate([np.vander(time - 0.5, 3) * waves[..., :1], waves[..., 1:]], axis=2))[0]
+    explained = np.sum(np.abs(basis.conj().swapaxes(1, 2) @ windows) ** 2, axis=(1, 2))
+    return np.asarray(np.sum(np.abs(windows) ** 2) - explained)
 
-    def explained(shifts: FloatArray) -> FloatArray:
-        waves = np.exp(2j * np.pi * np.multiply.outer(time, shifts))
-        waves -= steady @ (steady.conj().T @ waves)
-        power = np.sum(np.abs(waves.conj().T @ unsteady) ** 2, axis=1)
-        return np.asarray(power / np.sum(np.abs(waves) ** 2, axis=0))
 
-    shifts = np.arange(_NEAREST, _FARTHEST, _STEP)
-    shifts = np.concatenate([-shifts, shifts])
+def _least(windows: ComplexArray, time: FloatArray, places: FloatArray) -> FloatArray:
+    """Places (1 or 2,) that leave least: of some (k, 1 or 2), then with the last one between these."""
     for step in _STEP / 4.0 ** np.arange(5):
-        powers = explained(shifts)
-        best, power = float(shifts[np.argmax(powers)]), float(powers.max())
-        shifts = best + step * np.linspace(-1.0, 1.0, 9)
-    return total - power, best, power
+        best = places[np.argmin(_left(windows, time, places))]
+        places = np.tile(best, (9, 1))
+        places[:, -1] += step * np.linspace(-1.0, 1.0, 9)
+    return np.asarray(best)

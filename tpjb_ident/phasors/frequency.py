@@ -36,6 +36,7 @@ class Tuning:
     lines: LineSet
     follow: ShaftCourse | None
     conditions: tuple[Condition, ...]
+    settled: bool = True  #: whether the windows told the shaft's course: a drive far off its set point hides it
 
 
 def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
@@ -109,7 +110,8 @@ def tuned(
     slips = np.array([_line_slip(result, i, rate) for i in range(len(result.lines.excitation))])
     slips[np.abs(slips) * span <= MAX_SLIP] = 0.0
     exact = tuple(frequency + slip for frequency, slip in zip(result.lines.driven, slips.tolist()))
-    turning, follow = _line_slip(result, result.lines.place("1X"), rate), _drifting(result, rate)
+    settled = bool(np.all(np.abs(slips) * result.length <= MAX_RETUNED))
+    turning, follow = _line_slip(result, result.lines.place("1X"), rate), _drifting(result, rate) if settled else None
     if not slips.any() and follow is None and abs(turning) * span <= 5 * MAX_SLIP:
         return None
     conditions = []
@@ -121,7 +123,7 @@ def tuned(
         low, high = follow.speed.min(), follow.speed.max()
         conditions.append(Condition(DRIFT, f"shaft speed between {low:.4g} and {high:.4g} Hz; followed by window"))
     lines = known_lines(exact, speed + turning, rate, settings.lines, result.lines.found, run.length / rate)
-    return Tuning(lines, follow, tuple(conditions))
+    return Tuning(lines, follow, tuple(conditions), settled)
 
 
 def device_rates(result: RunPhasors, rate: float) -> dict[str, float]:

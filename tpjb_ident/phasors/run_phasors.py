@@ -26,6 +26,9 @@ from tpjb_ident.phasors.stretches import longest_stretch
 from tpjb_ident.phasors.whole_record import WholeRecord, whole_records, with_record
 from tpjb_ident.phasors.windows import RecordTooShortError
 
+#: Second thoughts about the frequencies, at most.
+_TUNINGS = 3
+
 
 def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None = None) -> RunPhasors:
     """Extract the phasors of one run."""
@@ -71,14 +74,18 @@ class _RunFit:
         self._fit(self._lines(self.driven, speed, ()), None)
         self.slower = filled_channels(run)
         self._add_unexpected(speed)
-        better = tuned(run, self.result, self.driven, speed, settings)
-        if better is not None:
+        self._add_near(speed)
+        for _ in range(_TUNINGS):
+            better = tuned(run, self.result, self.driven, speed, settings)
+            if better is None:
+                break
             self.conditions += better.conditions
             self._fit(better.lines, better.follow)
+            if better.settled:
+                break
         self.clocks = device_rates(self.result, run.sample_rate)
         if self.clocks:
             self._fit(self.result.lines, self.follow)
-        self._add_near()
         self.result = with_record(self.result, self.records)
 
     def extend(self, run: Run) -> None:
@@ -125,16 +132,17 @@ class _RunFit:
             self.conditions += conditions
             self._fit(self._lines(self.driven, speed, extra), None)
 
-    def _add_near(self) -> None:
-        """Fit lines along that no window tells from the excitation."""
-        lines = self.result.lines
-        duration, rate = self.records[0].duration, self.run.sample_rate
-        near = [near_line(self.result, i, duration, rate) for i in range(len(lines.excitation))]
-        neighbours = tuple(frequency for frequency in near if frequency is not None)
+    def _add_near(self, speed: float) -> None:
+        """Fit lines along that no window tells from the excitation: their beat looks like a drive off its set point."""
+        lines, exact, neighbours = self.result.lines, list(self.result.lines.driven), []
+        for i in range(len(exact)):
+            pair = near_line(self.result, i, self.records[0].duration, self.run.sample_rate)
+            if pair is not None:
+                exact[i] = pair[0]
+                neighbours.append(pair[1])
         if neighbours:
-            exact = lines.driven
-            self._fit(self._lines(exact, lines.speed, (*lines.found, *neighbours)), self.follow)
-            self.conditions += (lines_beside(neighbours),)
+            self._fit(self._lines(tuple(exact), speed, (*lines.found, *neighbours)), None)
+            self.conditions += (lines_beside(tuple(neighbours)),)
 
 
 __all__ = ["PhasorSettings", "RunPhasors", "run_phasors"]

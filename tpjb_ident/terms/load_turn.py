@@ -36,6 +36,8 @@ class LoadTurn(FilmTerm):
         log_load = np.log(np.maximum([p.static_load for p in blocks.points], 1e-9))
         middle = np.array([log_load[self.group == k].mean() for k in range(len(self.families))])
         self._aside = log_load - middle[self.group]
+        aside = [self._aside[self.group == k] for k in range(len(self.families))]
+        self.reach = np.array([np.sqrt(np.mean(logarithms**2)) for logarithms in aside])  # of ln W, in every family
         for direction, *_ in self.families if np.any(blocks.miss.imag) else ():
             self.parameters += numbered(f"{direction:g} deg", "1/rad", np.repeat(PLAUSIBLE, NUMBERS).tolist())
 
