@@ -41,7 +41,7 @@ from rigdata.virtual_rig import (
     operating_points,
     write_campaign,
 )
-from rigdata.virtual_rig.layout import CsvLayout, Layout, layout_named
+from rigdata.virtual_rig.campaign import CsvLayout, csv_layout
 
 BEARINGS = Path(__file__).resolve().parents[1] / "model" / "bearings"
 STIFFNESS = np.array([[3.0e8, 0.2e8], [-0.3e8, 4.5e8]])
@@ -95,19 +95,19 @@ def rocker_rig(seed: int, *faults: Fault, plan: RigPlan = SMALL_PLAN, **names: s
     return VirtualRig(truth, plan, instruments, Noise.like_samples(), faults=faults, seed=seed, **names)
 
 
-def written(path: Path, rig: VirtualRig, layout: str | Layout = "hdf5") -> Path:
+def written(path: Path, rig: VirtualRig, layout: str | CsvLayout = "hdf5") -> Path:
     """Write a rig's campaign; its path."""
     write_campaign(path, rig, layout)
     return path
 
 
-def shared_campaign(folder: Path, rig: VirtualRig, layout: str | Layout = "hdf5", name: str = "campaign") -> Path:
+def shared_campaign(folder: Path, rig: VirtualRig, layout: str | CsvLayout = "hdf5", name: str = "campaign") -> Path:
     """The read-only campaign of `rig` in `folder`, written by the first who asks; see the top of this file."""
-    layout = layout_named(layout)
-    place = folder / f"campaign-{content_key(rig, layout)}"
+    csv = csv_layout(layout)
+    place = folder / f"campaign-{content_key(rig, csv)}"
     place.mkdir(exist_ok=True)
     return once(
-        place / (name if isinstance(layout, CsvLayout) else f"{name}.h5"),
+        place / (f"{name}.h5" if csv is None else name),
         lambda path: _read_only(written(path, rig, layout)),
     )
 
@@ -118,9 +118,9 @@ def _read_only(path: Path) -> None:
             file.chmod(0o444)
 
 
-def content_key(rig: VirtualRig, layout: Layout) -> str:
+def content_key(rig: VirtualRig, layout: CsvLayout | None) -> str:
     """What a campaign is made of, as a hash: plain fields by what they print, laws by their values at the points."""
-    digest = hashlib.sha256(f"{type(layout).__name__} {asdict(layout)}".encode())
+    digest = hashlib.sha256(repr(layout).encode())
     truth = rig.truth
     for part in (rig.plan, rig.instruments, rig.noise, *rig.faults):
         digest.update(f"{type(part).__name__} {asdict(part)}".encode())
@@ -136,7 +136,7 @@ def content_key(rig: VirtualRig, layout: Layout) -> str:
 
 def _probed(rig: VirtualRig) -> Iterator[OperatingPoint]:
     """Every planned point, and one a little off: a rig that misses its set points asks the laws there."""
-    for point in dict.fromkeys(run.point for run in rig.runs() if run.test is None):
+    for point in dict.fromkeys(run.point for run in rig.runs if run.test is None):
         yield point
         yield replace(
             point,

@@ -6,10 +6,8 @@
 >>> truth = write_campaign("campaign.h5", rig)  # doctest: +SKIP
 """
 
-from rigdata.virtual_rig.campaign import CampaignTruth, write_campaign
-from rigdata.virtual_rig.faults import Fault
+from rigdata.virtual_rig.campaign import CampaignTruth, CsvLayout, write_campaign
 from rigdata.virtual_rig.instruments import Instruments, Sensor, SensorError
-from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout
 from rigdata.virtual_rig.noise import (
     ChannelNoise,
     DryImperfections,
@@ -23,7 +21,7 @@ from rigdata.virtual_rig.plan import (
     locus_points,
     operating_points,
 )
-from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
+from rigdata.virtual_rig.rig import Fault, SimulatedRun, VirtualRig
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
 
 __all__ = [
@@ -35,7 +33,6 @@ __all__ = [
     "DryTest",
     "Fault",
     "Glitches",
-    "Hdf5Layout",
     "Instruments",
     "Noise",
     "RigPlan",

@@ -4,20 +4,21 @@ import json
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
-from math import ceil, log10
+from math import ceil, degrees, log10
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.virtual_rig.instruments import Instruments
-from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout, Layout, layout_named, manifest_text
+from rigdata.operating_point import ROTATIONS
+from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import answer
+from rigdata.virtual_rig.plan import DryTest, PlannedRun
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig, converter_step, felt_direction
-from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, point_facts
+from rigdata.virtual_rig.truth import PAPER_RIG, RigTruth, VirtualRigError, hz, point_facts
 
 Progress = Callable[[int, int, str], None]
 #: Names and readings of a file's columns.
@@ -25,6 +26,33 @@ _Columns = list[tuple[str, FloatArray]]
 _Records = Iterator[SimulatedRun]
 _UNQUANTISED_BITS = 36  # without a converter, digits are written as if it had this many bits
 _PIVOT_LOADS = np.arange(250.0, 8001.0, 250.0)
+
+
+@dataclass(frozen=True)
+class CsvLayout:
+    """Folder with `campaign.toml` and one CSV file per record."""
+
+    delimiter: str = ","
+    decimal: str = "."
+    encoding: str = "utf-8"
+    newline: str = "\n"
+    preamble: tuple[str, ...] = ()
+    units_line: bool = False
+    time_name: str = "time"  #: "" where times are counted
+    missing: str = ""
+    trailing_delimiter: bool = False
+    blank_last_lines: int = 0
+    declared: bool = True
+
+
+def csv_layout(layout: str | CsvLayout) -> CsvLayout | None:
+    """How CSV is written, by the name of a layout; None for HDF5."""
+    if not isinstance(layout, str):
+        return layout
+    named = PAPER_RIG["layouts"]
+    if layout not in ("hdf5", *named):
+        raise VirtualRigError(f"no layout {layout!r}; there are hdf5, {', '.join(named)}")
+    return None if layout == "hdf5" else CsvLayout(**named[layout])
 
 
 class CampaignTruth(dict[str, Any]):
@@ -39,20 +67,21 @@ class CampaignTruth(dict[str, Any]):
 def write_campaign(
     out: str | os.PathLike[str],
     rig: VirtualRig,
-    layout: str | Layout = "hdf5",
+    layout: str | CsvLayout = "hdf5",
     *,
     progress: Progress | None = None,
 ) -> CampaignTruth:
-    """Write a campaign in the `tpjb-rig/1` format."""
-    target, chosen = Path(out), layout_named(layout)
+    """Write a campaign in the `tpjb-rig/1` format: as HDF5, or as CSV in a layout or that of a name."""
+    target, csv = Path(out), csv_layout(layout)
     if not target.parent.is_dir():
         raise VirtualRigError(f"{target.parent} is not a folder; make it first")
     if os.path.lexists(target):
         raise VirtualRigError(f"{target} exists; choose another name, or delete it first")
-    layouts = {"CsvLayout", "Hdf5Layout", "times"} - {type(chosen).__name__, "times" if chosen.time_name else ""}
+    lacks = {"CsvLayout": csv is None, "Hdf5Layout": csv is not None, "times": csv is None or not csv.time_name}
     for fault in rig.faults:
-        if missing := layouts.intersection(fault.needs):
-            raise VirtualRigError(f"fault {fault.kind!r} needs {missing.pop()}, which this layout does not have")
+        for need in fault.rule["needs"]:
+            if lacks.get(need):
+                raise VirtualRigError(f"fault {fault.kind!r} needs {need}, which this layout does not have")
     laws: dict[str, Any] = {name: cache(getattr(rig.truth, name)) for name in ("stiffness", "position", "temperature")}
     rig = replace(rig, truth=replace(rig.truth, **laws))  # each is asked only once per point
     facts: dict[str, dict[str, object]] = {}
@@ -60,8 +89,10 @@ def write_campaign(
     # the temporary sibling is on the same file system, so that the last step is one rename
     with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as spare:
         draft = Path(spare) / "campaign"
-        write = _write_hdf5 if isinstance(chosen, Hdf5Layout) else _write_csv
-        write(draft, rig, records, chosen)
+        if csv is None:
+            _write_hdf5(draft, rig, records)
+        else:
+            _write_csv(draft, rig, records, csv)
         truth = campaign_truth(rig, facts)
         os.rename(draft, target)
     return truth
@@ -69,7 +100,7 @@ def write_campaign(
 
 def _written_records(rig: VirtualRig, facts: dict[str, dict[str, object]], progress: Progress | None) -> _Records:
     """Simulate every record and note its facts; those whose file is there."""
-    records = [run.id for run in rig.runs() if run.record == run.id]
+    records = [run.id for run in rig.runs if run.record == run.id]
     for done, run in enumerate(records, 1):
         record = rig.simulate(run)
         facts[run] = {
@@ -84,10 +115,10 @@ def _written_records(rig: VirtualRig, facts: dict[str, dict[str, object]], progr
             progress(done, len(records), run)
 
 
-def _stored(record: SimulatedRun, rig: VirtualRig, layout: Layout) -> _Columns:
+def _stored(record: SimulatedRun, rig: VirtualRig, time_name: str = "") -> _Columns:
     """Columns of a record as its file holds them, times first, with the faults of the file."""
     readings, run = record.readings, record.run.id
-    columns: _Columns = [] if not layout.time_name else [(layout.time_name, readings.time)]
+    columns: _Columns = [] if not time_name else [(time_name, readings.time)]
     doubled: _Columns = []
     for name, values in readings.columns.items():
         kinds = rig.fault_kinds(run, name)
@@ -101,7 +132,7 @@ def _stored(record: SimulatedRun, rig: VirtualRig, layout: Layout) -> _Columns:
     return [(name, values[:0]) for name, values in columns] if is_empty else columns
 
 
-def _write_hdf5(path: Path, rig: VirtualRig, records: _Records, layout: Any) -> None:
+def _write_hdf5(path: Path, rig: VirtualRig, records: _Records) -> None:
     """Write all records to a new file; runs that share a record share its group.
 
     No time stamps are stored: the same rig gives the same bytes.
@@ -110,25 +141,24 @@ def _write_hdf5(path: Path, rig: VirtualRig, records: _Records, layout: Any) -> 
 
     kind = "float64" if rig.noise.bits is None else "float32"
     with h5py.File(path, "w-", libver="earliest") as file:
-        file.attrs["manifest"] = manifest_text(rig, layout)
+        file.attrs["manifest"] = manifest_text(rig)
         file.attrs["bearing"] = rig.truth.bearing_text
         groups = file.create_group("runs")
         for record in records:
             group = groups.create_group(record.run.id)
             group.attrs["sample_rate_hz"] = float(record.readings.rate)
-            for name, values in _stored(record, rig, layout):
+            for name, values in _stored(record, rig):
                 packing: dict[str, Any] = {}
                 if len(values):
                     chunks = (min(len(values), 16384),)
                     packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "chunks": chunks}
-                data = values if name == layout.time_name else values.astype(kind)
-                group.create_dataset(name, data=data, track_times=False, **packing)
-        for run in rig.runs():
+                group.create_dataset(name, data=values.astype(kind), track_times=False, **packing)
+        for run in rig.runs:
             if run.record != run.id and run.record in groups:
                 groups[run.id] = groups[run.record]  # a hard link
 
 
-def _write_csv(folder: Path, rig: VirtualRig, records: _Records, layout: Any) -> None:
+def _write_csv(folder: Path, rig: VirtualRig, records: _Records, layout: CsvLayout) -> None:
     """Write manifest, bearing and all records into a new folder."""
     (folder / "runs").mkdir(parents=True)
     (folder / "campaign.toml").write_bytes(manifest_text(rig, layout).encode())
@@ -139,7 +169,7 @@ def _write_csv(folder: Path, rig: VirtualRig, records: _Records, layout: Any) ->
 
 
 def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> str:
-    columns, rate = _stored(record, rig, layout), record.readings.rate
+    columns, rate = _stored(record, rig, layout.time_name), record.readings.rate
     sensors = {sensor.name: sensor for sensor in rig.instruments.sensors}
     names, units, forms = [], [], []
     for name, _ in columns:
@@ -232,3 +262,99 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
         readings[quantity] = np.linalg.solve(np.array(stated, dtype=complex), np.array(sensed)) @ phasors
     oil_force = readings["force"] + instruments.housing_mass * readings["acceleration"]
     return oil_force @ np.linalg.inv(readings["displacement"])
+
+
+def manifest_text(rig: VirtualRig, layout: CsvLayout | None = None) -> str:
+    """Write the manifest (`tpjb-rig/1`)."""
+    rates = [run.rate for run in rig.runs]
+    rate, rotation = max(set(rates), key=rates.count), rig.runs[0].point.rotation
+    header = {"schema": "tpjb-rig/1", "id": rig.campaign, "bearing": rig.truth.bearing_name}
+    blocks = [
+        _table("", {**header, "description": rig.description}),
+        _table("[housing]", {"mass": f"{rig.instruments.housing_mass:.10g} kg"}),
+        _table("[acquisition]", {"sample_rate": _rate(rate)}),
+    ]
+    if layout is not None and layout.declared:
+        line = len(layout.preamble) + 1
+        dialect = {key: getattr(layout, key) for key in ("delimiter", "decimal", "encoding")}
+        lines = {"header_line": line, "units_line": line + 1 if layout.units_line else None}
+        blocks.append(_table("[csv]", dialect | lines))
+    if layout is not None and layout.time_name:
+        blocks.append(_table(f"[channels.{layout.time_name}]", {"quantity": "time", "unit": "s"}))
+    blocks += [_channel(sensor) for sensor in rig.instruments.sensors]
+    if rotation != ROTATIONS[0]:
+        blocks.append(_table("[shaft]", {"rotation": rotation}))
+    suffix = "" if layout is None else ".csv"
+    blocks += [_run(_as_noted(run, rig), suffix, rate, rotation) for run in rig.runs]
+    return "\n".join(blocks)
+
+
+def _table(title: str, entries: dict[str, object]) -> str:
+    """A table of the manifest; entries without a value are left out."""
+    lines = [title] if title else []
+    for key, value in entries.items():
+        if value is not None:
+            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+    return "\n".join(lines) + "\n"
+
+
+def _channel(sensor: Sensor) -> str:
+    entries: dict[str, object] = {
+        "quantity": sensor.quantity,
+        "axis": None if sensor.axis is None else _degrees(sensor.axis),
+        "pad": sensor.pad,
+        "position": sensor.position,
+        "unit": sensor.unit,
+        **sensor.calibration,
+        "polarity": sensor.polarity if sensor.polarity < 0 else None,
+        "uncertainty": f"{100 * sensor.uncertainty:g} %" if sensor.uncertainty else None,
+    }
+    return _table(f"[channels.{sensor.name}]", entries)
+
+
+def _run(run: PlannedRun, suffix: str, rate: float, rotation: str) -> str:
+    test, point = run.test, run.point
+    entries: dict[str, object] = {
+        "id": run.id,
+        "file": f"runs/{run.record}{suffix}" if suffix else None,
+        "kind": run.kind,
+    }
+    if isinstance(test, DryTest):
+        entries["pad"] = test.pad
+        entries["static_load_direction"] = _degrees(run.direction)
+        entries["branch"] = test.branch if test.branch != "up" else None
+    elif test is None:
+        entries["shaft_speed"] = f"{point.shaft_speed_hz:.10g} Hz"
+        entries["static_load"] = f"{point.static_load / 1e3:.10g} kN"
+        entries["static_load_direction"] = _degrees(point.static_load_direction)
+        entries["rotation"] = point.rotation if point.rotation != rotation else None
+    if run.kind == "dynamic":
+        entries["excitation_frequency"] = f"{point.excitation_hz:.10g} Hz"
+        entries["excitation_direction"] = _degrees(run.direction)
+    entries["sample_rate"] = _rate(run.rate) if run.rate != rate else None
+    return _table("[[runs]]", entries)
+
+
+def _as_noted(run: PlannedRun, rig: VirtualRig) -> PlannedRun:
+    """Give the run as somebody noted it, with that person's mistakes."""
+    for fault in rig.faults:
+        point, value = run.point, fault.size(0.0)
+        if not fault.affects(run.id):
+            continue
+        if fault.kind == "wrong_pad" and isinstance(run.test, DryTest):
+            run = replace(run, test=replace(run.test, pad=int(value)))
+        elif fault.kind == "wrong_direction":
+            run = replace(run, direction=run.direction + value)
+        elif fault.kind == "wrong_frequency":
+            run = replace(run, point=replace(point, excitation=point.excitation + hz(value)))
+        elif fault.kind == "wrong_load":
+            run = replace(run, point=replace(point, static_load=point.static_load * value))
+    return run
+
+
+def _degrees(angle: float) -> str:
+    return f"{round(degrees(angle), 9) + 0.0:.10g} deg"
+
+
+def _rate(rate: float) -> str:
+    return f"{rate / 1e3:g} kHz" if rate >= 1e3 and rate % 1e3 == 0 else f"{rate:.10g} Hz"

@@ -3,20 +3,84 @@
 From motion to readings: axes, gains, delays, runout, noise, glitches, zero, the converter, faults of the record.
 """
 
-from collections.abc import Iterable
-from dataclasses import astuple, dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, astuple, dataclass, field, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
+from math import inf
+from typing import Any
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len
 
 from rigdata.arrays import BoolArray, FloatArray
-from rigdata.virtual_rig.faults import KINDS, Fault, check_faults
+from rigdata.near_names import unknown_name
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
 from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
 from rigdata.virtual_rig.plan import DryTest, PlannedRun, RigPlan
-from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
+from rigdata.virtual_rig.truth import PAPER_RIG, RigTruth, VirtualRigError
+
+#: Where each kind of fault sits ("sensor", "record", "run" or "file"), what it needs of its own fields, of the layout or
+#: of the files, and what it does.
+KINDS: dict[str, dict[str, Any]] = PAPER_RIG["faults"]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One named defect in chosen runs and channels, for testing whoever reads the campaign.
+
+    A sensor is wrong from the start, a record is spoilt after the converter, a run was done or noted wrongly, or a file is
+    at fault.
+    """
+
+    kind: str
+    run: str = "*"
+    channel: str | None = None
+    value: float | None = None
+    start: float = 0.0
+    length: float = inf
+    other: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise VirtualRigError(unknown_name("fault", self.kind, KINDS))
+        for name in self.rule["needs"]:
+            if getattr(self, name, self) is None:
+                raise VirtualRigError(f"fault {self.kind!r} needs {name}: {self.rule['does']}")
+
+    @property
+    def rule(self) -> dict[str, Any]:
+        """What `KINDS` says of its kind."""
+        return KINDS[self.kind]
+
+    def stated(self) -> dict[str, object]:
+        """Its entries that say something; an open end is not a JSON number."""
+        return {key: value for key, value in asdict(self).items() if value not in (None, inf)}
+
+    def size(self, usual: float) -> float:
+        """Its value, or the usual one."""
+        return usual if self.value is None else self.value
+
+    def affects(self, run: str) -> bool:
+        """Whether it concerns a run."""
+        return fnmatchcase(run, self.run)
+
+    def is_in(self, channel: str) -> bool:
+        """Whether it concerns a channel of its runs."""
+        return self.channel is None or fnmatchcase(channel, self.channel)
+
+
+def check_faults(faults: Iterable[Fault], runs: Sequence[str], channels: Sequence[str]) -> None:
+    """Refuse faults that would strike nothing: a campaign must hold what was asked for."""
+    for fault in faults:
+        for name, pattern, names in (("run", fault.run, runs), ("channel", fault.channel or "*", channels)):
+            if not any(fnmatchcase(candidate, pattern) for candidate in names):
+                listed = ", ".join(names[:20])
+                raise VirtualRigError(f"fault {fault.kind!r}: no {name} matches {pattern!r}; there are {listed}")
+        candidates = channels if fault.kind == "swapped" else runs
+        if fault.other is not None and fault.other not in candidates:
+            raise VirtualRigError(f"fault {fault.kind!r}: there is no {fault.other!r} among {candidates}")
 
 
 @dataclass(frozen=True)
@@ -167,7 +231,7 @@ def spoil_record(
     """Readings with the record faults of their run; the given ones stay as they are."""
     columns, time = dict(readings.columns), readings.time
     for fault in faults:
-        if fault.place != "record":
+        if fault.rule["place"] != "record":
             continue
         inside = (time >= fault.start) & (time < fault.start + fault.length)
         if fault.kind == "time_gap":
@@ -227,19 +291,16 @@ class VirtualRig:
 
     def __post_init__(self) -> None:
         if self.faults:
-            check_faults(self.faults, [run.id for run in self._runs], [s.name for s in self.instruments.sensors])
-
-    def runs(self) -> tuple[PlannedRun, ...]:
-        """All runs, in the order of the test."""
-        return self._runs
+            check_faults(self.faults, [run.id for run in self.runs], [s.name for s in self.instruments.sensors])
 
     @cached_property
-    def _runs(self) -> tuple[PlannedRun, ...]:
+    def runs(self) -> tuple[PlannedRun, ...]:
+        """All runs, in the order of the test."""
         return self.plan.runs(self.truth.pivot_angles)
 
     def simulate(self, run_id: str) -> SimulatedRun:
         """Make the record of one run (or the one that it shares, or that was copied in its place)."""
-        runs = {run.id: run for run in self.runs()}
+        runs = {run.id: run for run in self.runs}
         run = runs[runs[run_id].record]
         copied = [fault.other for fault in self.faults_of(run.id) if fault.kind == "duplicate_run"]
         source = runs[copied[0] or ""] if copied else run
@@ -249,7 +310,7 @@ class VirtualRig:
         """Faults that strike one of the runs of a record."""
         if not self.faults:
             return ()
-        members = [run.id for run in self.runs() if run.record == record]
+        members = [run.id for run in self.runs if run.record == record]
         return tuple(fault for fault in self.faults if any(map(fault.affects, members)))
 
     def fault_kinds(self, record: str, channel: str | None = None) -> set[str]:
@@ -262,8 +323,8 @@ class VirtualRig:
             run = replace(run, lines=())
         sensors = self.instruments.sensors
         for fault in faults:
-            if fault.place == "sensor":
-                change = {KINDS[fault.kind]["error"]: fault.size(0.0)}
+            if fault.rule["place"] == "sensor":
+                change = {fault.rule["error"]: fault.size(0.0)}
                 sensors = tuple(s.with_error(**change) if fault.is_in(s.name) else s for s in sensors)
         instruments = replace(self.instruments, sensors=sensors)
         glitches: tuple[Glitch, ...] = ()

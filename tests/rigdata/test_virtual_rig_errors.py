@@ -21,7 +21,7 @@ def seen_in_records(instruments: vr.Instruments) -> np.ndarray:
     plan = vr.RigPlan(dynamic=vr.operating_points([(5000.0, 40.0)]), directions=(0.2, 1.4))
     rig = vr.VirtualRig(vr.RigTruth.constant(K, C), plan, instruments, vr.Noise.none(), seed=8)
     columns = {"displacement": [], "force": [], "acceleration": []}
-    for run in rig.runs():
+    for run in rig.runs:
         readings = rig.simulate(run.id).readings
         time = readings.time
         design = np.stack([np.ones(len(time)), np.cos(OMEGA * time), np.sin(OMEGA * time)], axis=1)

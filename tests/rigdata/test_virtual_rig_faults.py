@@ -7,7 +7,7 @@ import pytest
 
 import rigdata
 from rigdata import virtual_rig as vr
-from rigdata.virtual_rig.faults import KINDS
+from rigdata.virtual_rig.rig import KINDS
 from tests.good_campaigns import CROSS_DAMPING as C
 from tests.good_campaigns import CROSS_STIFFNESS as K
 
@@ -56,7 +56,7 @@ CHANNEL_FAULTS = {
 def test_channel_faults_change_that_channel_of_that_run(kind):
     entries, expected = CHANNEL_FAULTS[kind]
     fault = vr.Fault(kind, FIRST, *entries)
-    noise = None if fault.place == "record" else vr.Noise.none()  # a sensor's error is there before its noise
+    noise = None if fault.rule["place"] == "record" else vr.Noise.none()  # a sensor's error is there before its noise
     faulty, sound = pair(fault, noise=noise)
     changed = expected(sound)
     for name, values in sound.items():
@@ -96,7 +96,7 @@ def test_duplicate_run_is_the_other_record():
     assert (copied.run.id, copied.source) == (SECOND, FIRST)
     np.testing.assert_array_equal(copied.readings.columns["X1A"], rig().simulate(FIRST).readings.columns["X1A"])
     crossed = rig(vr.Fault("duplicate_run", SECOND, other=FIRST), vr.Fault("duplicate_run", FIRST, other=SECOND))
-    assert [crossed.simulate(run.id).source for run in crossed.runs()][:2] == [SECOND, FIRST]
+    assert [crossed.simulate(run.id).source for run in crossed.runs][:2] == [SECOND, FIRST]
 
 
 def test_time_gap_takes_rows_out_of_all_channels_and_time_jitter_keeps_the_order():
@@ -124,7 +124,7 @@ def test_wrong_notes_are_in_the_manifest_only(campaign_of):
         np.testing.assert_array_equal(wrong.run(name).record("X1A").values, right.run(name).record("X1A").values)
 
 
-LAYOUTS = [vr.Hdf5Layout(), *(vr.CsvLayout(missing=m, delimiter=";") for m in ("", "NaN", "-", "#N/A"))]
+LAYOUTS = ["hdf5", *(vr.CsvLayout(missing=m, delimiter=";") for m in ("", "NaN", "-", "#N/A"))]
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)

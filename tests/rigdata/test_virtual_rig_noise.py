@@ -134,7 +134,7 @@ def test_actuator_harmonics_and_cross_talk():
     directions = tuple(np.linspace(0.0, 3.1, 200))
     talk = rig(noise, directions=directions, dynamic_seconds=0.01)
     along, across = [], []
-    for run in talk.runs()[:200]:
+    for run in talk.runs[:200]:
         oil_force = talk.simulate(run.id).motion.lines[0].oil_force / 500.0
         turn = np.exp(-1j * run.direction)
         unit = np.array([turn.real, -turn.imag])
@@ -148,7 +148,7 @@ def test_set_points_are_missed_by_as_much_as_stated():
     noise = replace(vr.Noise.none(), load_miss=0.003, direction_miss=0.0035, speed_miss=0.001)
     plan = replace(vr.RigPlan(locus=vr.locus_points(300)), locus_seconds=0.02)
     many = vr.VirtualRig(TRUTH, plan, vr.Instruments.like_paper(), noise, seed=2)
-    facts = [many.simulate(run.id).motion.facts for run in many.runs()]
+    facts = [many.simulate(run.id).motion.facts for run in many.runs]
     assert np.std([f["static_load_N"] / 5000 for f in facts]) == pytest.approx(0.003, rel=0.15)
     assert np.std([f["shaft_speed_Hz"] / 22 for f in facts]) == pytest.approx(0.001, rel=0.15)
     off = [f["static_load_direction_deg"] - p.static_load_direction_deg for f, p in zip(facts, plan.locus)]

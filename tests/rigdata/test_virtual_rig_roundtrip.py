@@ -100,7 +100,7 @@ def test_means_temperatures_and_speed_come_back(campaign_of, layout):
 def test_manifest_set_points_are_those_of_the_plan(campaign_of):
     rig = quiet_rig()
     campaign = rigdata.load_campaign(campaign_of(rig))
-    for planned, found in zip(rig.runs(), campaign.runs, strict=True):
+    for planned, found in zip(rig.runs, campaign.runs, strict=True):
         assert (planned.id, planned.kind) == (found.id, found.kind)
         if planned.test is None:
             want, have = planned.point, found.point

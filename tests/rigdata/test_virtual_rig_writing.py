@@ -91,7 +91,7 @@ def test_the_truth_is_not_in_the_campaign(tmp_path):
     assert stored["schema"] == "tpjb-truth/1"
     assert stored["housing_mass_kg"] == 37.31
     assert stored["sensor_errors"]["X1A"]["gain"] == 1.0437
-    assert set(stored["runs"]) == {run.id for run in hidden.runs()}
+    assert set(stored["runs"]) == {run.id for run in hidden.runs}
     assert stored["runs"]["d-02500-25-01"]["lines"][0]["frequency_Hz"] == 25.0
     np.testing.assert_allclose(stored["pivot_curves"][0]["stiffness_N_per_m"], 6e8, rtol=1e-9)
 

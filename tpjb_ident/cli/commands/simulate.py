@@ -71,7 +71,7 @@ def simulate(
     with c.results("simulating") as show:
         truth = write_campaign(c.folder / file, rig, layout, progress=lambda done, total, run: show(run, done, total))
         truth.write(c.folder / "truth.json")
-    c.print(f"{name}: {len(rig.runs())} runs, seed {seed}, in {c.target / file}, the truth in truth.json beside it")
+    c.print(f"{name}: {len(rig.runs)} runs, seed {seed}, in {c.target / file}, the truth in truth.json beside it")
     c.next("check", c.target / file)
 
 
