@@ -228,9 +228,9 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
     from rigdata.readers.file_reader import FileReader, ReadingCache
 
     text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
-    files: dict[str, Path] = {manifest_path.name: manifest_path}
+    files = {manifest_path.name: manifest_path}
     manifest = parse_manifest(text, manifest_path.name, _named_file(folder, manifest_path.name, files))
-    problems: list[Problem] = []
+    problems = []
     bearing, name = "", manifest.bearing_name
     try:
         path = inside(folder, name, manifest_path.name, "bearing")
@@ -258,7 +258,7 @@ def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
     """The same test in another file: a repeat, or a record that landed under another name."""
     from rigdata.readers.file_reader import FileReader
 
-    old: Any = run.reader
+    old = run.reader
     if isinstance(old, FileReader):
         reader = replace(old, path=path, file=file, run=run_id)
     else:
@@ -275,7 +275,7 @@ def _load_hdf5(path: Path) -> Campaign:
     manifest = parse_manifest(text, f"{path.name}:manifest", _named_file(path.parent, path.name, files))
     with open_readonly(path, path.name) as handle:
         refuse_claims(handle, path, [run.id for run in manifest.runs], list(manifest.channels))
-    problems: list[Problem] = []
+    problems = []
     if not bearing or len(bearing) > _MAX_BEARING:
         cure = "Store the bearing's TOML text there, or give --bearing where one is needed"
         problems.append(Problem("warning", path.name, "root attribute bearing", "is missing or too long", cure))

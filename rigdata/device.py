@@ -86,10 +86,10 @@ def planned(
     A time column wins over the channel's stated rate, that over the run's.
     """
     grids: dict[tuple[int, str | float], Grid] = {}
-    shared: list[Grid] = []  # whose times are those of channels without a clock
-    untimed: dict[str, Grid] = {}
-    rates: dict[str, float] = {}
-    faults: dict[str, str] = {}
+    shared = []  # whose times are those of channels without a clock
+    untimed = {}
+    rates = {}
+    faults = {}
     for name, timing in timings.items():
         channel = channels.get(name)
         if timing.clock:
@@ -162,7 +162,7 @@ def _own_first(grids: Iterable[Grid], channels: Channels) -> list[Grid]:
 def by_clock(grids: Iterable[Grid], channels: Channels) -> tuple[Device, ...]:
     """Devices of a run: grids split by clock, that of the first probe first."""
     order = first_probe_first(channels)
-    parts: list[tuple[str, Device]] = []
+    parts = []
     for grid in grids:
         letters: dict[str, list[str]] = {}
         held = set(grid.channels)

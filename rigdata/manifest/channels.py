@@ -148,8 +148,8 @@ def channels_by_run(table: Table, channels: Channels, runs: Sequence[str]) -> di
     for name in channels:
         for run, entry in _entries(table.subtable(name), runs, budget):
             entries.setdefault(run, []).append((name, entry))
-    described: dict[str, Channels] = {}
-    known: dict[tuple[int, ...], Channels] = {}
+    described = {}
+    known = {}
     for run, changes in entries.items():
         key = tuple(id(entry) for _, entry in changes)
         if key not in known:
@@ -165,7 +165,7 @@ def _entries(channel: Table, runs: Sequence[str], budget: Iterator[int]) -> list
     if not isinstance(entries, list):
         channel.error("for", f"is {shown(entries)}, not a list of tables", f"Write [[channels.{channel.path[-1]}.for]]")
         return []
-    pairs: list[tuple[str, Table]] = []
+    pairs = []
     for index, data in enumerate(entries):
         entry = Table(data, (*channel.path, "for", index), channel.findings)
         entry.only(_ENTRY)
@@ -177,7 +177,7 @@ def _entries(channel: Table, runs: Sequence[str], budget: Iterator[int]) -> list
 def _matching(entry: Table, runs: Sequence[str], budget: Iterator[int]) -> set[str]:
     """Runs that the patterns of an entry name; `budget` counts the patterns with a star."""
     patterns = entry.value(RUNS_OF)
-    named: set[str] = set()
+    named = set()
     known = set(runs)
     for pattern in patterns or ():
         matches = {pattern} & known
@@ -195,7 +195,7 @@ def _matching(entry: Table, runs: Sequence[str], budget: Iterator[int]) -> set[s
 
 def _changed(table: Table, channels: Channels, changes: Sequence[tuple[str, Table]]) -> Channels:
     """All channels of a run, some with other entries: the last one counts, key by key."""
-    merged: dict[str, Table] = {}
+    merged = {}
     for name, entry in changes:
         if name not in merged:
             merged[name] = Table(dict(table.data[name]), (*table.path, name), table.findings)

@@ -111,12 +111,12 @@ def open_paths(data: object, path: Path = ()) -> list[Path]:
         return [path] if data.startswith(MARK) and path[-1] not in ("description", "id") else []
     if len(path) > 3:
         return []
-    entries: list[tuple[str | int, object]] = []
+    entries = []
     if isinstance(data, dict):
         entries = list(data.items())
     elif isinstance(data, list) and path == ("runs",):
         entries = list(enumerate(data))
-    places: list[Path] = []
+    places = []
     for key, value in entries:
         places += open_paths(value, (*path, key))
     return places
@@ -229,7 +229,7 @@ def key_lines(text: str) -> dict[Path, int]:
     """Line (1-based) of every table and key, by path."""
     lines: dict[Path, int] = {}
     counts: dict[str, int] = {}
-    table: Path = ()
+    table = ()
     for number, line in enumerate(text.splitlines(), start=1):
         if len(line) > _LONGEST:
             continue

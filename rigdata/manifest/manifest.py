@@ -71,7 +71,7 @@ def _read_runs(top: Table) -> tuple[RunEntry, ...]:
     if len(data) > _MAX_RUNS:
         findings.error(("runs",), f"more than {_MAX_RUNS} runs", "Split the campaign")
         return ()
-    runs: list[RunEntry] = []
+    runs = []
     first: dict[str, int] = {}
     for index, entry in enumerate(data):
         errors = findings.errors

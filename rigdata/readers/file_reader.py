@@ -49,7 +49,7 @@ class ReadingCache:
         with self._lock:
             if key in self._entries:
                 self._entries.move_to_end(key)
-                cached: _Value = self._entries[key]
+                cached = self._entries[key]
                 return cached
         value = make()
         with self._lock:
@@ -136,8 +136,8 @@ class FileReader(RunReader):
 
     def _arranged(self, contents: Contents) -> _Columns:
         series = with_unique_names(contents.series)
-        faults: dict[str, RigDataError] = {}
-        timings: dict[str, Grid] = {}
+        faults = {}
+        timings = {}
         times: dict[str, FloatArray] = {}
         for channel in series:
             if channel.time is None:

@@ -156,8 +156,8 @@ def time_columns(names: Sequence[str], channels: Channels) -> list[int]:
 def serving(names: Sequence[str], clocks: Sequence[int], channels: Channels) -> list[int | None]:
     """Place of every column's time column: of the clock that it states, else the nearest without one to its left."""
     stated = {name: channel.clock for name, channel in channels.items()}
-    letters: dict[str, int] = {}
-    plain: list[int] = []
+    letters = {}
+    plain = []
     for i in clocks:
         letter = stated.get(names[i])
         if letter:
@@ -165,7 +165,7 @@ def serving(names: Sequence[str], clocks: Sequence[int], channels: Channels) -> 
         else:
             plain.append(i)
     nearest = plain[0] if plain else None
-    served: list[int | None] = []
+    served = []
     for i, name in enumerate(names):
         nearest = i if i in plain else nearest
         served.append(letters.get(stated.get(name, ""), nearest))

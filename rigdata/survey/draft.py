@@ -70,7 +70,7 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
 def _tables(surveyed: Survey) -> _Tables:
     """Lines of all channels' and runs' tables; of sensors of a kind and unit one is described, the others `like` it."""
     models: dict[tuple[str, str], str] = {}
-    tables: _Tables = {}
+    tables = {}
     for name, guess in surveyed.channels.items():
         quantity = guess.quantity.value
         is_raw = quantity in WORDS["sensitivities"] and quantity_of_unit(guess.unit) == ""

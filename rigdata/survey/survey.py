@@ -227,7 +227,7 @@ class _Folder:
             for series in of_quantity(run.export, self.channels, "speed"):
                 if not quantity_of_unit(self.channels[series.name].unit):
                     ratios.setdefault(series.name, []).append(float(np.nanmedian(series.values)) / line)
-        per_hertz: dict[str, float] = {}
+        per_hertz = {}
         for name, values in ratios.items():
             if min(values) > 0 and max(values) - min(values) <= NEAR * max(values):
                 per_hertz[name] = sorted(values)[len(values) // 2]
@@ -312,12 +312,12 @@ def _set_points(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
     """Directions, speeds, frequencies and loads that are nearly alike become the set point that was meant."""
     changed = list(runs)
     for name in _SPREADS:
-        entries: list[Entry] = [getattr(run, name) for run in changed]
+        entries = [getattr(run, name) for run in changed]
         movable = [i for i, entry in enumerate(entries) if name != "load" or entry.source == "records"]
         points = _common(name, [entries[i].number for i in movable])
         for i in movable:
             value = points.get(entries[i].number, entries[i].value)
-            moved: Any = {name: replace(entries[i], value=value)}
+            moved = {name: replace(entries[i], value=value)}
             changed[i] = replace(changed[i], **moved)
     for i, run in enumerate(changed):
         if run.load.source and not run.load_text:

@@ -118,8 +118,8 @@ def _written_records(rig: VirtualRig, facts: dict[str, dict[str, object]], progr
 def _stored(record: SimulatedRun, rig: VirtualRig, time_name: str = "") -> _Columns:
     """Columns of a record as its file holds them, times first, with the faults of the file."""
     readings, run = record.readings, record.run.id
-    columns: _Columns = [] if not time_name else [(time_name, readings.time)]
-    doubled: _Columns = []
+    columns = [] if not time_name else [(time_name, readings.time)]
+    doubled = []
     for name, values in readings.columns.items():
         kinds = rig.fault_kinds(run, name)
         if "missing_channel" in kinds:
@@ -148,7 +148,7 @@ def _write_hdf5(path: Path, rig: VirtualRig, records: _Records) -> None:
             group = groups.create_group(record.run.id)
             group.attrs["sample_rate_hz"] = float(record.readings.rate)
             for name, values in _stored(record, rig):
-                packing: dict[str, Any] = {}
+                packing = {}
                 if len(values):
                     chunks = (min(len(values), 16384),)
                     packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "chunks": chunks}

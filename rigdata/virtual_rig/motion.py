@@ -98,7 +98,7 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
     for frequency, force in forces:
         line = answer(frequency, force, truth.stiffness(replace(actual, excitation=frequency)), instruments)
         lines.append(line)
-        fact: dict[str, object] = {"frequency_Hz": round(frequency / (2 * np.pi), 9)}
+        fact = {"frequency_Hz": round(frequency / (2 * np.pi), 9)}
         for name, phasor in (("oil_force_N", line.oil_force), ("displacement_m", line.displacement)):
             fact[name] = np.stack([phasor.real, phasor.imag], axis=1).tolist()
         line_facts.append(fact)
@@ -117,7 +117,7 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
 
 def _actuator_forces(run: PlannedRun, noise: Noise, rng: np.random.Generator) -> list[tuple[float, ComplexArray]]:
     """Force phasors (2,) [N] of the actuators, with their frequencies [rad/s]."""
-    forces: list[tuple[float, ComplexArray]] = []
+    forces = []
     along = directions(run.direction)
     across = np.array([-along[1], along[0]])
     for frequency, amplitude in run.lines:

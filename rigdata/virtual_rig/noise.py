@@ -7,7 +7,6 @@ that they do not change with a sensor's sensitivity.
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass, replace
-from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -85,7 +84,7 @@ class Noise:
     @classmethod
     def like_samples(cls) -> Noise:
         """As strong as in the sample campaigns, of every kind that they have."""
-        entries: dict[str, Any] = dict(PAPER_RIG["noise"])
+        entries = dict(PAPER_RIG["noise"])
         for name, amounts in entries.pop("channels").items():
             entries[name] = ChannelNoise(**amounts)
         entries |= {"glitches": Glitches(**entries["glitches"]), "dry": DryImperfections(**entries["dry"])}

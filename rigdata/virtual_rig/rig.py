@@ -17,12 +17,12 @@ from rigdata.arrays import BoolArray, FloatArray
 from rigdata.near_names import unknown_name
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
-from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
+from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import DryTest, PlannedRun, RigPlan
 from rigdata.virtual_rig.truth import PAPER_RIG, RigTruth, VirtualRigError
 
-#: Where each kind of fault sits ("sensor", "record", "run" or "file"), what it needs of its own fields, of the layout or
-#: of the files, and what it does.
+#: Where each kind of fault sits ("sensor", "record", "run" or "file"), what it needs (fields of its own, a layout, times
+#: in the files), and what it does.
 KINDS: dict[str, dict[str, Any]] = PAPER_RIG["faults"]
 
 
@@ -30,8 +30,8 @@ KINDS: dict[str, dict[str, Any]] = PAPER_RIG["faults"]
 class Fault:
     """One named defect in chosen runs and channels, for testing whoever reads the campaign.
 
-    A sensor is wrong from the start, a record is spoilt after the converter, a run was done or noted wrongly, or a file is
-    at fault.
+    A sensor is wrong from the start, a record is spoilt after the converter, a run was done or noted wrongly, or a file
+    is damaged.
     """
 
     kind: str
@@ -170,7 +170,7 @@ def converter_step(sensor: Sensor, bits: int) -> float:
 
 def channel_noise(sensors: tuple[Sensor, ...], noise: Noise, time: FloatArray, seed: int, run: str) -> FloatArray:
     """Noise of each sensor over `time` (n,) [s] -> (n_sensors, n), in the SI unit of its quantity."""
-    kinds: list[ChannelNoise] = [getattr(noise, sensor.quantity) for sensor in sensors]
+    kinds = [getattr(noise, sensor.quantity) for sensor in sensors]
     white, pink, mains, drift = np.array([astuple(kind) for kind in kinds]).T[..., None]
     n = len(time)
     rate = (n - 1) / (time[-1] - time[0]) if n > 1 else 1.0

@@ -226,7 +226,7 @@ class Command(Terminal):
 
     def document(self, exit_code: int) -> dict[str, Any]:
         """Everything printed, as plain data; ``data`` holds the result tables and JSON files themselves."""
-        data: dict[str, Any] = {}
+        data = {}
         for name in self._outputs:
             stem, ending = os.path.splitext(name)
             if ending == ".parquet":
@@ -280,7 +280,7 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
         functools.update_wrapper(run, function)
         parameters = []
         for parameter in (*own, *common):
-            annotation: Any = Annotated[hints[parameter.name], option(name, parameter.name)]  # type: ignore
+            annotation = Annotated[hints[parameter.name], option(name, parameter.name)]  # type: ignore
             run.__annotations__[parameter.name] = annotation
             parameters.append(parameter.replace(annotation=annotation, kind=inspect.Parameter.KEYWORD_ONLY))
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
@@ -386,5 +386,5 @@ def _places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
 
 def _plain(options: Mapping[str, Any]) -> dict[str, Any]:
     """Options as JSON holds them; of a file its name: its place is of no use elsewhere, its SHA-256 tells which."""
-    plain: dict[str, Any] = json.loads(json.dumps(options, default=lambda value: getattr(value, "name", str(value))))
+    plain = json.loads(json.dumps(options, default=lambda value: getattr(value, "name", str(value))))
     return plain

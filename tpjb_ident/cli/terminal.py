@@ -125,8 +125,8 @@ class Terminal:
 
     def show_frame(self, title: str, frame: pd.DataFrame, names: str, file: str = "") -> None:
         """Print columns of a table on disk, by the names in a text; what has an interval with half of it."""
-        columns: list[Column | str] = []
-        cells: list[Iterable[Any]] = []
+        columns = []
+        cells = []
         for name in names.split() if len(frame) else ():
             column = PRINTED[name]
             values: Iterable[Any] = frame[name]

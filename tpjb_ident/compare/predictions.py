@@ -88,8 +88,8 @@ def predict_points(
         frequencies = groups.setdefault(_static(point), [])
         if _excitation(point) not in frequencies:
             frequencies.append(_excitation(point))
-    found: dict[OperatingPoint, Prediction] = {}
-    before: Prediction | None = None
+    found = {}
+    before = None
     for done, (static, frequencies) in enumerate(sorted(groups.items())):
         prediction = predict(
             bearing,
@@ -127,7 +127,7 @@ def point_columns(point: OperatingPoint) -> dict[str, float | str]:
 
 def _row(point: OperatingPoint, p: Prediction, index: int) -> dict[str, Any]:
     """Row of one point, of whose frequencies in a prediction it is the one of this index."""
-    row: dict[str, Any] = {**point_columns(point)}
+    row = {**point_columns(point)}
     row.update(zip(COEFFICIENT_COLUMNS, np.stack([p.k[index], p.c[index]]).ravel(), strict=True))
     row.update(x_m=p.position[0], y_m=p.position[1])
     for number in range(1, len(p.pad_load) + 1):

@@ -51,7 +51,7 @@ def compare_table(
     settings = settings or CompareSettings()
     rows = read_coefficients(path, reading_error)
     points = points_of(rows)
-    frames: dict[str, pd.DataFrame] = {}
+    frames = {}
     remarks: list[str] = []
     if bearing is not None:
         names, remarks = possible_variants(settings.variants, (), bearing)
@@ -87,7 +87,7 @@ _MOST = 6
 
 def read_predictions(paths: Sequence[Path]) -> dict[str, pd.DataFrame]:
     """Read tables of predictions; each is called by its file's name, which its frame's attributes hold."""
-    tables: dict[str, pd.DataFrame] = {}
+    tables = {}
     for path in paths:
         name = path.stem if path.stem not in VARIANTS else path.name
         if name in tables:

@@ -114,7 +114,7 @@ def _pads(frame: pd.DataFrame) -> pd.Series:
 
 def _both(frame: pd.DataFrame, name: str, quantity: str) -> dict[str, Iterable[str]]:
     """A quantity of both sides, its difference, and whether it changed."""
-    cells: dict[str, Iterable[str]] = {}
+    cells = {}
     for side, title in _SIDES.items():
         cells[f"{title}, {symbol(quantity)}"] = interval_cells(frame, f"{name}_{side}", size(quantity))
     return cells | {"changed": frame[changed_column(name)]}

@@ -213,7 +213,7 @@ def local_workers(count: int, start: str | None = None) -> Iterator[Workers]:
         yield pool
     finally:
         gc.unfreeze()
-        processes: Any = getattr(pool.executor, "_processes", None) or {}
+        processes = getattr(pool.executor, "_processes", None) or {}
         for process in list(processes.values()):  # nobody waits for what they are still at
             process.terminate()
         pool.executor.shutdown(cancel_futures=True)
@@ -252,7 +252,7 @@ def _send_outcome(sender: Any, packed: bytes, job: Job) -> None:
 
 def _received_value(receiver: Any) -> Any | None:
     try:
-        outcome: Outcome = receiver.recv()
+        outcome = receiver.recv()
     except (EOFError, ConnectionError):
         return None
     return outcome.get() if outcome.error is None else None

@@ -86,7 +86,7 @@ def interrupts_held() -> Iterator[None]:
 
     The end of this one would wait for it, and it for somebody who takes its answer.
     """
-    held: list[int] = []
+    held = []
     # other threads are not interrupted
     kinds = _KINDS if threading.current_thread() is threading.main_thread() else ()
     former = {kind: signal.signal(kind, lambda number, frame: held.append(number)) for kind in kinds}

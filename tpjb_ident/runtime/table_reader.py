@@ -98,7 +98,7 @@ def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str]
         if len(cells) != len(header):
             remedy = "A delimiter at a line's end counts as one; save the table again"
             raise BadInputError(f"{place}: has {len(cells)} cells, the names are {len(header)}. {remedy}.")
-        row: dict[str, object] = {}
+        row = {}
         for column, cell in zip(header, cells, strict=True):
             try:
                 row[column.name] = column.value(cell.strip())
@@ -133,7 +133,7 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 def _header(place: str, path: Path, names: list[str]) -> list[_Header]:
     """What each column is, by its name in SI; US units are known by their ends."""
-    header: dict[str, _Header] = {}
+    header = {}
     for number, text in enumerate(names, start=1):
         name, size = _EXPORTED.get(text.strip(), (text.strip(), 1.0))
         if match := _US_NAME.fullmatch(name):

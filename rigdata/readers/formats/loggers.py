@@ -33,7 +33,7 @@ def read_tdms(path: Path) -> list[Series]:
     """
     from nptdms import TdmsFile
 
-    series: list[Series] = []
+    series = []
     # opened here: npTDMS leaves a file open that it cannot read
     with path.open("rb") as stream, TdmsFile.open(stream) as file:
         samples = 0
@@ -76,7 +76,7 @@ def read_uff(path: Path) -> list[Series]:
     import pyuff
 
     file = pyuff.UFF(str(path))
-    series: list[Series] = []
+    series = []
     unusable: Counter[str] = Counter()
     for index, kind in enumerate(file.get_set_types()):
         if int(kind) != 58:
@@ -89,7 +89,7 @@ def read_uff(path: Path) -> list[Series]:
             continue
         values, x = to_temporary_file(np.asarray(data["data"], dtype=float)), data.get("x")
         step = float(data.get("abscissa_inc") or 0.0)
-        time: FloatArray | None = None
+        time = None
         if x is not None and len(x) == len(values):
             time = to_temporary_file(np.asarray(x, dtype=float))
         elif step > 0:

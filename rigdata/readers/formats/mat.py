@@ -87,7 +87,7 @@ def _load(path: Path) -> dict[str, Any]:
         with h5py.File(path, "r", locking="best-effort") as file:
             items = list(_datasets(file, path))
             refuse_claim(sum(claimed_bytes(item) for _, item in items), path)
-            values: dict[str, Any] = {}  # numbers, and texts that a dataset refers to
+            values = {}  # numbers, and texts that a dataset refers to
             for name, item in items:
                 texts = _cell_texts(item) if item.dtype == h5py.ref_dtype else []
                 if texts:

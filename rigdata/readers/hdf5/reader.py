@@ -191,7 +191,7 @@ class Hdf5Reader(RunReader):
     def _arranged(self, group: Any) -> _Members:
         """What is sampled together: by time datasets, stated rates, and the length that most channels have."""
         members = tuple(itertools.islice(group, _MAX_MEMBERS))
-        lengths: dict[str, int] = {}
+        lengths = {}
         problems: list[Problem] = []
         for name in members:
             try:
@@ -206,7 +206,7 @@ class Hdf5Reader(RunReader):
         names = [name for name in self.channels if name in lengths]
         clocks = [i for i, name in enumerate(names) if self.channels[name].quantity == "time"]
         run_rate = stated or self.stated_rate
-        timed: dict[str, Grid] = {}
+        timed = {}
         for clock in [names[i] for i in clocks]:
             time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
             grid = timed_grid(lengths[clock], clock, time, clock, run_rate)
@@ -293,7 +293,7 @@ def _hash_dataset(digest: Any, file: BinaryIO, name: str, dataset: Any) -> None:
     """Feed how a dataset is stored, and every stored byte, in the order of the file's own index."""
     layout = (name, dataset.dtype.str, dataset.shape, dataset.chunks, filters(dataset))
     digest.update(repr(layout).encode())
-    pieces: list[tuple[int, int]] = []
+    pieces = []
     if dataset.chunks is not None:
         dataset.id.chunk_iter(lambda chunk: pieces.append((chunk.byte_offset, chunk.size)))
     elif dataset.id.get_offset() is not None:

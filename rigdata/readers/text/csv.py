@@ -134,7 +134,7 @@ def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, 
 
     record, length, odd_lines = head.record, 0, 0
     stamps: dict[int, list[str | None]] = {i: [] for i in places if i in head.stamps}
-    bad: set[int] = set()
+    bad = set()
 
     def skip(row: Any) -> str:
         nonlocal odd_lines
@@ -196,7 +196,7 @@ def _judged(head: Head, places: Sequence[int], odd_lines: int) -> tuple[Problem,
     """Take a file whose last line is cut off; reject other lines of a wrong width, and text in columns at `places`."""
     record, width, last = head.record, len(head.names), 0
     texts: dict[int, list[tuple[int, str]]] = {i: [] for i in places}
-    wrong: list[tuple[int, int]] = []
+    wrong = []
     for last, cells in head.rows():
         if len(cells) != width:
             wrong.append((last, len(cells)))

@@ -140,7 +140,7 @@ class _HeadFinder:
 
     def _best(self, delimiters: tuple[str, ...], where: range) -> _NamesLine | None:
         """Find the line with most of the channel names; of equals the one that numbers follow."""
-        best: _NamesLine | None = None
+        best = None
         best_rank = (0, True)
         for number in where:
             if not any(name in self.lines[number] for name in self.channels):
@@ -233,7 +233,7 @@ class _HeadFinder:
 
     def _units(self, header: _NamesLine, first: int, names: tuple[str, ...]) -> tuple[str, ...]:
         """Units from brackets in the names, or from the line below the names."""
-        below: list[str] = []
+        below = []
         line = self.spec.units_line or header.line + 1
         if 0 < header.line < line <= first:
             below = split_line(self.lines[line - 1], header.delimiter)

@@ -54,7 +54,7 @@ class _LvmFile(io.TextIOBase):
 
     def channels(self) -> Iterator[Series]:
         """Channels over time of all segments in order; special blocks of their headings are left alone."""
-        header: dict[str, list[str]] = {}
+        header = {}
         special = False
         while (line := next(self.lines, None)) is not None:  # a table puts the next heading back
             key, *cells = self._cells(line)
@@ -70,7 +70,7 @@ class _LvmFile(io.TextIOBase):
 
     def _segment(self, header: Mapping[str, Sequence[str]], names: Sequence[str]) -> Iterator[Series]:
         """Channels over time of the table that begins here; the group of each is when the segment began."""
-        x: FloatArray | None = None
+        x = None
         number = 0
         for name, values in zip(names, self._table(names).T, strict=True):
             if name == _X:

@@ -118,7 +118,7 @@ def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings
     from tpjb_ident.phasors.run_data import QUANTITIES, PhasorSettings
 
     excited = () if lines is None else parse_values(lines, "speed", "--lines")
-    times: dict[str, float] = {}
+    times = {}
     for text in delays:
         quantity, _, time = text.partition("=")
         refuse_unknown(quantity, QUANTITIES, "--delay")

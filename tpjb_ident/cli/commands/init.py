@@ -113,7 +113,7 @@ def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[
     from rigdata.survey.exports import read_exports, record_files
 
     problems: list[Problem] = []
-    exports: list[Export] = []
+    exports = []
     with c.progress(f"looking at {folder.name}") as show:
         total = len(record_files(folder))
         for export in read_exports(folder, problems, names):

@@ -84,7 +84,7 @@ def _run_again(name: str, entry: Mapping[str, Any], folder: Path, out: Path) -> 
 
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
     app.command()(COMMANDS[name.split(" ")[0]])
-    program: Any = get_command(app)
+    program = get_command(app)
     typed = _typed(program.params, entry, folder)
     try:
         code = program.main([f"--out={out}", "--quiet", *typed], prog_name="tpjb", standalone_mode=False)
@@ -107,7 +107,7 @@ def _typed(parameters: Iterable[Any], entry: Mapping[str, Any], folder: Path) ->
             continue
         given = options.get(parameter.name)
         files = [str(folder / place) for key, place in places.items() if key.partition(".")[0] == parameter.name]
-        values: list[Any] = given if isinstance(given, list) else [given]
+        values = given if isinstance(given, list) else [given]
         for value in files or values:
             if isinstance(value, bool):
                 flags += (parameter.opts if value else parameter.secondary_opts)[:1]

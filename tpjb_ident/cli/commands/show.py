@@ -120,8 +120,8 @@ def _run_series(run: Run) -> tuple[list[Series], list[Series]]:
     from rigdata.readers.series import Series
     from rigdata.units import SI_UNITS
 
-    series: list[Series] = []
-    displayed: list[Series] = []
+    series = []
+    displayed = []
     problems: list[Problem] = []
     for name, channel in run.channels.items():
         if channel.quantity == "time":

@@ -78,7 +78,7 @@ def files_of(results: Path, name: str, entry: Mapping[str, Any], given: Sequence
     hashes = texts_of(entry, "outputs_sha256")
     for file in outputs_of(entry):
         yield {"command": name, "role": "result", "file": file, "state": _state([results], file, hashes[file])}
-    folders: list[Path] = []
+    folders = []
     for place in given or [results / place for place in texts_of(entry, "inputs_at").values()]:
         inner = campaign_place(place)
         folders += [inner if inner.is_dir() else inner.parent, *([place] if place.is_dir() else ())]

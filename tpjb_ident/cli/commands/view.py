@@ -86,7 +86,7 @@ def _tables(c: Command, folder: Path) -> dict[str, Any]:
     from tpjb_ident.runtime.table_reader import read_table
 
     files = {name: folder / f"{name}.csv" for name in TABLES}
-    tables: dict[str, Any] = {name: read_table(c.file(path)) for name, path in files.items() if path.exists()}
+    tables = {name: read_table(c.file(path)) for name, path in files.items() if path.exists()}
     findings = folder / "check.json"
     if findings.exists():
         problems = read_document(c.file(findings), "tpjb-check").get("problems")

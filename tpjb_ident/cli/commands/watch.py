@@ -45,7 +45,7 @@ def watch(
     c.next("check", folder)
     c.options = {"folder": folder, "every": every, "settle": settle, "within": within or "-"}
     c.doing(f"watching {folder}; the page: {c.target / 'watch.html'}")
-    latest: Snapshot | None = None
+    latest = None
     printed: set[str] = set()
     until = math.inf
     try:

@@ -255,7 +255,7 @@ def add_colour_bar(axes: Axes, image: Any, text: str) -> Axes:
     shrink(axes, right=0.75)
     width = _size(axes)[0] * axes.get_position().width
     bar = axes.inset_axes((1.0 + 0.12 / width, 0.0, 0.14 / width, 1.0))
-    figure: Any = axes.figure
+    figure = axes.figure
     figure.colorbar(image, cax=bar, label=text).outline.set_visible(False)
     return bar
 

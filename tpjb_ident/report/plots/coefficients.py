@@ -257,7 +257,7 @@ def _model_of_sines(source: Identification | pd.DataFrame, series: pd.DataFrame)
     """The model that the frequencies of the series support; None where they refuse all, and for a table."""
     wanted = tuple(series.iloc[0].reindex(list(STATIC_KEY)))
     for group in getattr(source, "frequency_fits", list)():
-        fit: FrequencyModel | None = group.fits.get(group.supported)
+        fit = group.fits.get(group.supported)
         if fit is not None and group.points[0].point.static_key == wanted:
             return fit
     return None
