@@ -21,8 +21,8 @@ from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import DryTest, PlannedRun, RigPlan
 from rigdata.virtual_rig.truth import PAPER_RIG, RigTruth, VirtualRigError
 
-#: Where each kind of fault sits ("sensor", "record", "run" or "file"), what it needs (fields of its own, a layout, times
-#: in the files), and what it does.
+#: Where each kind of fault sits ("sensor", "record", "run" or "file"), what it needs (fields, a layout, times in the
+#: files), and what it does.
 KINDS: dict[str, dict[str, Any]] = PAPER_RIG["faults"]
 
 
