@@ -70,16 +70,13 @@ def parse_filter(text: str) -> AnalogFilter:
 class ResponseTable:
     """A measured frequency response."""
 
-    frequency: tuple[float, ...]
-    gain: tuple[float, ...]
-    phase: tuple[float, ...]
+    lines: tuple[tuple[float, float, float], ...]  #: frequency [Hz], gain, phase [rad]
 
     def at(self, frequency: FloatArray) -> ComplexArray:
         """Complex gain at `frequency` (n,) [Hz], linear between the lines of the table, NaN outside it."""
-        f = np.asarray(frequency, dtype=float)
-        gain = np.interp(f, self.frequency, self.gain, left=np.nan, right=np.nan)
-        phase = np.interp(f, self.frequency, self.phase)
-        return np.asarray(gain * np.exp(1j * phase))
+        known, gains, phases = np.transpose(self.lines)
+        gain = np.interp(frequency, known, gains, left=np.nan, right=np.nan)
+        return np.asarray(gain * np.exp(1j * np.interp(frequency, known, phases)))
 
 
 def parse_response_table(text: str) -> ResponseTable:
@@ -95,8 +92,8 @@ def parse_response_table(text: str) -> ResponseTable:
     frequency, gain, phase = rows.T
     if len(rows) < 2 or not np.isfinite(rows).all() or gain.min() <= 0 or np.diff(frequency).min() <= 0:
         raise UnitError("the table needs two lines and more, all finite, gains above zero, and frequencies that rise")
-    turned = np.unwrap(np.radians(phase))
-    return ResponseTable(tuple(frequency.tolist()), tuple(gain.tolist()), tuple(turned.tolist()))
+    rows[:, 2] = np.unwrap(np.radians(phase))
+    return ResponseTable(tuple(map(tuple, rows.tolist())))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rigdata.calibration import Channel, Channels
-from rigdata.manifest.manifest import MAX_MANIFEST, Description, Manifest, RunEntry, parse_manifest
+from rigdata.manifest.manifest import MAX_MANIFEST, Description, Manifest, RunDescription, RunEntry, parse_manifest
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import TEXT, RunReader
@@ -313,10 +313,8 @@ def _assembled(
         except RigDataError as error:
             problems.extend(error.problems)
             continue
-        shared = {item.name: getattr(entry, item.name) for item in fields(Run) if hasattr(entry, item.name)}
-        shared |= {"channels": channels if own is None else _used(own), "reader": reader}
-        shared["point"] = replace(entry.point, rotation=entry.rotation or manifest.rotation)
-        runs.append(Run(**shared))
+        stated = {item.name: getattr(entry, item.name) for item in fields(RunDescription)}
+        runs.append(Run(**stated, channels=channels if own is None else _used(own), reader=reader))
     if any(p.severity == "error" for p in problems):
         raise RigDataError([*manifest.notes, *problems])
     described = {item.name: getattr(manifest, item.name) for item in fields(Description)}

@@ -9,15 +9,15 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel, Channels
 from rigdata.device import Device
-from rigdata.operating_point import OperatingPoint
+from rigdata.manifest.manifest import RunDescription
 from rigdata.problem import RigDataError, refuse
 from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
 from rigdata.record import Record, VectorRecord
 from rigdata.vector import inverse_directions, vector_rows
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, kw_only=True)
+class Run(RunDescription):
     """One test run; its samples are read when they are asked for.
 
     Attributes
@@ -52,18 +52,8 @@ class Run:
     2000
     """
 
-    id: str
-    kind: str
-    point: OperatingPoint
-    excitation_direction: float | None
-    pad: int | None
-    branch: str
     channels: Channels
-    stated: frozenset[str]
     reader: RunReader = field(compare=False)
-    excitation_kind: str = "sine"
-    band: tuple[float, float] | None = None
-    temperature: float | None = None
 
     def __repr__(self) -> str:
         towards = "" if self.pad is None else f", pad #{self.pad}"
@@ -209,14 +199,7 @@ class Run:
         if len(reading) != len(time):  # a time column of another device
             fault = f"has {len(reading)} samples in place of {len(time)}"
             raise self._refuse(f"channel {name}", fault, "Its times come with the records of its device's channels")
-        return Record(
-            name=name,
-            quantity=channel.quantity,
-            values=channel.to_si(reading),
-            time=time,
-            rate=rate,
-            axis=channel.axis,
-        )
+        return Record(name, channel.quantity, channel.to_si(reading), time, rate, channel.axis)
 
     def _stretch(
         self, names: Sequence[str], start: int | None, stop: int | None
@@ -261,14 +244,8 @@ class Run:
         channels = self.vector_channels(quantity)
         names = tuple(c.name for c in channels)
         readings, time, rate = self._stretch(names, start, stop)
-        rows = vector_rows(channels, readings)
-        return VectorRecord(
-            quantity=quantity,
-            values=np.ascontiguousarray(rows.T),
-            time=time,
-            rate=rate,
-            names=names,
-        )
+        values = np.ascontiguousarray(vector_rows(channels, readings).T)
+        return VectorRecord(quantity, values, time, rate, names)
 
     def of(self, quantity: str) -> list[Channel]:
         """Channels that measure a quantity."""

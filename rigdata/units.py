@@ -98,7 +98,7 @@ def parse_unit(text: str, dimension: str = "") -> Unit:
     """Read a unit such as ``"mV/um"``, ``"m/s^2"`` or ``"V/(rad/s)"``."""
     if len(text) > _MAX_UNIT:
         raise UnitError(f"unit {text[:_MAX_UNIT]!r}... is too long to be one")
-    plain = text.strip().translate(_SPELLINGS).replace("°C", "degC").replace("°F", "degF").replace("°", "deg")
+    plain = text.strip().translate(_SPELLINGS)
     if dimension == "speed" and plain in {"1/s", "s^-1", "s-1", "1/min", "min^-1", "min-1"}:
         plain = "revolution/min" if "min" in plain else "revolution/s"
     if not plain:
@@ -219,7 +219,7 @@ def to_si(value: Any, dimension: str, name: str) -> Any:
 
 def temperature_offset(unit: str) -> float:
     """Kelvin at 0 of the temperature `unit`."""
-    plain = unit.strip().replace("°", "deg")
+    plain = unit.strip().translate(_SPELLINGS)
     if plain in {"degC", "C", "celsius"}:
         return ZERO_CELSIUS
     return ZERO_CELSIUS - 32 / 1.8 if plain == "degF" else 0.0

@@ -43,7 +43,7 @@ def vector_rows(channels: Sequence[Channel], readings: Sequence[FloatArray]) -> 
     partial = np.isnan(rows[0])
     if partial.any():
         rows[:, partial] = plane_vector(directions(axes), values[:, partial].T).real.T
-    return np.asarray(rows)
+    return rows
 
 
 def plane_vector(along: FloatArray, values: ComplexArray) -> ComplexArray:

@@ -42,28 +42,33 @@ _MAX_LINE, _MAX_DOTS = 40_000, 100
 _QUOTED = re.compile(r'"[^"\\]*"|\'[^\']*\'')
 
 
-@dataclass(frozen=True)
-class RunEntry:
-    """One run as the manifest states it, SI."""
+@dataclass(frozen=True, kw_only=True)
+class RunDescription:
+    """What a manifest says of a run, SI."""
 
     id: str
     kind: str
-    file: str
     point: OperatingPoint
     excitation_direction: float | None
     pad: int | None
     branch: str
-    sample_rate: float | None
     stated: frozenset[str]
-    index: int
     excitation_kind: str = "sine"
     band: tuple[float, float] | None = None
-    rotation: str | None = None
     temperature: float | None = None
 
 
-def _read_runs(top: Table) -> tuple[RunEntry, ...]:
-    """Read every run; what is wrong is noted, and that run left out."""
+@dataclass(frozen=True, kw_only=True)
+class RunEntry(RunDescription):
+    """A run and where its record is."""
+
+    file: str
+    sample_rate: float | None
+    index: int
+
+
+def _read_runs(top: Table, rotation: str) -> tuple[RunEntry, ...]:
+    """Read every run, of this rotation if it states none; what is wrong is noted, and that run left out."""
     data, findings = top.data.get("runs"), top.findings
     if not isinstance(data, list) or not data:
         findings.error(("runs",), "no runs are listed", "Add a [[runs]] table per record")
@@ -75,7 +80,7 @@ def _read_runs(top: Table) -> tuple[RunEntry, ...]:
     first: dict[str, int] = {}
     for index, entry in enumerate(data):
         errors = findings.errors
-        run = _read_run(Table(entry, ("runs", index), findings), index)
+        run = _read_run(Table(entry, ("runs", index), findings), index, rotation)
         if run is None:
             continue
         if run.id in first:
@@ -87,7 +92,7 @@ def _read_runs(top: Table) -> tuple[RunEntry, ...]:
     return tuple(runs)
 
 
-def _read_run(table: Table, index: int) -> RunEntry | None:
+def _read_run(table: Table, index: int, rotation: str) -> RunEntry | None:
     needed = _NEEDED.get(str(table.data.get("kind")), ())
     if table.data.get("excitation", "sine") != "sine":
         needed = tuple(key.replace("excitation_frequency", "excitation_band") for key in needed)
@@ -103,6 +108,7 @@ def _read_run(table: Table, index: int) -> RunEntry | None:
         static_load_direction=values["static_load_direction"],
         shaft_speed=values["shaft_speed"],
         excitation=values["excitation_frequency"],
+        rotation=values["rotation"] or rotation,
     )
     plain = {key: value for key, value in values.items() if key in RunEntry.__dataclass_fields__}
     plain |= {"excitation_kind": values["excitation"], "stated": frozenset(table.data)}
@@ -176,7 +182,8 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     header = top.read(TOP)
     tables = top.subtable("channels")
     channels = read_channels(tables)
-    runs = _read_runs(top)
+    rotation = top.subtable("shaft").read(SHAFT)["rotation"]
+    runs = _read_runs(top, rotation)
     described = channels_by_run(tables, channels, [run.id for run in runs])
     excited = any(run.kind in {"dynamic", "baseline"} for run in runs)
     housing = top.subtable("housing").read(HOUSING, ["mass"] if excited else [])
@@ -192,7 +199,7 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
         notes=tuple(p for p in findings.problems if p.severity != "error"),
         mass_uncertainty=housing["mass_uncertainty"],
         mains=acquisition["mains"],
-        rotation=top.subtable("shaft").read(SHAFT)["rotation"],
+        rotation=rotation,
         mount=housing["mount"],
         described=described,
     )

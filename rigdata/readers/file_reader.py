@@ -7,12 +7,10 @@ that names the file. What was parsed is cached, the last used of a campaign, as 
 from __future__ import annotations
 
 import importlib
-import stat
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -68,7 +66,8 @@ def read_contents(record: RecordFile) -> Contents:
     """Read the channels of a file, each at its own times."""
     path, again = record.path, "Export or copy it again from the logger"
     if not path.is_file():
-        raise record.refuse("", "the file is not there", "Restore it, or delete the run")
+        fault = "is not an ordinary file" if path.exists() else "the file is not there"
+        raise record.refuse("", fault, "Restore it, or delete the run")
     size = path.stat().st_size
     if size == 0:
         raise record.refuse("", "is empty", again)
@@ -120,19 +119,11 @@ class FileReader(RunReader):
 
     cache: ReadingCache = field(default_factory=ReadingCache, repr=False, compare=False)
 
-    def _signature(self) -> tuple[Path, int, int, str | None]:
-        """A key that changes when the file does, so that the cache never serves an old one."""
-        try:
-            state = self.path.stat()
-        except OSError as error:
-            raise self.refuse("", "the file is not there", "Restore it, or delete the run") from error
-        if not stat.S_ISREG(state.st_mode):
-            raise self.refuse("", "is not an ordinary file", "Name a record in the manifest")
-        return self.path, state.st_size, state.st_mtime_ns, self.run
-
     def _layout(self) -> _Columns:
-        """All channels at their own times."""
-        return self.cache.get(self._signature(), lambda: self._arranged(read_contents(self)))
+        """All channels at their own times; the key changes when the file does, so that no old one is served."""
+        state = self.path.stat() if self.path.is_file() else None
+        key = (self.path, self.run, state and (state.st_size, state.st_mtime_ns))
+        return self.cache.get(key, lambda: self._arranged(read_contents(self)))
 
     def _arranged(self, contents: Contents) -> _Columns:
         series = with_unique_names(contents.series)

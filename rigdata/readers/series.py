@@ -82,8 +82,7 @@ def to_temporary_file(values: FloatArray) -> FloatArray:
     try:
         with tempfile.TemporaryFile(prefix="tpjb-") as file:
             values.tofile(file)
-            file.flush()
-            return np.memmap(file, dtype=values.dtype, mode="r", shape=values.shape)
+            return np.memmap(file, values.dtype, "r", shape=values.shape)
     except OSError:
         return values
 

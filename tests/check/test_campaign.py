@@ -133,7 +133,8 @@ def make_run(name: str, kind: str = "dynamic") -> Run:
     class Reader:
         file = f"runs/{name}.csv"
 
-    return Run(name, kind, OperatingPoint(5000.0), None, None, "up", {}, frozenset(), Reader())
+    stated = {"excitation_direction": None, "pad": None, "branch": "up", "stated": frozenset()}
+    return Run(id=name, kind=kind, point=OperatingPoint(5000.0), channels={}, reader=Reader(), **stated)
 
 
 def test_what_many_runs_share_is_told_once():

@@ -29,7 +29,7 @@ POINT = OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22.0, 2 * math.pi * D
 
 def run_of(data, channels, stamps=None):
     described = {c.name: c for c in channels}
-    return Run("r", "dynamic", POINT, 0.3, None, "up", described, frozenset(), HeldReader(data, RATE, stamps))
+    return replace(held_run.run_of(HeldReader(data, RATE, stamps), described, POINT, "r"), excitation_direction=0.3)
 
 
 def probes(axes, zero=0.0, polarity=1):

@@ -67,7 +67,8 @@ def channels(quantities: Sequence[str], speed: bool = False) -> dict[str, Channe
 
 def run_of(reader: HeldReader, described: Mapping[str, Channel], point: OperatingPoint = POINT, name: str = "a") -> Run:
     """A dynamic run of such a reader."""
-    return Run(name, "dynamic", point, 0.0, None, "up", described, frozenset(), reader)
+    stated = {"excitation_direction": 0.0, "pad": None, "branch": "up", "stated": frozenset()}
+    return Run(id=name, kind="dynamic", point=point, channels=described, reader=reader, **stated)
 
 
 def lines_in_noise(seed: int, rate: float = RATE, seconds: float = SECONDS) -> dict[str, np.ndarray]:

@@ -14,7 +14,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.device import Grid, timed_grid
 from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, SAMPLE, Layout, RunReader
+from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, Layout, RunReader
 from rigdata.readers.hdf5.guards import (
     TEXT,
     UNIT,
@@ -88,6 +88,7 @@ class _Members(Layout):
     """What every request needs, cached until the file changes."""
 
     members: tuple[str, ...]
+    largest_chunk: int  #: bytes
 
 
 @dataclass(frozen=True)
@@ -124,19 +125,11 @@ class Hdf5Reader(RunReader):
         if _GROUP in self.opened_members:  # by whoever called
             yield
             return
+        # two stored chunks of the largest dataset; the cache is given when a file is opened
+        cache = min(max(2 * self._layout().largest_chunk, _LEAST_CACHE), _MOST_CACHE)
         stack = ExitStack()
         try:
-            self.opened_members[_GROUP] = stack.enter_context(self._group(_LEAST_CACHE))
-            needed, grid = _LEAST_CACHE, self._layout().grids[0]
-            if grid.length * SAMPLE > _LEAST_CACHE:
-                # two stored chunks of the largest of a few datasets; they are stored alike as a rule
-                with self._group() as group:
-                    largest = max(chunk_bytes(self._dataset(group, name)) for name in grid.channels[:4])
-                needed = min(2 * largest, _MOST_CACHE)
-            if needed > _LEAST_CACHE:  # the cache is given when a file is opened
-                self.opened_members.clear()
-                stack.close()
-                self.opened_members[_GROUP] = stack.enter_context(self._group(needed))
+            self.opened_members[_GROUP] = stack.enter_context(self._group(cache))
             yield
         finally:  # closed without the block's own errors, which are no faults of the file
             self.opened_members.clear()
@@ -193,9 +186,12 @@ class Hdf5Reader(RunReader):
         members = tuple(itertools.islice(group, _MAX_MEMBERS))
         lengths = {}
         problems: list[Problem] = []
+        largest = 0
         for name in members:
             try:
-                lengths[name] = int(self._dataset(group, name).shape[0])
+                dataset = self._dataset(group, name)
+                lengths[name] = int(dataset.shape[0])
+                largest = max(largest, chunk_bytes(dataset))
             except RigDataError as error:  # raised again when that channel is asked for
                 problems.extend(error.problems)
         if not lengths:
@@ -219,7 +215,7 @@ class Hdf5Reader(RunReader):
         remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
         layout = self._planned(timings, run_rate, "dataset", remedy)
         unserved = Grid(max(lengths.values()), "", run_rate or np.nan)
-        return _Members(layout.grids or (unserved,), layout.faults, members)
+        return _Members(layout.grids or (unserved,), layout.faults, members, largest)
 
     def _seconds(self, group: Any, clock: str, start: int, stop: int) -> FloatArray:
         """Some times of a time dataset [s]."""
