@@ -1,4 +1,4 @@
-"""Amplitude spectrum and statistics of one channel, for a first look."""
+"""Amplitude spectrum of one channel and its lines, for a first look."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,6 @@ from rigdata.arrays import FloatArray
 #: A line must exceed by this factor the median of its neighbourhood to be named.
 _STANDS_OUT = 8.0
 _NEIGHBOURS = 25
-#: Lines that a first look names.
-_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -23,51 +21,11 @@ class SpectralPeak:
 
 #: Lines of a spectrum, strongest first.
 Peaks = tuple[SpectralPeak, ...]
+#: Frequencies (m,) [Hz] and peak amplitudes (m,).
+Spectrum = tuple[FloatArray, FloatArray]
 
 
-@dataclass(frozen=True)
-class Look:
-    """What a first look at a channel shows."""
-
-    count: int
-    missing: int
-    mean: float
-    deviation: float
-    low: float
-    high: float
-    frequency: FloatArray  #: (m,) each: Hz, unit of the signal
-    amplitude: FloatArray
-    lines: Peaks = ()
-
-    @property
-    def flat(self) -> bool:
-        """Whether the channel never moves: a dead one."""
-        return not self.high > self.low
-
-
-def look_at(values: FloatArray, rate: float) -> Look:
-    """Take a first look at a channel's `values` (n,)."""
-    good = np.isfinite(values)
-    finite = values[good]
-    empty = np.empty(0)
-    if not len(finite):
-        nan = np.nan
-        return Look(len(values), len(values), nan, nan, nan, nan, empty, empty)
-    frequency, amplitude = amplitude_spectrum(values, rate)
-    return Look(
-        count=len(values),
-        missing=int((~good).sum()),
-        mean=float(finite.mean()),
-        deviation=float(finite.std()),
-        low=float(finite.min()),
-        high=float(finite.max()),
-        frequency=frequency,
-        amplitude=amplitude,
-        lines=strongest(frequency, amplitude, _NAMED),
-    )
-
-
-def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+def amplitude_spectrum(values: FloatArray, rate: float) -> Spectrum:
     """Peak amplitudes (m,) over frequency (m,) [Hz] of values (n,), Hann window, no trend; empty if there are too few.
 
     Gaps are filled in between, which is good enough for a look and for nothing else.

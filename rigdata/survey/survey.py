@@ -10,26 +10,24 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.readers.series import Series
-from rigdata.survey.axes import (
-    Frame,
-    Pair,
-    along,
-    fitted_frame,
-    folded,
-    line_phasors,
-    pairs,
-    part_means,
-    stated_frame,
-    with_axes,
-)
 from rigdata.survey.channels import (
     OPEN,
     Entry,
+    Frame,
     Guesses,
+    Pair,
     Tables,
+    along,
     as_described,
+    fitted_frame,
+    folded,
     guess_channel,
+    line_phasors,
+    pairs,
+    part_means,
     quantity_of_unit,
+    stated_frame,
+    with_axes,
 )
 from rigdata.survey.exports import Export, in_seconds
 from rigdata.survey.runs import NEAR, RunGuess, guess_run, of_quantity, strongest_lines

@@ -17,11 +17,12 @@ from rigdata.survey.channels import guess_channel, usable_unit
 from rigdata.survey.draft import draft_manifest
 from rigdata.survey.exports import Export, read_exports, record_files
 from rigdata.survey.runs import _load_of, guess_run
-from rigdata.survey.spectrum import look_at
+from rigdata.survey.spectrum import amplitude_spectrum, strongest
 from rigdata.survey.survey import survey
 from rigdata.virtual_rig import DryTest, locus_points, operating_points
 from tests.good_campaigns import SMALL_PLAN, rocker_rig
 from tpjb_ident.check.campaign import check_campaign
+from tpjb_ident.cli.commands.show import channel_row
 
 RATE = 1000.0
 
@@ -218,14 +219,19 @@ def test_a_look_finds_lines_and_dead_channels():
     time = np.arange(2000) / RATE
     rng = np.random.default_rng(1)
     swing = 3.0 * np.sin(2 * np.pi * 25.3 * time) + np.sin(2 * np.pi * 22 * time) + 0.01 * rng.standard_normal(2000)
-    look = look_at(swing + 5.0 * time, RATE)
-    assert [round(x.frequency, 1) for x in look.lines[:2]] == [25.3, 22.0]
-    assert look.lines[0].amplitude == pytest.approx(3.0, rel=0.1)
-    assert look_at(np.full(100, 2.5), RATE).flat
-    nothing = look_at(np.full(100, np.nan), RATE)
-    assert nothing.missing == 100
-    assert math.isnan(nothing.mean)
-    assert look_at(rng.standard_normal(2000), RATE).lines == ()
+    lines = strongest(*amplitude_spectrum(swing + 5.0 * time, RATE), 3)
+    assert [round(x.frequency, 1) for x in lines[:2]] == [25.3, 22.0]
+    assert lines[0].amplitude == pytest.approx(3.0, rel=0.1)
+    assert strongest(*amplitude_spectrum(rng.standard_normal(2000), RATE), 3) == ()
+    dead = shown(np.full(100, 2.5))
+    assert (dead["minimum"], dead["maximum"], dead["missing"]) == (2.5, 2.5, 0)
+    nothing = shown(np.full(100, np.nan))
+    assert nothing["missing"] == nothing["samples"] == 100
+    assert math.isnan(nothing["mean"])
+
+
+def shown(values):
+    return channel_row(Series("X", "um", values, np.arange(len(values)) / RATE), amplitude_spectrum(values, RATE))
 
 
 TIME = np.arange(4000) / RATE

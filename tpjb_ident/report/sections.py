@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from rigdata.readers.series import Series
     from rigdata.run import Run
-    from rigdata.survey.spectrum import Look
+    from rigdata.survey.spectrum import Spectrum
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.comparison import Comparison
@@ -328,22 +328,22 @@ _ROW, _WIDTH = 1.35, 4.6
 _POINTS = 4000
 
 
-def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Panel:
+def quick_look(title: str, series: Sequence[Series], spectra: Mapping[str, Spectrum]) -> Panel:
     """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
-    figure = functools.partial(_quick_look, list(series)[:_MOST], looks, title=printable(title))
+    figure = functools.partial(_quick_look, list(series)[:_MOST], spectra, title=printable(title))
     return panel("quick-look", title, figure)
 
 
 @plot
-def _quick_look(series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:
+def _quick_look(series: Sequence[Series], spectra: Mapping[str, Spectrum]) -> Figure:
     figure, grid = new_pictures(len(series), 2, width=_WIDTH, height=_ROW)
     for (over_time, spectrum), channel in zip(grid, series, strict=True):
         label(over_time, "time, s", printable(", ".join(filter(None, (channel.name, channel.unit)))))
         label(spectrum, "frequency, Hz", "")
         time = np.arange(len(channel), dtype=float) if channel.time is None else channel.time
         over_time.plot(*thinned(time, channel.values, _POINTS), color=INK, linewidth=0.6)
-        look = looks[channel.name]
-        spectrum.plot(look.frequency[4:], np.maximum(look.amplitude[4:], 1e-300), color=BLUE, linewidth=0.7)
+        frequency, amplitude = spectra[channel.name]
+        spectrum.plot(frequency[4:], np.maximum(amplitude[4:], 1e-300), color=BLUE, linewidth=0.7)
         spectrum.set_yscale("log")
         over_time.locator_params(axis="y", nbins=3)
         spectrum.yaxis.set_major_locator(LogLocator(numticks=4))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from rigdata.readers.series import Series
     from rigdata.run import Run
-    from rigdata.survey.spectrum import Look
+    from rigdata.survey.spectrum import Spectrum
 
 #: Runs that are listed.
 MOST_RUNS = 200
@@ -48,7 +48,7 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
     """
     from rigdata.campaign import HDF5_SUFFIXES, campaign_place
     from rigdata.survey.exports import read_export
-    from rigdata.survey.spectrum import look_at
+    from rigdata.survey.spectrum import amplitude_spectrum
 
     place = campaign_place(source)
     if not place.exists():
@@ -72,28 +72,25 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
         title = source.name
         with c.progress(f"looking at {source.name}"):
             displayed = series = list(read_export(c.file(source)).series)
-    looks = {s.name: look_at(s.values, s.rate) for s in displayed}
-    dead = [name for name, look in looks.items() if look.flat]
+    spectra = {s.name: amplitude_spectrum(s.values, s.rate) for s in displayed}
+    rows = [channel_row(s, spectra[s.name]) for s in displayed]
+    dead = [row["channel"] for row in rows if not row["maximum"] > row["minimum"]]
     c.print(f"{title}: {counted(len(displayed), 'channel')}, {', '.join(dead) or 'none'} dead.")
-    rows = [_row(s, looks[s.name]) for s in displayed]
     names = _COLUMNS.split()
     c.show(title, [PRINTED[name] for name in names], map(itemgetter(*names), rows))
-    spectra = []
-    for name, look in looks.items():
-        if len(look.frequency) > 4:
-            spectra.append([name, look.amplitude[4:].tolist(), look.frequency[-1]])
+    lines = [[name, a[4:].tolist(), f[-1]] for name, (f, a) in spectra.items() if len(f) > 4]
     bars = Column("from 0", lambda *values: sparkline(values), words=True)
-    c.show("spectra, 3 decades", [*words("channel"), bars, "to {frequency}"], spectra)
+    c.show("spectra, 3 decades", [*words("channel"), bars, "to {frequency}"], lines)
     if picture or c.out is not None:
         import pandas as pd
 
         c.options = {"source": source, "shown": title}
         with c.results():
-            c.table("channels", pd.DataFrame([_row(s, look_at(s.values, s.rate)) for s in series]))
+            c.table("channels", pd.DataFrame([channel_row(s, amplitude_spectrum(s.values, s.rate)) for s in series]))
             if picture:
                 from tpjb_ident.report.sections import quick_look
 
-                c.draw([quick_look(title, displayed, looks)])
+                c.draw([quick_look(title, displayed, spectra)])
 
 
 def _show_campaign(c: Command, campaign: Campaign) -> None:
@@ -150,19 +147,25 @@ def _shown_in(quantity: str, unit: str) -> tuple[str, float, float]:
     return shown or unit, scale, 0.0
 
 
-def _row(series: Series, look: Look) -> dict[str, Any]:
+def channel_row(series: Series, spectrum: Spectrum) -> dict[str, Any]:
     """A channel in channels.csv."""
-    frequencies = [line.frequency for line in look.lines[:3]] + 3 * [math.nan]
+    import numpy as np
+
+    from rigdata.survey.spectrum import strongest
+
+    good = series.values[np.isfinite(series.values)]
+    mean, deviation, low, high = (good.mean(), good.std(), good.min(), good.max()) if len(good) else 4 * (math.nan,)
+    frequencies = [line.frequency for line in strongest(*spectrum, 3)] + 3 * [math.nan]
     return {
         "channel": series.name,
         "unit": series.unit,
-        "samples": look.count,
-        "missing": look.missing,
+        "samples": len(series),
+        "missing": len(series) - len(good),
         "sample_rate_Hz": series.rate,
-        "mean": look.mean,
-        "standard_deviation": look.deviation,
-        "minimum": look.low,
-        "maximum": look.high,
+        "mean": float(mean),
+        "standard_deviation": float(deviation),
+        "minimum": float(low),
+        "maximum": float(high),
         **{f"line{i + 1}_Hz": frequencies[i] for i in range(3)},
     }
 
