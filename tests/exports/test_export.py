@@ -34,10 +34,21 @@ from tpjb_ident.exports.formats import (
     chosen_rows,
     turning_counter_clockwise,
 )
-from tpjb_ident.exports.rotor_programs import grids, ross_version, write_ansys, write_dyrobes, write_ross, write_xltrc
 from tpjb_ident.exports.structural import sep005
-from tpjb_ident.exports.table import write_csv, write_excel, write_mat, write_parquet, write_us
 from tpjb_ident.exports.write import export
+from tpjb_ident.exports.writers import (
+    grids,
+    ross_version,
+    write_ansys,
+    write_csv,
+    write_dyrobes,
+    write_excel,
+    write_mat,
+    write_parquet,
+    write_ross,
+    write_us,
+    write_xltrc,
+)
 
 
 def table(points):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.columns import in_us_units
 from tpjb_ident.errors import NotTrustedError
-from tpjb_ident.exports import rotor_programs, table
+from tpjb_ident.exports import writers
 from tpjb_ident.exports.formats import (
     ROSS_VERSIONS,
     ROTOR_PROGRAMS,
@@ -18,7 +18,6 @@ from tpjb_ident.exports.formats import (
     chosen_rows,
     turning_counter_clockwise,
 )
-from tpjb_ident.exports.rotor_programs import write_ross_bearing
 from tpjb_ident.runtime.output_folder import contradiction
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import STATIC_KEY
@@ -103,7 +102,7 @@ def export(
         if to != "ross":
             raise ExportError(f"a bearing file leaves for ROSS alone, not for {to}. Export a prediction of it.")
         target.mkdir(parents=True, exist_ok=True)
-        write_ross_bearing(target, source, **options)
+        writers.write_ross_bearing(target, source, **options)
         return Export(target, ("ross_bearing.py",), Chosen())
     frame, origin = _table(source)
     chosen = chosen_rows(frame, force)
@@ -120,14 +119,14 @@ def export(
 
 def _write(target: Path, rows: pd.DataFrame, to: str, source: str, options: dict[str, int]) -> None:
     """Write rows in one form; intervals, and a table in US units, beside it."""
-    rotor = to in ROTOR_PROGRAMS
-    beside = table.INTERVALS if rotor else table.NAME
-    if rotor:
+    beside = writers.NAME
+    if to in ROTOR_PROGRAMS:
+        beside = writers.INTERVALS
         rows = turning_counter_clockwise(rows)
-        table.write_csv(target, rows, "", beside)
-    getattr(rotor_programs if rotor else table, f"write_{to}")(target, rows, source, **options)
+        writers.write_csv(target, rows, "", beside)
+    getattr(writers, f"write_{to}")(target, rows, source, **options)
     if in_us_units():
-        table.write_us(target, rows, beside)
+        writers.write_us(target, rows, beside)
 
 
 def _ross_options(to: str, version: int | None) -> dict[str, int]:
