@@ -15,7 +15,7 @@ import tpjb_ident.report
 from tests.report.tags import Page
 from tpjb_ident.report import page as report_page
 from tpjb_ident.report.drawing.picture import add_legend, longest_series, new_picture
-from tpjb_ident.report.figure import panel, save_panels, svg_text
+from tpjb_ident.report.figure import Panel, save_panels, svg_text
 from tpjb_ident.report.page import Section, Table, render_page, render_section
 from tpjb_ident.report.sections import coefficient_sections, position_panels
 from tpjb_ident.rounding import fixed, percent, signed, with_interval
@@ -31,7 +31,7 @@ def page_and_svg(tmp_path_factory):
     add_legend(axes)
     other, axes = new_picture("x", "y")
     axes.plot([0, 1], [1, 0], marker="s")
-    panels = [panel("one", f"first {HOSTILE}", figure), panel("two", "second", other)]
+    panels = [Panel("one", f"first {HOSTILE}", figure), Panel("two", "second", other)]
     page = report_page.Page(
         title=HOSTILE,
         subtitle=HOSTILE,
@@ -100,14 +100,14 @@ def test_the_same_figure_gives_the_same_bytes_and_leaves_no_global_setting(page_
     before = dict(matplotlib.rcParams)
     figure, axes = new_picture("x", "y")
     axes.plot([0, 1], [1, 0], marker="s")
-    assert svg_text(panel("two", "second", figure).figure, "two") == page_and_svg[1]["two"]
+    assert svg_text(Panel("two", "second", figure).figure, "two") == page_and_svg[1]["two"]
     assert dict(matplotlib.rcParams) == before
 
 
 def test_a_section_alone_is_as_safe_and_brings_its_style():
     figure, _ = new_picture(HOSTILE.partition("$")[0], "y")
     text = render_section(
-        Section(HOSTILE, [HOSTILE], [panel("p", HOSTILE, figure)], [Table(HOSTILE, ["a"], [[HOSTILE]])])
+        Section(HOSTILE, [HOSTILE], [Panel("p", HOSTILE, figure)], [Table(HOSTILE, ["a"], [[HOSTILE]])])
     )
     tags = parsed(text)
     assert not [t for t, attrs in tags if t in ("img", "script") or any(a.startswith("on") for a in attrs)]

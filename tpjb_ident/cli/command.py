@@ -33,7 +33,7 @@ from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.conditions import Condition, sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.runtime.interrupts import heard, interrupt_behind
-from tpjb_ident.runtime.output_folder import RECORD, contradiction, files_in, former_runs, output_folder, record_text
+from tpjb_ident.runtime.output_folder import RECORD, contradiction, files_in, output_folder, record_text
 from tpjb_ident.runtime.provenance import TABLE_SCHEMA, sha256, versions
 from tpjb_ident.runtime.tables import write_csv, write_table, write_text
 
@@ -78,7 +78,6 @@ class Command(Terminal):
         """Open a campaign."""
         from rigdata import load_campaign
 
-        refuse_special(path)
         self._sources.append(path)
         campaign = load_campaign(path)
         self._opened.append(campaign)
@@ -347,10 +346,7 @@ def write_record(
     inputs: Mapping[str, str],
     notes: Mapping[str, Any] | None = None,
 ) -> list[str]:
-    """Write run.json into the temporary folder of a command, last; the files that it lists.
-
-    Commands that share an output folder share its run.json: one entry each.
-    """
+    """Write run.json into the temporary folder of a command, last; the files that it lists."""
     outputs = files_in(staging)
     record = {
         "tables": TABLE_SCHEMA,
@@ -363,7 +359,7 @@ def write_record(
         "inputs_at": _places(settings, target),
         **{name: note for name, note in (notes or {}).items() if note},
     }
-    write_text(staging / RECORD, record_text({**former_runs(target), entry: record}))
+    write_text(staging / RECORD, record_text({entry: record}))
     return outputs
 
 

@@ -19,7 +19,7 @@ from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap_at
 from tpjb_ident.report.drawing.picture import DIRECT
-from tpjb_ident.report.figure import Panel, panel
+from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.page import Page, Section, Table, plain_templates, write_page
 from tpjb_ident.report.plots.residuals import gap, residual_frame, residual_map, residual_series
 from tpjb_ident.report.sections import coefficient_sections, flags_line, tested_facts, values_table
@@ -289,13 +289,13 @@ def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
     frame = residual_frame(diagnosis)
     for over, name, title in _SERIES:
         try:
-            panels.append(panel(name, title, residual_series(frame, over)))
+            panels.append(Panel(name, title, residual_series(frame, over)))
         except ValueError:  # nothing varies over it
             continue
     title = "Gap by observable, held-out points where there are any (* fitted points)"
-    panels.append(panel("gap-by-observable", title, gap(diagnosis.verdict)))
+    panels.append(Panel("gap-by-observable", title, gap(diagnosis.verdict)))
     if len(frame):
-        panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame)))
+        panels.append(Panel("residual-map", "Residuals of every coefficient and point", residual_map(frame)))
     return panels
 
 

@@ -23,7 +23,7 @@ from tpjb_ident.report.drawing.picture import (
     set_point_ticks,
     with_errors,
 )
-from tpjb_ident.report.figure import panel
+from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.page import Page, Section, Table, table_of, write_page
 from tpjb_ident.report.sections import coefficient_cells, flags_line, interval_cells, set_points
 from tpjb_ident.schema import DAMPING, POINT_KEY, STIFFNESS, TANGENT, Coefficient
@@ -95,7 +95,7 @@ def _sections(difference: Difference) -> list[Section]:
     sections = []
     if len(points):
         tables = [_coefficient_table(points, kind) for kind in (STIFFNESS, DAMPING)]
-        sections.append(Section("Coefficients", panels=[panel("difference", _TITLE, _drawn, points)], tables=tables))
+        sections.append(Section("Coefficients", panels=[Panel("difference", _TITLE, _drawn, points)], tables=tables))
     if len(pivots):
         loads = (per("load") * pivots["force_N"]).map("{:.3g}".format)
         cells = {"pad": _pads(pivots), f"load, {symbol('load')}": loads, **_both(pivots, TANGENT, "stiffness")}

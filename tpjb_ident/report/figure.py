@@ -10,7 +10,6 @@ import io
 import multiprocessing
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,18 +36,17 @@ _MOST_POINTS = 400
 _ID = re.compile(r"(\bid=\"|href=\"#|url\(#)([^\")]+)")
 
 
-@dataclass(frozen=True)
 class Panel:
-    """One figure of a report."""
+    """One figure of a report: a picture, or a function that draws it and its arguments."""
 
-    name: str
-    title: str
-    drawing: Callable[[], Figure]
+    def __init__(self, name: str, title: str, drawing: Figure | Callable[..., Figure], *arguments: Any) -> None:
+        self.name, self.title = name, title
+        self._drawing, self._arguments = drawing, arguments
 
     @functools.cached_property
     def figure(self) -> Figure:
         """The picture, without its white ground: the page's own shows through."""
-        figure = self.drawing()
+        figure = self._drawing(*self._arguments) if callable(self._drawing) else self._drawing
         figure.patch.set_alpha(0.0)
         return figure
 
@@ -63,11 +61,6 @@ def is_wide(svg: str) -> bool:
 _TOGETHER, _MOST_HANDS = 6, 4
 #: What is being drawn, for processes that are forked from this one.
 _drawn: list[Panel] = []
-
-
-def panel(name: str, title: str, figure: Figure | Callable[..., Figure], *arguments: Any) -> Panel:
-    """Make a panel of a picture, or of a function that draws it and its arguments."""
-    return Panel(name, title, functools.partial(figure, *arguments) if callable(figure) else lambda: figure)
 
 
 @in_house_style

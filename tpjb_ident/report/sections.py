@@ -31,7 +31,7 @@ from tpjb_ident.report.drawing.picture import (
     points_table,
     thinned,
 )
-from tpjb_ident.report.figure import Panel, panel
+from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.page import Section, Table, plain_templates
 from tpjb_ident.report.plots.coefficients import coefficient, frf
 from tpjb_ident.report.plots.records import coherence, coherence_spectrum, orbit, spectra
@@ -211,7 +211,7 @@ def evidence_section(campaign: Campaign, result: Identification) -> Section:
     panels = _stiffness_panels(result)
     if result.points:
         title = "Force that the displacements do not explain"
-        panels = [*_run_panels(campaign, result), *panels, panel("coherence-points", title, coherence, result)]
+        panels = [*_run_panels(campaign, result), *panels, Panel("coherence-points", title, coherence, result)]
     return Section("Raw evidence of one run", panels=panels)
 
 
@@ -222,11 +222,11 @@ def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
         try:
             label = f"run {run.id}, {place_of(point.point.static_load, point.point.excitation_hz)}"
             return [
-                panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
+                Panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
                       orbit(run)),
-                panel("coherence-spectrum", f"Multiple coherence of force and displacement, {label}",
+                Panel("coherence-spectrum", f"Multiple coherence of force and displacement, {label}",
                       coherence_spectrum(run)),
-                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run)),
+                Panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run)),
             ]  # fmt: skip
         except (RigDataError, ValueError):  # a damaged or short run: the next one shows the same
             continue
@@ -241,12 +241,12 @@ def _stiffness_panels(result: Identification) -> list[Panel]:
         title = (
             f"Dynamic stiffness h over frequency, {constant_along(series, 'frequency')}; a line: the model that fits"
         )
-        panels.append(panel("h-over-frequency", title, frf, result))
+        panels.append(Panel("h-over-frequency", title, frf, result))
     for number, band in enumerate(result.bands, start=1):
         key = band.key()
         title = (f"Dynamic stiffness h over the band, {amount(key['static_load_N'], 'load')}, "
                  f"shaft at {spinning(key['shaft_speed_Hz'], key['rotation'])}, {key['excitation']}")  # fmt: skip
-        panels.append(panel(f"h-over-band-{number}", title, frf, band))
+        panels.append(Panel(f"h-over-band-{number}", title, frf, band))
     return panels
 
 
@@ -278,7 +278,7 @@ def coefficient_sections(table: pd.DataFrame) -> list[Section]:
             panels = []
             for name in names:
                 title = f"{name} ({KINDS[name[0]].quantity}) over {over}, at {constant_along(series, over)}"
-                panels.append(panel(f"{name}-over-{over}", title, coefficient, table, name, over))
+                panels.append(Panel(f"{name}-over-{over}", title, coefficient, table, name, over))
             sections.append(Section(f"{kind} over {over}", panels=panels))
     return sections
 
@@ -291,9 +291,9 @@ def pivot_panels(curves: Sequence[PivotCurve], formula: Formula | None = None) -
     steps = "Load steps and fitted laws, pivot and housing together"
     across = "Load and displacement vectors, and what of them lies on each pad's direction"
     return [
-        panel("pivot-stiffness", bands, pivot_stiffness, curves, formula),
-        panel("pivot-steps", steps, load_deflection, curves),
-        panel("pivot-projection", across, pad_projection, curves),
+        Panel("pivot-stiffness", bands, pivot_stiffness, curves, formula),
+        Panel("pivot-steps", steps, load_deflection, curves),
+        Panel("pivot-projection", across, pad_projection, curves),
     ]
 
 
@@ -314,12 +314,12 @@ def position_panels(
         return []
     polygons = None if polygon is None else {"measured": polygon} | {f"run {p.run}": p for p in others}
     figure = functools.partial(clearance_and_locus, polygons, measured, predicted, drawing=drawn)
-    return [panel("locus-and-clearance", "Shaft centre locus inside the clearance polygon", figure)]
+    return [Panel("locus-and-clearance", "Shaft centre locus inside the clearance polygon", figure)]
 
 
 def isolability_panels(plans: Mapping[str, CampaignPlan]) -> list[Panel]:
     """Draw the isolability matrix of every plan."""
-    return [panel(name.replace("_", "-"), f"Isolability, {name}", isolability, plan) for name, plan in plans.items()]
+    return [Panel(name.replace("_", "-"), f"Isolability, {name}", isolability, plan) for name, plan in plans.items()]
 
 
 #: A picture of more channels could not be read.
@@ -331,7 +331,7 @@ _POINTS = 4000
 def quick_look(title: str, series: Sequence[Series], spectra: Mapping[str, Spectrum]) -> Panel:
     """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
     figure = functools.partial(_quick_look, list(series)[:_MOST], spectra, title=printable(title))
-    return panel("quick-look", title, figure)
+    return Panel("quick-look", title, figure)
 
 
 @plot

@@ -11,7 +11,7 @@ import numpy as np
 from tpjb_ident.columns import amount, per, spinning, symbol
 from tpjb_ident.report.comparison_page import clearance_table, pivot_stiffness_table
 from tpjb_ident.report.drawing.picture import DIRECT, longest_series
-from tpjb_ident.report.figure import Panel, panel, svg_text
+from tpjb_ident.report.figure import Panel, svg_text
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.plots.coefficients import direct_coefficients
 from tpjb_ident.report.sections import KINDS_IN_WORDS, flags_line, tested_facts, values_table
@@ -119,7 +119,7 @@ def _panels(snapshot: Snapshot) -> list[Panel]:
     for over in ("load", "frequency"):
         if longest_series(table, over) is not None:
             title, bearings = f"Direct stiffness over {over}, 95 % intervals", {identification.campaign: table}
-            panels.append(panel(f"k-over-{over}", title, direct_coefficients, bearings, "k", over))
+            panels.append(Panel(f"k-over-{over}", title, direct_coefficients, bearings, "k", over))
     return panels
 
 

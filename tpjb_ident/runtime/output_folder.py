@@ -103,7 +103,7 @@ def _bring(staging: Path, target: Path, command: str) -> None:
 
 
 def _join_records(staging: Path, target: Path, command: str) -> None:
-    """Have run.json tell of the folder's other commands too, and note what this one no longer writes."""
+    """Have run.json tell of the folder's other commands too, an entry each, and note what this one no longer writes."""
     new, before = files_in(staging), former_runs(target)
     ours = {name for entry in before.values() for name in outputs_of(entry)} | {RECORD}
     foreign = [name for name in new if (target / name).exists() and name not in ours]
@@ -113,9 +113,7 @@ def _join_records(staging: Path, target: Path, command: str) -> None:
             "Give another folder or move the file."
         )
     stale = sorted(set(outputs_of(before.get(command, {}))) - set(new))
-    # another command may have ended here since this one began
-    entries = {**before, **{name: entry for name, entry in former_runs(staging).items() if name == command}}
-    write_text(staging / RECORD, record_text(entries))
+    write_text(staging / RECORD, record_text(before | former_runs(staging)))
     write_text(staging / _STALE, json.dumps(stale))
 
 

@@ -11,7 +11,7 @@ from rigdata.problem import RigDataError
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
 from tpjb_ident.columns import amount, channel_unit
 from tpjb_ident.report.drawing.picture import LIGHT, thinned
-from tpjb_ident.report.figure import panel
+from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.page import Section, render_section
 from tpjb_ident.report.plots.records import orbit
 from tpjb_ident.runtime.tables import printable
@@ -121,7 +121,7 @@ def _show_channels(records: Sequence[Record], plots: dict[str, Any], data: dict[
 def _orbit(run: Run) -> str:
     """The path of the shaft, as the report draws it; of a run whose probes give none nothing."""
     try:
-        picture = panel("orbit", "Orbit of the shaft in the housing", orbit(run))
+        picture = Panel("orbit", "Orbit of the shaft in the housing", orbit(run))
     except (RigDataError, ValueError):
         return ""
     return render_section(Section("Shaft in the housing", panels=[picture]))

@@ -16,7 +16,7 @@ from tpjb_ident.compare.predictions import ModelSettings, point_columns, predict
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.comparison_page import deviations_table, measured_table
 from tpjb_ident.report.drawing.picture import DIRECT, longest_series
-from tpjb_ident.report.figure import panel
+from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.page import Section, render_section
 from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficients
 from tpjb_ident.report.plots.records import window_weights
@@ -72,7 +72,7 @@ def points_tab(identification: Identification) -> Any:
         p = points[choice.value]
         flags = ", ".join(str(condition) for condition in p.quality) or "none"
         title = f"Robust weight of {p.n_windows} windows; flags: {flags}"
-        windows.text = render_section(Section("Windows", panels=[panel("window-weights", title, window_weights(p))]))
+        windows.text = render_section(Section("Windows", panels=[Panel("window-weights", title, window_weights(p))]))
 
     follow(update, choice)
     return column(
@@ -84,7 +84,7 @@ def _points_html(identification: Identification) -> str:
     panels = []
     if longest_series(identification.to_frame(), "load") is not None:
         figure = direct_coefficients({identification.campaign: identification})
-        panels.append(panel("stiffness", "Direct stiffness over load, 95 % intervals", figure))
+        panels.append(Panel("stiffness", "Direct stiffness over load, 95 % intervals", figure))
     return render_section(Section("All points", panels=panels, tables=[measured_table(identification)]))
 
 
@@ -107,7 +107,7 @@ def model_tab(session: Session) -> Any:
 
     follow(update, load, event="value_throttled")  # when a moving slider is let go
     table = _compared(session, [p.point for p in identification.points], identification.to_frame())
-    residuals = panel("residual-map", "Residuals of all points", residual_map(table))
+    residuals = Panel("residual-map", "Residuals of all points", residual_map(table))
     html_of_all = render_section(Section("All points", panels=[residuals]))
     return column(load, curves, text_element("residuals", html_of_all), sizing_mode="stretch_width")
 
@@ -125,7 +125,7 @@ def _curves_html(session: Session, load: float) -> str:
     panels = []
     for name in DIRECT:
         figure = coefficient(table, name, over="frequency")
-        panels.append(panel(f"model-{name}", f"{name} over excitation at {amount(load, 'load')}", figure))
+        panels.append(Panel(f"model-{name}", f"{name} over excitation at {amount(load, 'load')}", figure))
     note = f"{counted(len(measured), 'measured point')} at this load."
     return render_section(Section("Prediction and measurement", [note], panels))
 
