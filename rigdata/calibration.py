@@ -76,7 +76,7 @@ class ResponseTable:
         """Complex gain at `frequency` (n,) [Hz], linear between the lines of the table, NaN outside it."""
         known, gains, phases = np.transpose(self.lines)
         gain = np.interp(frequency, known, gains, left=np.nan, right=np.nan)
-        return np.asarray(gain * np.exp(1j * np.interp(frequency, known, phases)))
+        return gain * np.exp(1j * np.interp(frequency, known, phases))
 
 
 def parse_response_table(text: str) -> ResponseTable:

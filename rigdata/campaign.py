@@ -13,7 +13,7 @@ from typing import Any
 
 from rigdata.calibration import Channel, Channels
 from rigdata.manifest.manifest import MAX_MANIFEST, Description, Manifest, RunDescription, RunEntry, parse_manifest
-from rigdata.near_names import nearest_name
+from rigdata.near_names import hint
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import TEXT, RunReader
 from rigdata.run import Run
@@ -107,8 +107,7 @@ class Campaign(Description):
         for run in self.runs:
             if run.id == run_id:
                 return run
-        close = nearest_name(run_id, [r.id for r in self.runs])
-        cure = f"Did you mean {close!r}?" if close else f"There are {len(self.runs)} runs; see campaign.runs"
+        cure = hint(run_id, [run.id for run in self.runs], "There are")[:200]
         raise refuse(self.path.name, "", f"no run has the id {run_id!r}", cure)
 
     def of_kind(self, kind: str) -> tuple[Run, ...]:
@@ -194,8 +193,8 @@ def _refuse_other(source: Path) -> None:
     if source.is_dir():
         fault = f"the folder has no {MANIFEST_NAME}"
         stored = [p.name for p in _campaigns_in(source)]
-        hint = f" ({', '.join(stored[:3])})" if stored else ""
-        cure += f"{hint}; `tpjb init FOLDER` drafts one for records"
+        listed = f" ({', '.join(stored[:3])})" if stored else ""
+        cure += f"{listed}; `tpjb init FOLDER` drafts one for records"
     elif not source.exists():
         fault, cure = "there is no such file or folder", "Check the path"
     elif not source.is_file():

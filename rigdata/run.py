@@ -326,7 +326,7 @@ def pulse_times(readings: FloatArray, time: FloatArray) -> FloatArray:
             after_last = int(edge) + 1
     at = np.array(edges, dtype=int)
     share = (level - readings[at]) / (readings[at + 1] - readings[at])
-    return np.asarray(time[at] + share * (time[at + 1] - time[at]))
+    return time[at] + share * (time[at + 1] - time[at])
 
 
 def speed_from_pulses(readings: FloatArray, time: FloatArray) -> FloatArray:
@@ -335,4 +335,4 @@ def speed_from_pulses(readings: FloatArray, time: FloatArray) -> FloatArray:
     if len(pulses) < 2:
         return np.full(len(readings), np.nan)
     speeds = 2 * np.pi / np.diff(pulses)
-    return np.asarray(np.interp(time, 0.5 * (pulses[1:] + pulses[:-1]), speeds))
+    return np.interp(time, 0.5 * (pulses[1:] + pulses[:-1]), speeds)

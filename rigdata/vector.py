@@ -67,4 +67,4 @@ def zero_uncertainty(channels: Iterable[Channel], quantity: str) -> FloatArray:
     if len(chosen) < 2:
         return np.zeros(2)
     inverse = inverse_directions(tuple(float(c.axis or 0.0) for c in chosen))
-    return np.asarray(np.sqrt(inverse**2 @ np.array([c.zero_uncertainty for c in chosen]) ** 2))
+    return np.sqrt(inverse**2 @ np.array([c.zero_uncertainty for c in chosen]) ** 2)

@@ -274,7 +274,7 @@ def _pair(run: RunGuess, names: Pair) -> list[Series]:
 def _change(series: Sequence[Series]) -> FloatArray:
     """Difference of two channels (2,) between the last and the first tenth of a record."""
     tenths = part_means(series)
-    return np.asarray(tenths[-1] - tenths[0])
+    return tenths[-1] - tenths[0]
 
 
 def _with_load(run: RunGuess, load: float) -> RunGuess:

@@ -4,8 +4,8 @@ With the shaft turning (dynamic and locus runs) actuators push through the film,
 there are dry load steps toward one pad, and a small load swept once around the clearance polygon.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class Motion:
     facts: Mapping[str, object]
     lines: tuple[MotionLine, ...] = ()
     speed: float = 0.0  #: rad/s, about +z
-    surface: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=complex))  #: runout of 1X, 2X, ... [m]
+    surface: Iterable[complex] = ()  #: runout of 1X, 2X, ... [m]
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
         """X and Y of "displacement" [m], "force" [N] or "acceleration" [m/s^2] at `time` (n,) [s] -> (n, 2)."""
@@ -262,7 +262,7 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
         alone = 4.0 * weight[i - 1] * weight[i]
         side = _reach(truth, pad, push * np.cos(direction - angles[i]))
         position += (alone * (side - position @ normal))[:, None] * normal
-    return np.asarray(position)
+    return position
 
 
 def _reach(truth: RigTruth, pad: int, force: FloatArray) -> FloatArray:

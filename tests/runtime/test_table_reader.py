@@ -31,7 +31,8 @@ def coefficients(tmp_path, folder="out"):
     out = tmp_path / folder
     out.mkdir()
     row = dict.fromkeys(POINT_COLUMNS, 20.0) | dict.fromkeys(COEFFICIENT_COLUMNS, 1e8) | {"quality": "ok"}
-    paths = write_table(out, "coefficients", pd.DataFrame([row]))
+    write_table(out, "coefficients", pd.DataFrame([row]))
+    paths = sorted(out.iterdir())
     entry = {"outputs": [p.name for p in paths], "outputs_sha256": {p.name: sha256(p) for p in paths}}
     (out / "run.json").write_text(record_text({"identify": entry}), encoding="utf-8")
     return out / "coefficients.csv"

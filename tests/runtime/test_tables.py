@@ -27,7 +27,8 @@ def test_csv_and_parquet_hold_the_same_numbers_to_the_last_bit(tmp_path):
     frame = pd.DataFrame(
         {"a_m": [1 / 3, 1e-9, float("nan")], "n": [1, 2, 3], "ok": [True, False, True], "s": list("xyz")}
     )
-    csv, parquet = write_table(tmp_path, "t", frame)
+    write_table(tmp_path, "t", frame)
+    csv, parquet = tmp_path / "t.csv", tmp_path / "t.parquet"
     pd.testing.assert_frame_equal(pd.read_csv(csv), frame, check_exact=True, check_dtype=False)
     pd.testing.assert_frame_equal(pd.read_parquet(parquet), frame, check_exact=True, check_dtype=False)
     assert b"\r" not in csv.read_bytes()

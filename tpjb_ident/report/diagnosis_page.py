@@ -173,7 +173,7 @@ def write_diagnosis_report(
     campaign: Campaign | TableSource,
     result: CampaignDiagnosis,
     origin: Mapping[str, Any],
-) -> Path:
+) -> None:
     """Write report.html and its figures into an existing folder."""
     verdict = result.diagnosis.verdict
     table = before_and_after(result.diagnosis, result.identification)
@@ -193,7 +193,7 @@ def write_diagnosis_report(
         sections=_sections(result, coefficient_sections(table) if len(table) else []),
         **origin,
     )
-    return write_page(folder, page)
+    write_page(folder, page)
 
 
 def _effect_table(verdict: Verdict) -> Table:

@@ -32,7 +32,7 @@ _WAITING = ("to run", "being written")
 
 def write_watch_page(
     folder: Path, snapshot: Snapshot, refresh: int, origin: Mapping[str, Any], bearing: Any = None
-) -> Path:
+) -> None:
     """Write ``watch.html``, whole or not at all, with its figures inside; the next command comes after the last run."""
     answer, *more = [step.text for step in snapshot.steps] or ["Nothing to do: records are being written."]
     landed = snapshot.count("good", "look", "repeat", "replaced")
@@ -53,9 +53,7 @@ def write_watch_page(
         beside="coefficients.csv and watch.json are beside this file.",
         **{**origin, "then": "" if snapshot.count(*_WAITING) else origin["then"]},
     )
-    path = folder / "watch.html"
-    write_text(path, render_page(page, {p.name: svg_text(p.figure, p.name) for p in page.panels}))
-    return path
+    write_text(folder / "watch.html", render_page(page, {p.name: svg_text(p.figure, p.name) for p in page.panels}))
 
 
 def coverage_table(snapshot: Snapshot) -> Table:

@@ -42,12 +42,10 @@ def write_text(path: Path, text: str) -> None:
     write_atomic(path, lambda part: part.write_text(text, **form))
 
 
-def write_table(folder: Path, name: str, frame: pd.DataFrame) -> tuple[Path, Path]:
+def write_table(folder: Path, name: str, frame: pd.DataFrame) -> None:
     """Write ``name.csv`` and ``name.parquet``."""
-    csv, parquet = folder / f"{name}.csv", folder / f"{name}.parquet"
-    write_csv(csv, frame)
-    write_atomic(parquet, lambda path: write_parquet(path, frame))
-    return csv, parquet
+    write_csv(folder / f"{name}.csv", frame)
+    write_atomic(folder / f"{name}.parquet", lambda path: write_parquet(path, frame))
 
 
 def write_csv(path: Path, frame: pd.DataFrame) -> None:

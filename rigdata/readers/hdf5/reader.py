@@ -327,7 +327,7 @@ def _text_attribute(handle: Any, name: str, file: str) -> str:
     stored, value = handle.attrs.get_id(name), None
     if stored.get_storage_size() <= _MAX_TEXT and stored.get_type().get_class() == TEXT:
         value = _text(handle.attrs[name])
-    if not isinstance(value, str) or len(value) > _MAX_TEXT or "\ufffd" in value:  # what is no UTF-8
+    if not isinstance(value, str) or "\ufffd" in value:  # what is no UTF-8
         fault = "is not a text, or far too long"
         raise refuse(file, f"root attribute {name}", fault, "Store it as one UTF-8 string")
     return value
