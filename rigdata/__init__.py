@@ -9,16 +9,7 @@ run.vector("displacement")  # two channels, turned into X and Y
 """
 
 import importlib
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from rigdata.calibration import Channel
-    from rigdata.campaign import Campaign, load_campaign
-    from rigdata.device import Device
-    from rigdata.operating_point import OperatingPoint
-    from rigdata.problem import Problem, RigDataError
-    from rigdata.record import Record, VectorRecord
-    from rigdata.run import Run
+from typing import Any
 
 _HOMES = {
     "Campaign": "campaign",
@@ -33,21 +24,10 @@ _HOMES = {
     "load_campaign": "campaign",
 }
 
-__all__ = [
-    "Campaign",
-    "Channel",
-    "Device",
-    "OperatingPoint",
-    "Problem",
-    "Record",
-    "RigDataError",
-    "Run",
-    "VectorRecord",
-    "load_campaign",
-]
+__all__ = sorted(_HOMES)
 
 
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:
     """Import on first use: `import rigdata` alone stays quick."""
     if name not in _HOMES:
         raise AttributeError(f"module 'rigdata' has no attribute {name!r}")
@@ -55,4 +35,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES})
+    return __all__

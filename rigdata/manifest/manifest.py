@@ -104,11 +104,11 @@ def _read_run(table: Table, index: int, rotation: str) -> RunEntry | None:
     if name is None or kind is None:
         return None
     point = OperatingPoint(
-        static_load=values["static_load"],
-        static_load_direction=values["static_load_direction"],
-        shaft_speed=values["shaft_speed"],
-        excitation=values["excitation_frequency"],
-        rotation=values["rotation"] or rotation,
+        values["static_load"],
+        values["static_load_direction"],
+        values["shaft_speed"],
+        values["excitation_frequency"],
+        values["rotation"] or rotation,
     )
     plain = {key: value for key, value in values.items() if key in RunEntry.__dataclass_fields__}
     plain |= {"excitation_kind": values["excitation"], "stated": frozenset(table.data)}

@@ -95,15 +95,15 @@ def in_seconds(exports: Sequence[Export], described: Tables) -> tuple[list[Expor
     unit = next((unit for unit in TIME_FACTORS if unit in typed), likely)
     source = "file" if typed or unit == "s" else "guess"
     units |= dict.fromkeys(open_, Entry(unit, source, f"not stated: as seconds it would be {rate:.3g} Hz"))
-    if unit == "s":
-        return list(exports), units
-    changed = []
-    for export in exports:
-        times = {} if export.states_times else {id(s.time): s.time for s in export.series if s.time is not None}
-        scaled = {key: time * TIME_FACTORS[unit] for key, time in times.items()}
-        series = tuple(replace(s, time=scaled.get(id(s.time), s.time)) for s in export.series)
-        changed.append(replace(export, series=series))
-    return changed, units
+    in_unit = [export if export.states_times or unit == "s" else _scaled(export, unit) for export in exports]
+    return in_unit, units
+
+
+def _scaled(export: Export, unit: str) -> Export:
+    """An export with its times from this unit to seconds."""
+    times = {id(s.time): s.time for s in export.series if s.time is not None}
+    scaled = {key: time * TIME_FACTORS[unit] for key, time in times.items()}
+    return replace(export, series=tuple(replace(s, time=scaled.get(id(s.time))) for s in export.series))
 
 
 def _counts_evenly(series: Series) -> bool:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -57,9 +57,9 @@ class Survey:
     rates: tuple[float, ...]
     channels: Guesses
     runs: tuple[RunGuess, ...]
-    clocks: dict[str, Entry] = field(default_factory=dict)  #: unit of every time column, by name
-    nameless: int = 0
-    per_hertz: dict[str, float] = field(default_factory=dict)
+    clocks: dict[str, Entry]  #: unit of every time column, by name
+    nameless: int
+    per_hertz: dict[str, float]
 
 
 def survey(

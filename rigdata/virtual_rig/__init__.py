@@ -23,26 +23,3 @@ from rigdata.virtual_rig.plan import (
 )
 from rigdata.virtual_rig.rig import Fault, SimulatedRun, VirtualRig
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
-
-__all__ = [
-    "CampaignTruth",
-    "ChannelNoise",
-    "ClearanceSweep",
-    "CsvLayout",
-    "DryImperfections",
-    "DryTest",
-    "Fault",
-    "Glitches",
-    "Instruments",
-    "Noise",
-    "RigPlan",
-    "RigTruth",
-    "Sensor",
-    "SensorError",
-    "SimulatedRun",
-    "VirtualRig",
-    "VirtualRigError",
-    "locus_points",
-    "operating_points",
-    "write_campaign",
-]

@@ -70,7 +70,7 @@ class Sensor:
 class Instruments:
     """All sensors, and the housing between film and cells."""
 
-    sensors: tuple[Sensor, ...] = field(repr=False)
+    sensors: tuple[Sensor, ...]
     housing_mass: float = 30.0
     housing_mass_error: float = 0.0
     cell_stiffness: tuple[float, float] = (4e8, 6e8)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -42,18 +42,18 @@ PAPER_RIG: dict[str, dict[str, Any]] = _with_tuples(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RigTruth:
     """The physics of one virtual test bearing."""
 
-    stiffness: PointLaw = field(repr=False)
-    position: PointLaw = field(repr=False)
-    temperature: PointLaw = field(repr=False)
-    pivot_deflection: Callable[[int, FloatArray], Any] = field(repr=False)
+    stiffness: PointLaw
+    position: PointLaw
+    temperature: PointLaw
+    pivot_deflection: Callable[[int, FloatArray], Any]
     pivot_angles: tuple[float, ...] = _FIVE_PADS
     clearance: tuple[float, ...] = (80e-6,) * 5
     bearing_name: str = "bearing.toml"
-    bearing_text: str = field(default="", repr=False)
+    bearing_text: str = ""
     cold_temperature: float = 24.0
 
     @classmethod

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -121,8 +121,8 @@ class Comparison(Presented):
     curves: tuple[PivotCurve, ...]
     clearance: ClearancePolygon | None
     locus: Locus | None
-    predictions: Mapping[str, pd.DataFrame] = field(repr=False)
-    loci: pd.DataFrame | None = field(repr=False)
+    predictions: Mapping[str, pd.DataFrame]
+    loci: pd.DataFrame | None
     remarks: tuple[str, ...] = ()
 
     @property

@@ -54,7 +54,7 @@ class Side:
     coefficients: pd.DataFrame
     pivots: pd.DataFrame | None = None
     clearance: pd.DataFrame | None = None
-    campaign: Campaign | None = field(repr=False, default=None)
+    campaign: Campaign | None = None
     #: (P, 8) by parameter, N/m: what one standard deviation of an instrument's error does to the points
     sensors: Mapping[str, FloatArray] = field(default_factory=dict)
 

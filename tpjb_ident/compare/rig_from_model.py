@@ -61,13 +61,12 @@ def truth_of(setup: Setup, bearing_text: str = "") -> RigTruth:
         return np.array(of_pivot) + float(towards @ structure @ towards) * np.asarray(load)
 
     return RigTruth(
-        stiffness=stiffness,
-        position=position,
-        temperature=temperature,
-        pivot_deflection=deflection,
+        stiffness,
+        position,
+        temperature,
+        deflection,
         pivot_angles=tuple(pad.pivot_angle for pad in pads),
         clearance=tuple(pad.assembled_clearance for pad in pads),
-        bearing_name="bearing.toml",
         bearing_text=bearing_text,
     )
 

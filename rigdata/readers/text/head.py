@@ -9,7 +9,7 @@ import csv
 import itertools
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from statistics import mode
 
 from rigdata.problem import RigDataError
@@ -44,7 +44,7 @@ _TABLE_LINES = 3
 class Head:
     """How a text file is written, and what its first lines say of its columns."""
 
-    record: RecordFile = field(repr=False)
+    record: RecordFile
     encoding: str
     delimiter: str
     decimal: str
