@@ -47,6 +47,7 @@ class Entry:
     value: Any = None
     source: str = ""
     reason: str = ""
+    text: str = ""  #: the value with a unit of its own
 
     @property
     def number(self) -> float:
@@ -69,6 +70,7 @@ class ChannelGuess:
     hint: float = math.nan  #: direction [deg] that the name hints at
     typed: bool = False  #: whether the axis stands in the manifest
     sign: int = 0  #: polarity that stands in the manifest
+    sensitivity: Entry = OPEN
 
 
 #: What channels may be, by name.

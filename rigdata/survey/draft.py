@@ -96,10 +96,8 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
         lines.append(f"like = {_toml_string(model)}   # (guess) same type; or its own unit, sensitivity, ..")
     else:
         lines.append(f'unit = "{guess.unit or MARK}"')
-    if name in surveyed.per_hertz and guess.unit and not is_like:
-        ratio = f"{surveyed.per_hertz[name]:.4g} {guess.unit}/Hz"
-        reason = "constant over the line that is taken for the shaft's"
-        lines.append(_line("sensitivity", Entry(ratio, "records", reason)))
+    if guess.sensitivity.value and not is_like:
+        lines.append(_line("sensitivity", guess.sensitivity))
     elif not is_like and quantity_of_unit(guess.unit) == "":
         lines.append(f'sensitivity = "{MARK}"   # such as {WORDS["sensitivities"].get(quantity, "1 V per unit")}')
     usual = surveyed.channels[model].polarity if is_like else 1
@@ -118,8 +116,7 @@ def run_lines(run: RunGuess) -> list[str]:
     lines = ["[[runs]]", f"id = {_toml_string(stem)}", f"file = {_toml_string(run.file)}"]
     lines.append(_line("kind", run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
     if kind in ("dynamic", "locus", None):
-        load = replace(run.load, value=run.load_text if run.load.value is not None else None)
-        lines += [_line("shaft_speed", run.speed, RUN, "Hz"), _line("static_load", load, RUN, "kN")]
+        lines += [_line("shaft_speed", run.speed, RUN, "Hz"), _line("static_load", run.load, RUN, "kN")]
     if kind == "dry_pivot":
         lines.append(_line("pad", run.pad, RUN))
     if kind != "clearance":
@@ -135,7 +132,8 @@ def _line(key: str, entry: Entry, fields: tuple[Field, ...] = (), unit: str = ""
         meaning = next(field.meaning for field in fields if field.key == key)
         text = f'{key} = "{f"{MARK} {unit}".strip()}"   # {meaning}'
         return f"{text}; {entry.reason}" if entry.reason else text
-    value = f'"{entry.number:{digits}} {unit}"' if unit and isinstance(entry.value, float) else json.dumps(entry.value)
+    number = f"{entry.number:{digits}} {unit}" if unit and isinstance(entry.value, float) else entry.value
+    value = json.dumps(entry.text or number)
     mark = _SOURCES.get(entry.source)
     return f"{key} = {value}   # {mark}{entry.reason}" if mark else f"{key} = {value}"
 

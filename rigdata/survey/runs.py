@@ -28,13 +28,12 @@ _NUMBER = r"(?<![\d.,])((?<![a-z0-9])[-+])?(\d+(?:[.,]\d+)?)[ _]?"
 
 @dataclass(frozen=True)
 class RunGuess:
-    """What a record may be; loads [N] with their text in the manifest, directions in degrees, frequencies in Hz."""
+    """What a record may be; loads in N, directions in degrees, frequencies in Hz."""
 
     export: Export
     kind: Entry
     lines: Peaks = ()
     load: Entry = OPEN
-    load_text: str = ""
     direction: Entry = OPEN
     pad: Entry = OPEN
     speed: Entry = OPEN
@@ -53,7 +52,6 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
     lines = strongest_lines(forces) or strongest_lines(moves)
     stem = export.name.rpartition("/")[2].rpartition(".")[0]
     pad = re.search(rf"(?:^p|{PAD})[-_ #]?(\d{{1,2}})(?!\d)", stem, re.IGNORECASE)
-    load, text = _load_of(stem)
     angles = _numbers_before(stem, r"deg(?:ree)?s?|°|grad")
     # a frequency that the name states counts where one of the record's lines confirms it
     stated = [abs(f) for f in _numbers_before(stem, "Hz")]
@@ -62,8 +60,7 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
         export=export,
         kind=_kind(stem, forces, moves, lines),
         lines=lines,
-        load=load,
-        load_text=text,
+        load=_load_of(stem),
         direction=Entry(angles[0], "file") if angles else OPEN,
         pad=Entry(int(pad[1]), "file") if pad and int(pad[1]) else OPEN,
         speed=_speed(export, channels, stem),
@@ -96,16 +93,16 @@ def _numbers_before(stem: str, unit: str) -> list[float]:
     return numbers
 
 
-def _load_of(stem: str) -> tuple[Entry, str]:
-    """Static load that a file's name states, in N and as text: ``5kN``, ``1349lbf``, or a bare number of newtons."""
+def _load_of(stem: str) -> Entry:
+    """Static load [N] that a file's name states: ``5kN``, ``1349lbf``, or a bare number of newtons."""
     for _, number, letters in re.findall(rf"{_NUMBER}([a-z]+)", stem, re.IGNORECASE):
         unit, size = usable_unit(letters), float(number.replace(",", "."))
         with contextlib.suppress(UnitError):
-            return Entry(size * unit_factor(unit, "force"), "file"), f"{size:g} {unit}"
+            return Entry(size * unit_factor(unit, "force"), "file", text=f"{size:g} {unit}")
     for bare in re.findall(r"(?<![\d.])(\d{3,6})(?![\d.a-z])", stem, re.IGNORECASE):
         if 100.0 <= float(bare) <= 200_000.0:
-            return Entry(float(bare), "guess", "a number in the file's name"), f"{float(bare) / 1e3:g} kN"
-    return OPEN, ""
+            return Entry(float(bare), "guess", "a number in the file's name", f"{float(bare) / 1e3:g} kN")
+    return OPEN
 
 
 def _speed(export: Export, channels: Guesses, stem: str) -> Entry:

@@ -59,7 +59,6 @@ class Survey:
     runs: tuple[RunGuess, ...]
     clocks: dict[str, Entry]  #: unit of every time column, by name
     nameless: int
-    per_hertz: dict[str, float]
 
 
 def survey(
@@ -73,11 +72,12 @@ def survey(
     speed = folder.common_line()
     folder.runs = [_with_lines(run, speed) for run in folder.runs]
     folder.find_other_axes()
+    if speed.value:
+        folder.find_sensitivities(speed.number)
     return Survey(
         rates=tuple(e.rate for e in exports),
         channels=folder.channels,
         runs=_set_points(folder.runs),
-        per_hertz=folder.tachometers(speed.number) if speed.value else {},
         clocks=clocks,
         nameless=max((e.nameless for e in exports), default=0),
     )
@@ -218,18 +218,19 @@ class _Folder:
                 directions.append(float(cells.direction(force)))
         return np.array(readings), np.array(directions), f"the excitation of {len(readings)} runs"
 
-    def tachometers(self, line: float) -> dict[str, float]:
+    def find_sensitivities(self, line: float) -> None:
         """Reading per hertz of speed channels in volts, where it is one in all running records."""
         ratios: dict[str, list[float]] = {}
         for run, _ in self._with(_RUNNING):
             for series in of_quantity(run.export, self.channels, "speed"):
                 if not quantity_of_unit(self.channels[series.name].unit):
                     ratios.setdefault(series.name, []).append(float(np.nanmedian(series.values)) / line)
-        per_hertz = {}
         for name, values in ratios.items():
-            if min(values) > 0 and max(values) - min(values) <= NEAR * max(values):
-                per_hertz[name] = sorted(values)[len(values) // 2]
-        return per_hertz
+            guess, middle = self.channels[name], sorted(values)[len(values) // 2]
+            if guess.unit and min(values) > 0 and max(values) - min(values) <= NEAR * max(values):
+                reason = "constant over the line that is taken for the shaft's"
+                ratio = Entry(f"{middle:.4g} {guess.unit}/Hz", "records", reason)
+                self.channels[name] = replace(guess, sensitivity=ratio)
 
     def common_line(self) -> Entry:
         """Shaft speed [Hz]: line of all running records' displacements, besides an excitation that its name states."""
@@ -287,7 +288,7 @@ def _with_load(run: RunGuess, load: float) -> RunGuess:
     if stated.source == "file" or off <= _SPREADS["load"][1] * stated.number:
         source = "records" if agrees else "guess"
         return replace(run, load=replace(stated, source=source, reason=f"the file's name; {reason}"))
-    return replace(run, load=Entry(load, "records", reason), load_text="")
+    return replace(run, load=Entry(load, "records", reason))
 
 
 def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
@@ -318,8 +319,8 @@ def _set_points(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
             moved = {name: replace(entries[i], value=value)}
             changed[i] = replace(changed[i], **moved)
     for i, run in enumerate(changed):
-        if run.load.source and not run.load_text:
-            changed[i] = replace(run, load_text=f"{run.load.number / 1e3:.4g} kN")
+        if run.load.source and not run.load.text:
+            changed[i] = replace(run, load=replace(run.load, text=f"{run.load.number / 1e3:.4g} kN"))
     return tuple(changed)
 
 

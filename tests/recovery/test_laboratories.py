@@ -68,7 +68,7 @@ def test_runs_are_what_was_done(surveyed):
             assert run.excitation.value == test.frequency  # never what turns with the shaft
             assert run.load.value == pytest.approx(test.load, rel=0.005)
             units = {"kN": 1e3, "N": 1.0, "lbf": LBF, "kgf": KGF}
-            assert run.load_text in [f"{round(test.load / size, 3):g} {unit}" for unit, size in units.items()]
+            assert run.load.text in [f"{round(test.load / size, 3):g} {unit}" for unit, size in units.items()]
             assert run.direction.value == -90.0
 
 

@@ -172,8 +172,8 @@ def test_times_without_a_unit_are_those_of_a_recorder(tmp_path, clock, step, uni
     ],
 )
 def test_loads_in_names_of_files_have_any_unit_of_force(stem, newtons, text, source):
-    entry, written = _load_of(stem)
-    assert (entry.number, written, entry.source) == (pytest.approx(newtons, nan_ok=True), text, source)
+    entry = _load_of(stem)
+    assert (entry.number, entry.text, entry.source) == (pytest.approx(newtons, nan_ok=True), text, source)
 
 
 @pytest.mark.parametrize(
