@@ -48,10 +48,11 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     lines = [*_HEAD, 'schema = "tpjb-rig/1"', f"id = {_toml_string(name)}"]
     lines.append(f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # file in this folder')
     lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _line("mass", OPEN, HOUSING, "kg"), _MOUNT, ""]
-    if not all(rate > 0 for rate in surveyed.rates):
+    exports = [run.export for run in surveyed.runs]
+    if not all(export.rate > 0 for export in exports):
         lines += ["[acquisition]", _line("sample_rate", OPEN, ACQUISITION, "Hz"), ""]
-    if surveyed.nameless:
-        names = ", ".join(_toml_string(f"column{i + 1}") for i in range(surveyed.nameless))
+    if nameless := max((export.nameless for export in exports), default=0):
+        names = ", ".join(_toml_string(f"column{i + 1}") for i in range(nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
     for clock, unit in surveyed.clocks.items():
         spelt = replace(unit, value=usable_unit(unit.value) or "s")

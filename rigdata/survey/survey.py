@@ -54,11 +54,9 @@ _Evidence = tuple[FloatArray, FloatArray, str]
 class Survey:
     """What was found in a folder of exports."""
 
-    rates: tuple[float, ...]
     channels: Guesses
     runs: tuple[RunGuess, ...]
     clocks: dict[str, Entry]  #: unit of every time column, by name
-    nameless: int
 
 
 def survey(
@@ -75,11 +73,9 @@ def survey(
     if speed.value:
         folder.find_sensitivities(speed.number)
     return Survey(
-        rates=tuple(e.rate for e in exports),
         channels=folder.channels,
         runs=_set_points(folder.runs),
         clocks=clocks,
-        nameless=max((e.nameless for e in exports), default=0),
     )
 
 

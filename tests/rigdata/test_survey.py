@@ -153,11 +153,11 @@ def test_times_without_a_unit_are_those_of_a_recorder(tmp_path, clock, step, uni
     found = survey(exports)
     (entry,) = found.clocks.values()
     assert (entry.value, entry.source.removeprefix("file")) == (unit, mark)
-    assert found.rates == (pytest.approx(rate),)
+    assert [run.export.rate for run in found.runs] == [pytest.approx(rate)]
     text = draft_manifest(found, "a", "b.toml")
     assert (f'unit = "{unit}"   # (guess) not stated' in text) == bool(mark)
     typed = survey(exports, {clock.partition(" ")[0]: {"unit": "s"}})
-    assert typed.rates == (pytest.approx(1.0 / step if mark else rate),)
+    assert [run.export.rate for run in typed.runs] == [pytest.approx(1.0 / step if mark else rate)]
 
 
 @pytest.mark.parametrize(

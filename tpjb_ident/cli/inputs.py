@@ -172,22 +172,18 @@ def model_settings(
     return ModelSettings(pivots, thermal, effects)
 
 
-def source_words(campaign: Path | None, table: Path | None, bearing: Path | None) -> list[object]:
-    """What `open_source` takes, as words of a command."""
-    words: list[object] = [campaign] if table is None else ["--coefficients", table]
-    return words if bearing is None else [*words, "--bearing", bearing]
-
-
 def open_source(
     c: Command, campaign: Path | None, table: Path | None, bearing: Path | None, predicted: bool = False
-) -> tuple[Any, Any]:
+) -> tuple[Any, Any, list[object]]:
     """Open a campaign with its bearing, or in its place a `TableSource` of coefficients with the bearing file.
 
-    A table whose points another program has predicted needs no bearing.
+    A table whose points another program has predicted needs no bearing. With them come the words of a command that
+    name the same.
     """
+    words: list[object] = [] if bearing is None else ["--bearing", bearing]
     if table is None and campaign is not None:
         source = c.open(campaign)
-        return source, c.bearing_of(source, bearing)
+        return source, c.bearing_of(source, bearing), [campaign, *words]
     if table is None or campaign is not None:
         raise BadInputError(f"{c.name}: give a campaign, or --coefficients TABLE.csv with --bearing FILE; one of them.")
     from tpjb_ident.compare.coefficient_table import TableSource
@@ -197,4 +193,5 @@ def open_source(
         raise BadInputError(f"{table}: no such file. Give the table of coefficients as CSV.")
     if bearing is None and not predicted:
         raise BadInputError(f"{c.name} --coefficients: a table names no bearing. Add --bearing FILE.")
-    return TableSource(table.stem), None if bearing is None else c.bearing(bearing)
+    drawing = None if bearing is None else c.bearing(bearing)
+    return TableSource(table.stem), drawing, ["--coefficients", table, *words]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import identified, identify_settings, refuse_untrusted, write_identification
-from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, source_words
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_share
 from tpjb_ident.cli.options import DEMO, known_names
 from tpjb_ident.columns import amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
@@ -60,7 +60,7 @@ def compare(
 
     c.options["pivots"] = variants = known_names(pivots, VARIANTS, "--pivots")
     tables = read_predictions([c.file(path) for path in prediction or ()])
-    source, drawing = open_source(c, campaign, coefficients, bearing, bool(tables))
+    source, drawing, typed = open_source(c, campaign, coefficients, bearing, bool(tables))
     model = model_settings(c, "kirk", thermal, effects, drawing)
     settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
     with c.results():
@@ -75,7 +75,7 @@ def compare(
                 share = parse_share(reading_error, "--reading-error")
                 result = compare_table(coefficients, drawing, settings, share, show)
             result = with_predictions(result, tables)
-            _note_next(c, result, campaign, source_words(campaign, coefficients, bearing))
+            _note_next(c, result, campaign, typed)
             write_comparison(c, result, show)
     show_comparison(c, result)
     refuse_comparison(result)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import refuse_untrusted, write_identification
-from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, pivot_choice, source_words
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, pivot_choice
 from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
@@ -52,7 +52,7 @@ def diagnose(
     from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
     from tpjb_ident.runtime.executors import background_job, cores, forks
 
-    source, drawing = open_source(c, campaign, coefficients, bearing)
+    source, drawing, typed = open_source(c, campaign, coefficients, bearing)
     baseline = Baseline(start, thermal, model_settings(c, start, thermal, effects, drawing).effects)
     with c.results():
         is_quicker = coefficients is None and workers != 1 and cores() > 1 and forks()  # in a copy of this process
@@ -69,7 +69,7 @@ def diagnose(
         _write_verdict(c.folder, baseline, verdict)
         from tpjb_ident.report import diagnosis_page as page
 
-        c.next(*page.next_command(source_words(campaign, coefficients, bearing), verdict, c.target))
+        c.next(*page.next_command(typed, verdict, c.target))
         page.write_diagnosis_report(c.folder, source, result, c.origin)
     deviations = median_deviations(before_and_after(result.diagnosis, result.identification))
     with c.conclusion(page.verdict_sentences(source.id, verdict, deviations)):
