@@ -145,17 +145,18 @@ def unit_factor(unit: str, dimension: str) -> float:
     elif dimension == "angle":  # a slope: 0.2 mm/m
         is_usable = is_usable or ("/" in unit and not parsed.powers)
     if not is_usable:
-        raise UnitError(f"unit {unit!r} is not one of {dimension}; expected something like {_example(dimension)!r}")
+        raise UnitError(f"unit {unit!r} is not one of {dimension}; expected something like {example_of(dimension)!r}")
     return parsed.factor
 
 
-def _example(dimension: str) -> str:
+def example_of(dimension: str) -> str:
+    """A unit that people write for a dimension."""
     return str(LISTED["examples"].get(dimension, SI_UNITS[dimension]))
 
 
 def split_quantity(value: object, dimension: str) -> tuple[float, str]:
     """Split ``"7.78 mV/um"`` into 7.78 and ``"mV/um"``."""
-    example = _example(dimension)
+    example = example_of(dimension)
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise UnitError(f'expected a number with a unit in quotes, like "1 {example}", got {shown(value)}')
     if not isinstance(value, str):
@@ -251,5 +252,5 @@ def sensitivity_gain(value: object, signal_unit: str, dimension: str) -> float:
         return _finite(signal.factor / (number * parsed.factor))
     if parsed.powers == (quotient**-1).powers:
         return _finite(number * parsed.factor * signal.factor)
-    example = f"{signal_unit}/{_example(dimension)}"
+    example = f"{signal_unit}/{example_of(dimension)}"
     raise UnitError(f"{shown(value)} does not lead from {signal_unit} to {dimension}; expected like {example!r}")

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from rigdata.near_names import hint
 from rigdata.operating_point import ROTATIONS, OperatingPoint
-from rigdata.units import LONGEST, UnitError, parse_quantity
+from rigdata.units import LONGEST, UnitError, example_of, parse_quantity
 from tpjb_ident.cli.command import Command
 from tpjb_ident.cli.options import choices, refuse_unknown
 from tpjb_ident.errors import BadInputError
@@ -33,15 +33,6 @@ if TYPE_CHECKING:
 MAX_VALUES = 10_000
 _NUMBER = r"[+-]?(?:\d+\.(?!\.)\d*|\d+|\.\d+)(?:[eE][+-]?\d{1,3})?"
 _PART = re.compile(rf"\s*({_NUMBER})\s*([^\d\s.,;:+-][^,;:]*?)?\s*")
-_EXAMPLES = {
-    "force": "2.5 kN, 5 kN",
-    "speed": "22 Hz",
-    "angle": "-90 deg",
-    "stiffness": "4e8 N/m",
-    "temperature": "40 degC",
-    "time": "0.2 ms",
-    "ratio": "3 %",
-}
 
 
 def parse_values(text: str, dimension: str, option: str, is_positive: bool = False) -> tuple[float, ...]:
@@ -64,7 +55,7 @@ def parse_values(text: str, dimension: str, option: str, is_positive: bool = Fal
             quantities.insert(0, quantity)
         values[:0] = _range(quantities, where) if dots else quantities
     if not values:
-        raise BadInputError(f'{option}: is empty. Write, for instance, "{_EXAMPLES[dimension]}".')
+        raise BadInputError(f'{option}: is empty. Write, for instance, "5 {example_of(dimension)}".')
     if len(values) > MAX_VALUES:
         raise BadInputError(f"{option}: {text[:LONGEST]!r} makes more than {MAX_VALUES} values. Take a larger step.")
     if is_positive and min(values) <= 0:
@@ -107,7 +98,7 @@ def _quantity(text: str, unit: str, dimension: str, option: str) -> tuple[float,
         unit = match[2] or unit
         return parse_quantity(f"{match[1]} {unit}".strip(), dimension, option), unit
     except UnitError as error:
-        raise BadInputError(f'{error}. Write, for instance, "{_EXAMPLES[dimension]}".') from error
+        raise BadInputError(f'{error}. Write, for instance, "5 {example_of(dimension)}".') from error
 
 
 _PIVOTS = ("rigid", "kirk", "kirk-secant")
