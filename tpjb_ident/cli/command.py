@@ -78,6 +78,7 @@ class Command(Terminal):
         """Open a campaign."""
         from rigdata import load_campaign
 
+        refuse_special(path)
         self._sources.append(path)
         campaign = load_campaign(path)
         self._opened.append(campaign)
