@@ -46,7 +46,7 @@ class RecordFile:
     path: Path
     file: str
     run: str | None = None
-    channels: Channels = field(default_factory=dict)
+    channels: Channels = field(default_factory=dict, repr=False)
     stated_rate: float | None = None
     spec: CsvSpec = field(default_factory=CsvSpec)
 

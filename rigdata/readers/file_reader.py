@@ -117,7 +117,7 @@ class _Columns(Layout):
 class FileReader(RunReader):
     """One run's file; it is parsed when something of it is asked for."""
 
-    cache: ReadingCache = field(default_factory=ReadingCache, compare=False)
+    cache: ReadingCache = field(default_factory=ReadingCache, repr=False, compare=False)
 
     def _layout(self) -> _Columns:
         """All channels at their own times; the key changes when the file does, so that no old one is served."""

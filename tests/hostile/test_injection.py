@@ -82,7 +82,8 @@ def test_the_search_for_faults_finds_them():
 @pytest.mark.parametrize("formula", FORMULAS)
 def test_no_cell_or_heading_is_a_formula(tmp_path, formula):
     frame = pd.DataFrame({"run": [formula, "ok"], formula: [1.0, -2.0]})
-    csv, parquet = write_table(tmp_path, "t", frame)
+    write_table(tmp_path, "t", frame)
+    csv, parquet = tmp_path / "t.csv", tmp_path / "t.parquet"
     back = pd.read_csv(csv, dtype=str)
     assert back.iloc[0, 0] == back.columns[1] == "'" + formula.replace("\r", " ")
     assert back.iloc[1, 1] == "-2.0"  # numbers stay numbers

@@ -95,8 +95,8 @@ class _Members(Layout):
 class Hdf5Reader(RunReader):
     """One run's group in an HDF5 file; the file is opened for every request and closed again."""
 
-    cached_layout: dict[tuple[int, int], _Members] = field(default_factory=dict, compare=False)
-    opened_members: dict[str, Any] = field(default_factory=dict, compare=False)
+    cached_layout: dict[tuple[int, int], _Members] = field(default_factory=dict, repr=False, compare=False)
+    opened_members: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @contextmanager
     def _group(self, cache: int | None = None) -> Iterator[Any]:
