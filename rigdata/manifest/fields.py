@@ -94,14 +94,10 @@ class Field:
         return f"Write it like {self.key} = {self.example}{bound}"
 
 
-def _tables() -> dict[str, tuple[Field, ...]]:
-    """Keys by the tables that they are of."""
-    listed = tomllib.loads(FilePath(__file__).with_name("keys.toml").read_text(encoding="utf-8"))
-    return {table: tuple(Field(key, **entry) for key, entry in keys.items()) for table, keys in listed.items()}
-
-
+_LISTED = tomllib.loads(FilePath(__file__).with_name("keys.toml").read_text(encoding="utf-8"))
+_TABLES = [tuple(Field(key, **entry) for key, entry in keys.items()) for keys in _LISTED.values()]
 #: `RUNS_OF` is of one entry of `for`, besides all keys of a channel that it changes.
-TOP, SHAFT, HOUSING, ACQUISITION, CSV, CHANNEL, (RUNS_OF,), RUN = _tables().values()
+TOP, SHAFT, HOUSING, ACQUISITION, CSV, CHANNEL, (RUNS_OF,), RUN = _TABLES
 KINDS = next(tuple(field.choices) for field in RUN if field.key == "kind")
 
 

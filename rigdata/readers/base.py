@@ -1,6 +1,5 @@
 """What every reader of one run's record offers to `rigdata.campaign.Run`, and which file names which reader takes."""
 
-import itertools
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -101,7 +100,7 @@ class RunReader(RecordFile):
 
     def apart(self) -> frozenset[str]:
         """Channels that are not sampled with the run's own device."""
-        return frozenset(itertools.chain.from_iterable(grid.channels for grid in self._layout().grids[1:]))
+        return frozenset[str]().union(*(grid.channels for grid in self._layout().grids[1:]))
 
     def opened(self) -> AbstractContextManager[None]:
         """Keep the file open while the block runs, where that spares work; nested blocks share it."""

@@ -3,7 +3,7 @@
 From motion to readings: axes, gains, delays, runout, noise, glitches, zero, the converter, faults of the record.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, astuple, dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -69,18 +69,6 @@ class Fault:
     def is_in(self, channel: str) -> bool:
         """Whether it concerns a channel of its runs."""
         return self.channel is None or fnmatchcase(channel, self.channel)
-
-
-def check_faults(faults: Iterable[Fault], runs: Sequence[str], channels: Sequence[str]) -> None:
-    """Refuse faults that would strike nothing: a campaign must hold what was asked for."""
-    for fault in faults:
-        for name, pattern, names in (("run", fault.run, runs), ("channel", fault.channel or "*", channels)):
-            if not any(fnmatchcase(candidate, pattern) for candidate in names):
-                listed = ", ".join(names[:20])
-                raise VirtualRigError(f"fault {fault.kind!r}: no {name} matches {pattern!r}; there are {listed}")
-        candidates = channels if fault.kind == "swapped" else runs
-        if fault.other is not None and fault.other not in candidates:
-            raise VirtualRigError(f"fault {fault.kind!r}: there is no {fault.other!r} among {candidates}")
 
 
 @dataclass(frozen=True)
@@ -290,8 +278,17 @@ class VirtualRig:
     description: str = "computed data from a virtual rig"
 
     def __post_init__(self) -> None:
-        if self.faults:
-            check_faults(self.faults, [run.id for run in self.runs], [s.name for s in self.instruments.sensors])
+        """Refuse faults that would strike nothing: a campaign must hold what was asked for."""
+        channels = [sensor.name for sensor in self.instruments.sensors]
+        for fault in self.faults:
+            runs = [run.id for run in self.runs]
+            for name, pattern, names in (("run", fault.run, runs), ("channel", fault.channel or "*", channels)):
+                if not any(fnmatchcase(candidate, pattern) for candidate in names):
+                    listed = ", ".join(names[:20])
+                    raise VirtualRigError(f"fault {fault.kind!r}: no {name} matches {pattern!r}; there are {listed}")
+            candidates = channels if fault.kind == "swapped" else runs
+            if fault.other is not None and fault.other not in candidates:
+                raise VirtualRigError(f"fault {fault.kind!r}: there is no {fault.other!r} among {candidates}")
 
     @cached_property
     def runs(self) -> tuple[PlannedRun, ...]:

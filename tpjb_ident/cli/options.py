@@ -16,13 +16,9 @@ from tpjb_ident.errors import BadInputError
 DEMO, ROCKER = "rigdata/samples/demo.h5", "model/bearings/rocker.toml"
 
 
-def _listed() -> dict[str, dict[str, str]]:
-    """Options by the name of their parameter, those of one command alone behind its name."""
-    text = Path(__file__).with_name("options.csv").read_text(encoding="utf-8")
-    return {row["parameter"]: row for row in csv.DictReader(text.splitlines())}
-
-
-_OPTIONS = _listed()
+_TABLE = Path(__file__).with_name("options.csv").read_text(encoding="utf-8")
+#: Options by the name of their parameter, those of one command alone behind its name.
+_OPTIONS = {row["parameter"]: row for row in csv.DictReader(_TABLE.splitlines())}
 
 
 def choices(parameter: str) -> tuple[str, ...]:

@@ -36,14 +36,9 @@ _FORETELLS = 0.02
 _SPACE = "  "
 
 
-def _printed() -> dict[str, Column]:
-    """How columns of tables on disk are printed, by name."""
-    text = Path(__file__).with_name("printed.csv").read_text(encoding="utf-8")
-    rows = csv.DictReader(text.splitlines())
-    return {row["column"]: Column(row["title"], row["form"], bool(row["words"])) for row in rows}
-
-
-PRINTED = _printed()
+_TABLE = csv.DictReader(Path(__file__).with_name("printed.csv").read_text(encoding="utf-8").splitlines())
+#: How columns of tables on disk are printed, by name.
+PRINTED = {row["column"]: Column(row["title"], row["form"], bool(row["words"])) for row in _TABLE}
 #: Called with what is being done, how many are done, of how many.
 Progress = Callable[[str, int, int], None]
 
