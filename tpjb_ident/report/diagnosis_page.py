@@ -179,6 +179,8 @@ def write_diagnosis_report(
     table = before_and_after(result.diagnosis, result.identification)
     answer, *more = verdict_sentences(campaign.id, verdict, median_deviations(table))
     points = () if result.identification is None else result.identification.points
+    title = "Effects added to the model, with 95 % intervals"
+    added = Table(title, ["effect", "parameter", "value"], parameter_rows(verdict))
     worst = next((d.observable for d in verdict.disagreement if d.observable[0] in "kc"), "kyy")
     page = Page(
         title=f"{campaign.id}: what the model lacks",
@@ -189,16 +191,11 @@ def write_diagnosis_report(
         values=values_table(points),
         flags=flags_line([p.quality for p in points], len(points)),
         lead=worst,
-        key_table=_effect_table(verdict) if verdict.effects else _gap_table(verdict),
+        key_table=added if verdict.effects else _gap_table(verdict),
         sections=_sections(result, coefficient_sections(table) if len(table) else []),
         **origin,
     )
     write_page(folder, page)
-
-
-def _effect_table(verdict: Verdict) -> Table:
-    title = "Effects added to the model, with 95 % intervals"
-    return Table(title, ["effect", "parameter", "value"], parameter_rows(verdict))
 
 
 def _gap_table(verdict: Verdict) -> Table:

@@ -16,9 +16,7 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnosis.campaign import Baseline
     from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
-    from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 
 @command(f"tpjb diagnose {DEMO}", f"tpjb diagnose {DEMO} --pivots measured --out found")
@@ -66,7 +64,11 @@ def diagnose(
         if result.identification is not None:
             write_identification(c, result.identification)
         verdict = result.diagnosis.verdict
-        _write_verdict(c.folder, baseline, verdict)
+        before = baseline.effects, baseline.from_measured
+        write_text(c.folder / "diagnosis.json", verdict.to_json())
+        write_text(c.folder / "updated.effects.toml", verdict.effects_toml(*before))
+        if verdict.behaves_like:
+            write_text(c.folder / "with-terms.effects.toml", verdict.terms_toml(*before))
         from tpjb_ident.report import diagnosis_page as page
 
         c.next(*page.next_command(typed, verdict, c.target))
@@ -93,11 +95,3 @@ def _settings(model_tolerance: float | None, tolerances: Sequence[str], workers:
     if model_tolerance is not None:
         typed["model"] = model_tolerance
     return DiagnoseSettings(tolerances=Tolerances().states(typed, "command line"), workers=workers)
-
-
-def _write_verdict(folder: Path, baseline: Baseline, verdict: Verdict) -> None:
-    before = baseline.effects, baseline.from_measured
-    write_text(folder / "diagnosis.json", verdict.to_json())
-    write_text(folder / "updated.effects.toml", verdict.effects_toml(*before))
-    if verdict.behaves_like:
-        write_text(folder / "with-terms.effects.toml", verdict.terms_toml(*before))

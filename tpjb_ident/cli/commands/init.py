@@ -49,7 +49,8 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
             "or move the file away."
         )
     before = manifest.read_text("utf-8-sig") if update else ""
-    bearing = bearing or _bearing_file(folder)
+    stated = [p for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]]
+    bearing = bearing or (stated[0].name if len(stated) == 1 else None)
     exports, problems = _read_exports(c, folder, column_names(before) if update else ())
     angles = _pivot_angles(folder / (bearing or BEARING))
     if update:
@@ -146,9 +147,3 @@ def _bearing_draft(guesses: Survey) -> str:
         angles = ", ".join(f'"{steps[pad]:g} deg"' for pad in pads)
         text = text.replace('["?? deg"]          #', f"[{angles}]\n# (guess) where the dry steps pull;")
     return text
-
-
-def _bearing_file(folder: Path) -> str | None:
-    """Name of the one bearing file in a folder; None if there is none, or several."""
-    files = [p for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]]
-    return files[0].name if len(files) == 1 else None

@@ -40,11 +40,14 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
         raise BadInputError(f"{record}: is no {RECORD}. Give that of an output folder, or the folder.")
     repeated = {}
     for name, entry in recorded(folder).items():
-        if name.split(" ")[0] in _REPEATABLE:
-            repeated[name] = entry
-            _refuse_other_inputs(folder, name, entry)
-        else:
+        if name.split(" ")[0] not in _REPEATABLE:
             c.note(f"{name} is not repeated")
+            continue
+        repeated[name] = entry
+        for known in files_of(folder, name, entry, ()):
+            if known["role"] == "input" and known["state"] != "same":
+                place = f"{folder}: input {known['file']} of {name}"
+                raise BadInputError(f"{place} {STATES[known['state']]}. Bring it back to where it was.")
     if not repeated:
         raise BadInputError(f"{record}: names no command that can be repeated ({', '.join(_REPEATABLE)}).")
     found = []
@@ -69,13 +72,6 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
             c.json("rerun.json", {"schema": "tpjb-rerun/1", "folder": folder.name, "files": files})
     if different:
         raise NotTrustedError(f"{folder}: {len(different)} of {len(found)} files:\n{listed(different, 8, chr(10))}")
-
-
-def _refuse_other_inputs(folder: Path, name: str, entry: Mapping[str, Any]) -> None:
-    for known in files_of(folder, name, entry, ()):
-        if known["role"] == "input" and known["state"] != "same":
-            place = f"{folder}: input {known['file']} of {name}"
-            raise BadInputError(f"{place} {STATES[known['state']]}. Bring it back to where it was.")
 
 
 def _run_again(name: str, entry: Mapping[str, Any], folder: Path, out: Path) -> None:
