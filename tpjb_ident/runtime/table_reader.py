@@ -91,7 +91,16 @@ def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str]
         raise BadInputError(f"{path.name}: is empty. Give a table with a line of names.")
     header = _header(f"{path.name}, line {line}", path, names)
     columns: dict[str, list[object]] = {column.name: [] for column in header}
-    _refuse_wrong_names(path, list(columns), needed, misspelt)
+    for name in needed:
+        if name not in columns:
+            near = nearest_name(name, columns)
+            hint = f"; {near!r} is not it" if near else ""
+            raise BadInputError(f"{path.name}: column {name} is missing{hint}. Add it.")
+    for column in header:
+        if misspelt is not None and column.known is None and misspelt.fullmatch(column.name):
+            coefficients = [name + ending for name in COEFFICIENT_COLUMNS for ending in ("", "_se", "_lo", "_hi")]
+            near = nearest_name(column.name, coefficients)
+            raise BadInputError(f"{path.name}: column {column.name!r} is no coefficient. Did you mean {near}?")
     lines = []
     for line, cells in records:
         place = f"{path.name}, line {line}"
@@ -145,20 +154,6 @@ def _header(place: str, path: Path, names: list[str]) -> list[_Header]:
             raise BadInputError(f"{place}: column {name!r} is there twice. Delete one of them.")
         header[name] = _Header(name, size, *column_of(name, path.stem))
     return list(header.values())
-
-
-def _refuse_wrong_names(path: Path, names: list[str], needed: Sequence[str], misspelt: re.Pattern[str] | None) -> None:
-    """Name a column that is missing, and one that looks like a coefficient and is none."""
-    for name in needed:
-        if name not in names:
-            near = nearest_name(name, names)
-            hint = f"; {near!r} is not it" if near else ""
-            raise BadInputError(f"{path.name}: column {name} is missing{hint}. Add it.")
-    for name in names if misspelt is not None else ():
-        if misspelt is not None and misspelt.fullmatch(name) and column_of(name, path.stem)[0] is None:
-            coefficients = [name + ending for name in COEFFICIENT_COLUMNS for ending in ("", "_se", "_lo", "_hi")]
-            near = nearest_name(name, coefficients)
-            raise BadInputError(f"{path.name}: column {name!r} is no coefficient. Did you mean {near}?")
 
 
 @functools.lru_cache(maxsize=4096)
