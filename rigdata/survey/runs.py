@@ -51,6 +51,14 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
     moves = of_quantity(export, channels, "displacement")
     lines = strongest_lines(forces) or strongest_lines(moves)
     stem = export.name.rpartition("/")[2].rpartition(".")[0]
+    named = next((kind for kind, pattern in WORDS["kinds"].items() if re.search(pattern, stem, re.IGNORECASE)), "")
+    kind = Entry(named, "guess", "the file's name") if named else OPEN
+    # movement beats a misleading name, but a name tells a constant load from none
+    movement, why = _by_movement(forces, moves, lines)
+    if movement and movement == (named or movement):
+        kind = Entry(movement, "records", why)
+    elif movement and {movement, named} != {"dynamic", "locus"}:
+        kind = Entry(movement, "records", f"{why} (its name says {named})")
     pad = re.search(rf"(?:^p|{PAD})[-_ #]?(\d{{1,2}})(?!\d)", stem, re.IGNORECASE)
     angles = _numbers_before(stem, r"deg(?:ree)?s?|°|grad")
     # a frequency that the name states counts where one of the record's lines confirms it
@@ -58,7 +66,7 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
     confirmed = [f for f in stated if any(abs(line.frequency - f) <= NEAR * f for line in lines)]
     return RunGuess(
         export=export,
-        kind=_kind(stem, forces, moves, lines),
+        kind=kind,
         lines=lines,
         load=_load_of(stem),
         direction=Entry(angles[0], "file") if angles else OPEN,
@@ -71,17 +79,6 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
 def of_quantity(export: Export, channels: Guesses, quantity: str) -> list[Series]:
     """Channels of a record that measure a quantity."""
     return [s for s in export.series if channels[s.name].quantity.value == quantity]
-
-
-def _kind(stem: str, forces: list[Series], moves: list[Series], lines: Peaks) -> Entry:
-    """Movement beats a misleading name, but a name tells a constant load from none."""
-    named = next((kind for kind, pattern in WORDS["kinds"].items() if re.search(pattern, stem, re.IGNORECASE)), "")
-    movement, why = _by_movement(forces, moves, lines)
-    if movement and movement != named and named and {movement, named} != {"dynamic", "locus"}:
-        return Entry(movement, "records", f"{why} (its name says {named})")
-    if movement and movement == (named or movement):
-        return Entry(movement, "records", why)
-    return Entry(named, "guess", "the file's name") if named else OPEN
 
 
 def _numbers_before(stem: str, unit: str) -> list[float]:
