@@ -1,6 +1,7 @@
 """Pads, shaft and housing that stand otherwise than drawn."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,14 @@ import numpy as np
 from model.bearing import Pad
 from model.effects.kind import DIRECTION, PAD, Parameter, effect_on
 from model.setup import Setup
+
+
+def _least(name: str) -> Callable[[Setup], float]:
+    """The smallest of a number that every pad has: no change takes more away."""
+    return lambda setup: min(getattr(pad, name) for pad in setup.bearing.pads)
+
+
+_CLEARANCE, _BORE = _least("assembled_clearance"), _least("pad_clearance")
 
 
 def _moved(setup: Setup, name: str, change: float, number: int | None = None) -> Setup:
@@ -22,7 +31,7 @@ def _moved(setup: Setup, name: str, change: float, number: int | None = None) ->
 @effect_on(
     "bearing",
     PAD,
-    Parameter("radial_offset", "m", "length", 0.0, -6e-05, 6e-05, 1e-05),
+    Parameter("radial_offset", "m", "length", 0.0, -6e-05, 6e-05, 1e-05, most_missing=_CLEARANCE),
     source="Machining tolerance; the paper explains an irregular clearance polygon so (Fig. 14)",
     finding="{pad} stands {radial_offset:size} too far {radial_offset:out|in}",
     physics=(
@@ -67,7 +76,7 @@ def uneven_pads(setup: Setup, **offsets: float) -> Setup:
 
 @effect_on(
     "bearing",
-    Parameter("pad_clearance_change", "m", "length", 0.0, -0.0001, 0.0002, 1.2e-05),
+    Parameter("pad_clearance_change", "m", "length", 0.0, -0.0001, 0.0002, 1.2e-05, most_missing=_BORE),
     source="Boring tolerance of a pad of 100 mm: IT6 to IT7",
     finding="the pads are bored {pad_clearance_change:size} {pad_clearance_change:wider|tighter} than drawn",
     physics=(
@@ -87,7 +96,7 @@ def preload_error(setup: Setup, pad_clearance_change: float) -> Setup:
 @effect_on(
     "bearing",
     PAD,
-    Parameter("pad_clearance_change", "m", "length", 0.0, -0.0001, 0.0002, 1.2e-05),
+    Parameter("pad_clearance_change", "m", "length", 0.0, -0.0001, 0.0002, 1.2e-05, most_missing=_BORE),
     source="Boring tolerance of a pad of 100 mm: IT6 to IT7",
     finding="{pad} is bored {pad_clearance_change:size} {pad_clearance_change:wider|tighter} than drawn",
     physics="One pad has another radius, so another preload. Its film converges more or less than the others'.",
@@ -101,7 +110,7 @@ def pad_bore(setup: Setup, pad: int, pad_clearance_change: float) -> Setup:
 
 @effect_on(
     "bearing",
-    Parameter("assembled_clearance_change", "m", "length", 0.0, -0.0002, 0.0005, 8e-06),
+    Parameter("assembled_clearance_change", "m", "length", 0.0, -0.0002, 0.0005, 8e-06, most_missing=_CLEARANCE),
     source="Drawings state clearances as radius or as diameter; shims and seats move them by some micrometres",
     finding=(
         "the assembled clearance is {assembled_clearance_change:size} {assembled_clearance_change:larger|smaller} "
@@ -132,7 +141,21 @@ def pivot_offset_error(setup: Setup, offset_change: float) -> Setup:
 
 @effect_on(
     "bearing",
-    Parameter("clearance_change", "m", "length", 0.0, -6e-05, 6e-05, 8e-06),
+    Parameter("factor", "1", "ratio", 1.0, 0.5, 1.5, 0.05),
+    source="Chamfers and pockets at the edges of a pad take 1 to 5 % of its arc",
+    finding="the pads' arcs are {factor:size} {factor:longer|shorter} than the bearing file says",
+    physics="A film that begins later or ends earlier carries less. Every pad is off alike, the loaded ones most.",
+    on_the_rig="Clearances agree with the drawing; stiffness and damping are off alike at all loads.",
+    check="the pads' length along the shaft's surface against the drawing, chamfers and pockets taken off",
+)
+def pad_arc_error(setup: Setup, factor: float) -> Setup:
+    """The arc of every pad times factor, its pivot at the same share of it."""
+    return setup.change_pads(lambda number, pad: replace(pad, arc=pad.arc * factor))
+
+
+@effect_on(
+    "bearing",
+    Parameter("clearance_change", "m", "length", 0.0, -6e-05, 6e-05, 8e-06, most_missing=_CLEARANCE),
     source="12e-6 1/K x 66 mm x 8 K = 6 um if only the housing heats",
     finding="the running clearance is {clearance_change:size} {clearance_change:larger|smaller} than cold",
     physics=(

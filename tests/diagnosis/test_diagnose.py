@@ -18,8 +18,7 @@ from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import nuisances
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.next_test import Design, ranked, say, separated
-from tpjb_ident.diagnosis.observations.folds import held_out
-from tpjb_ident.diagnosis.observations.gap import contradictions, gap, localise, residuals
+from tpjb_ident.diagnosis.observations.gap import contradictions, gap, held_out, localise, residuals
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.diagnosis.plan import plan
 from tpjb_ident.diagnosis.planned import dynamic, planned_observations
@@ -55,7 +54,7 @@ def campaign(observations, setup, effects, seed):
 
 
 def test_candidates_spell_out_pads_and_directions(setup):
-    labels = [c.label for c in candidates(setup.bearing)]
+    labels = [c.label for c in candidates(setup)]
     assert "soft_pivot pad 5" in labels
     assert sum(name.startswith("pad_offset") for name in labels) == 5
     assert sum(name.startswith("misalignment") for name in labels) == 4
@@ -63,13 +62,13 @@ def test_candidates_spell_out_pads_and_directions(setup):
 
 @pytest.mark.parametrize("wanted", [0.3, 1.0, 2.5])
 def test_candidate_amplitudes_are_in_the_nearly_linear_form(setup, wanted):
-    softer = next(c for c in candidates(setup.bearing) if c.name == "pivot_flexibility")
+    softer = next(c for c in candidates(setup) if c.name == "pivot_flexibility")
     assert softer.effect(1.0 / wanted).parameters["stiffness_factor"] == pytest.approx(wanted)
     assert softer.neutral == 1.0
 
 
 def test_candidate_amplitude_is_kept_inside_its_physical_bounds(setup):
-    spring = next(c for c in candidates(setup.bearing) if c.name == "housing_flexibility")
+    spring = next(c for c in candidates(setup) if c.name == "housing_flexibility")
     assert spring.effect(-1.0).parameters["stiffness"] == math.inf
     assert spring.effect(1.0).parameters["stiffness"] == pytest.approx(5e7)
 
@@ -133,7 +132,7 @@ def test_forward_says_where_there_is_no_equilibrium(setup):
 
 @pytest.mark.slow
 def test_plan_tells_what_direct_coefficients_alone_cannot(setup, layout):
-    pool = [c for c in candidates(setup.bearing) if c.name in {"probe_gain", "loadcell_gain"}]
+    pool = [c for c in candidates(setup) if c.name in {"probe_gain", "loadcell_gain"}]
     bare = Layout(tuple(replace(t, pads=()) for t in layout.dynamic))
     assert plan(setup, bare, pool=pool).confusable
     assert not plan(setup, layout, pool=pool).confusable
@@ -176,6 +175,24 @@ def test_a_hidden_effect_is_named_sized_and_closes_the_gap(setup, observations, 
     data = json.loads(verdict.to_json())
     assert data["schema"] == "tpjb-diagnosis/2"
     assert set(data["gap"]) >= {"before", "after", "heldout_before", "heldout_after", "noise_floor"}
+
+
+def test_no_more_can_be_missing_than_a_campaign_states(setup):
+    light = setup.change(instruments=replace(setup.instruments, housing_mass=12.0))
+    lowest = {c.name: c.limits[0][0] for c in candidates(light)}
+    clearance = min(pad.assembled_clearance for pad in setup.bearing.pads)
+    assert lowest["housing_mass"] == -6.0
+    assert lowest["clearance_error"] == -clearance
+
+
+@pytest.mark.slow
+def test_arcs_that_are_short_have_their_name(setup, observations):
+    hidden = Effect("pad_arc_error", factor=0.9)
+    settings = few("pad_arc_error", "misalignment", "starvation", "pivot_offset_error")
+    verdict = diagnose(campaign(observations, setup, (hidden,), seed=4), setup, settings).verdict
+    assert [e.name for e in verdict.effects] == ["pad_arc_error"]
+    factor = verdict.effects[0].parameters["factor"]
+    assert factor.lo < 0.9 < factor.hi
 
 
 @pytest.mark.slow
@@ -253,7 +270,7 @@ def test_cells_that_read_other_loads_than_were_set_are_said(observations):
 
 def test_a_fault_on_a_tolerance_is_that_number_with_a_wide_prior(setup, observations):
     listed = nuisances(observations.elements, setup, Tolerances())
-    oil = next(f for f in faults_of(candidates(setup.bearing), listed) if f.label == "oil_viscosity")
+    oil = next(f for f in faults_of(candidates(setup), listed) if f.label == "oil_viscosity")
     unknowns = Unknowns(SimpleNamespace(nuisances=listed), (oil,))
     (at,) = unknowns.slices
     assert len(unknowns.width) == len(listed)

@@ -69,13 +69,13 @@ def bent_case(contradicted):
 
     measured = solved(there) + 2.0 * contradicted * held * effect
     elements = tuple(Element("h", "kxx", (("load", float(k)),)) for k in range(12))
-    noise, bound = 0.0025 * np.eye(12), np.full(1, 9.0)
+    noise, prior = 0.0025 * np.eye(12), np.array([[0.0], [9.0], [-9.0], [9.0]])
     problem = SimpleNamespace(
         observations=Observations(Layout(()), measured, noise, np.full(12, 0.05), elements), base=np.zeros(12),
         measured=measured, sigma=np.ones(12), nuisances=(None,), held=held,
         errors=SimpleNamespace(covariance=lambda level: noise),
     )  # fmt: skip
-    fault = SimpleNamespace(label="x", own=-1, is_term=False, origin=np.zeros(1), width=bound, low=-bound, high=bound)
+    fault = SimpleNamespace(label="x", own=-1, is_term=False, width=prior[1], prior=prior)
     unknowns = Unknowns(problem, (fault,))
     jacobian = np.column_stack([effect, tolerance + 0.8 * effect * there[1]])
     linear = SimpleNamespace(residual=measured - solved(there), theta=there, jacobian=jacobian, width=unknowns.width)
@@ -95,7 +95,8 @@ def test_how_a_tolerance_bends_is_no_gap_of_an_effect(contradicted):
 
 def test_a_group_of_look_alikes_begins_with_the_effect_that_is_listed():
     # the most probable model need not hold the likeliest name: others stand beside that
-    model = SimpleNamespace(names=frozenset({"oil_viscosity"}), has_terms=False)
-    judgement = look_alikes(model, held_out(2.0), ("supply_temperature", "oil_viscosity", "viscosity_law"))
+    held = held_out(2.0)
+    held.fit.names, held.fit.has_terms = frozenset({"oil_viscosity"}), False
+    judgement = look_alikes(held, ("supply_temperature", "oil_viscosity", "viscosity_law"))
     assert judgement.name == "ambiguous"
     assert judgement.family == ("oil_viscosity", "supply_temperature", "viscosity_law")

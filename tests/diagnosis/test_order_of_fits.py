@@ -33,8 +33,8 @@ def linear_case(scales):
 
 
 def straight(column, name="x"):
-    end = np.full(1, 1e6)
-    fault = SimpleNamespace(width=np.full(1, 3.0), origin=np.zeros(1), low=-end, high=end, label=name)
+    prior = np.array([[0.0], [3.0], [-1e6], [1e6]])
+    fault = SimpleNamespace(width=prior[1], prior=prior, label=name)
     return Path(fault, column[:, None])
 
 
@@ -118,9 +118,9 @@ def test_what_is_left_out_would_not_have_changed_the_answer(campaign, usual):
     assert whole.best.labels == quick.best.labels
     # beside the leader nothing is fitted whose estimate could not take the name's certainty from it
     spare = 1.0 - DiagnoseSettings().included
-    assert whole.probability(whole.best) == pytest.approx(quick.probability(quick.best), abs=spare)
+    assert whole.probabilities[whole.best] == pytest.approx(quick.probabilities[quick.best], abs=spare)
     left_out = [f for f in whole.fits if f.labels not in {fit.labels for fit in quick.fits}]
-    assert sum(whole.probability(fit) for fit in left_out) < spare
+    assert sum(whole.probabilities[fit] for fit in left_out) < spare
 
 
 def test_what_a_refused_step_promised_counts_for_no_explanation_beside(monkeypatch):
@@ -217,8 +217,16 @@ def test_a_fit_gets_derivatives_of_its_own_where_it_leads_or_is_off_its_score(mo
     assert bool(asked) == renewed
 
 
-@pytest.mark.parametrize(("rise", "times"), [(-5.0, 1), (-0.5, 2), (5.0, 2)])
-def test_after_a_coarse_start_derivatives_are_asked_again_unless_they_were_refused(monkeypatch, rise, times):
+@pytest.mark.parametrize(
+    ("total", "rise", "times"),
+    [
+        (-20.0, -5.0, 1),
+        (-20.0, -0.5, 2),
+        (-20.0, 5.0, 2),
+        (-200.0, 5.0, 1),  # far behind, for all that is known on derivatives from before the jump
+    ],
+)
+def test_after_a_coarse_start_derivatives_are_asked_again_unless_they_were_refused(monkeypatch, total, rise, times):
     asked = []
 
     def refined(run, fit, whole):
@@ -226,7 +234,7 @@ def test_after_a_coarse_start_derivatives_are_asked_again_unless_they_were_refus
         return stub_fit(fit.posterior.total + rise)
 
     tried = stub_search(total=0.0, estimate=0.0)
-    monkeypatch.setattr(search, "fitted", lambda run, problem, start: stub_fit(-20.0))
+    monkeypatch.setattr(search, "fitted", lambda run, problem, start: stub_fit(total))
     monkeypatch.setattr(search, "refined", refined)
     tried.run = tried.problem = None
     tried._reached(SimpleNamespace(estimate=-100.0, coarse=True))

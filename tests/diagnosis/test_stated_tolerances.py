@@ -10,7 +10,7 @@ from model.bearing_file import load_bearing
 from model.effects import Effect, apply_effects, kind_of
 from tests.diagnosis.rocker_case import ROCKER, points, rocker_setup
 from tpjb_ident.diagnosis.forward.forward import Forward
-from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Shift, nuisances
+from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, nuisances, shifted
 from tpjb_ident.diagnosis.forward.tolerances import DEFAULTS, Tolerances
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.diagnosis.planned import planned_observations
@@ -52,7 +52,7 @@ def test_nuisances_change_what_they_say():
     size = tuple(
         2.0 if n.name in {"viscosity", "clearance_scatter"} and n.place in {"", "pad 3"} else 0.0 for n in known
     )
-    bent = Shift(known, size)(setup).bearing
+    bent = shifted(setup, known, size).bearing
     assert bent.oil.viscosity_40 == pytest.approx(bearing.oil.viscosity_40 * math.exp(0.1))
     shifts = [b.assembled_clearance - a.assembled_clearance for a, b in zip(bearing.pads, bent.pads, strict=True)]
     assert np.allclose(shifts, [0.0, 0.0, 4e-6, 0.0, 0.0], atol=1e-12)

@@ -37,7 +37,7 @@ NAMES = {
     "pivot_rotation", "pivot_damping", "misalignment", "starvation", "probe_gain", "probe_rotation",
     "loadcell_gain", "loadcell_crosstalk", "channel_delay", "housing_mass", "structure_compliance", "uneven_pads",
     "viscosity_law", "heat_loss", "pad_conduction", "pivot_rolling", "pivot_friction", "one_probe_gain",
-    "one_cell_gain", "thermometer_offset", "pad_bore", "clearance_error", "pivot_offset_error",
+    "one_cell_gain", "thermometer_offset", "pad_bore", "clearance_error", "pivot_offset_error", "pad_arc_error",
 }  # fmt: skip
 HOUSING_MASS, CELLS = 30.0, np.array([4.0e8, 6.0e8])
 

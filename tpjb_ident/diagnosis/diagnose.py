@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from model.effects import Effect, apply_effects
+from model.effects import apply_effects
 from model.mirror import rotation_of
 from model.setup import Setup
 from rigdata.arrays import FloatArray
@@ -22,7 +21,6 @@ from tpjb_ident.diagnosis.comparison.unknowns import derivatives
 from tpjb_ident.diagnosis.forward.candidates import candidates
 from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.forward.nuisance import nuisances
-from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map, workers
 from tpjb_ident.diagnosis.next_test import Separation, options_for, ranked, say, separated, suggested
 from tpjb_ident.diagnosis.observations.constants import Deciding
@@ -80,7 +78,7 @@ def pose(observations: Observations, forward: Forward, settings: DiagnoseSetting
     listed = nuisances(trusted.elements, forward.setup, settings.tolerances)
     # without a cold polygon the clearance of the file and that of the running bearing are one
     unseen = frozenset() if observations.layout.push_load is not None else frozenset({"clearance_error"})
-    pool = candidates(forward.setup.bearing, settings.skip | unseen)
+    pool = candidates(forward.setup, settings.skip | unseen)
     problem = Problem(trusted, base, listed, np.zeros((len(base), len(listed))), pool)
     with workers(forward, problem, settings.workers) as run:
         jobs = [((), np.zeros(len(listed)), (i,)) for i in range(len(listed))]
@@ -104,9 +102,9 @@ def _next_test(
     rivals = [fit for fit in _rivals(comparison, model) if _possible(setup, fit)]
     if not rivals or not _possible(setup, model):
         return ""
-    explanations = (model.effects, *(fit.effects for fit in rivals))
-    count = len(options_for(setup, layout))
-    tried = run(_separated, [(setup, i, explanations, settings.tolerances) for i in range(count)])
+    others = [fit.effects for fit in rivals]
+    options = options_for(setup, layout)
+    tried = run(_separated, [(setup, option, model.effects, others, settings.tolerances) for option in options])
     tests = ranked([separation for separation in tried if separation is not None])
     if not tests:
         return ""
@@ -114,11 +112,9 @@ def _next_test(
     return f"to confirm: {text}" if verdict.verdict == "named" else text
 
 
-def _separated(
-    forward: Forward, problem: Problem, setup: Setup, index: int, told: Sequence[tuple[Effect, ...]], known: Tolerances
-) -> Separation | None:
-    """What one option would show between the first explanation and the others."""
-    return separated(setup, options_for(setup, forward.layout)[index], told[0], told[1:], known)
+def _separated(forward: Forward, problem: Problem, *asked: Any) -> Separation | None:
+    """Job: what one option would show between the first explanation and the others."""
+    return separated(*asked)
 
 
 def _possible(setup: Setup, fit: Fit) -> bool:

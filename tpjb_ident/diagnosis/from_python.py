@@ -31,7 +31,7 @@ from tpjb_ident.errors import ArgumentError
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
 
-#: Set points of a plan and what they must be.
+#: Set points of a plan, in the order of an operating point, and what they must be.
 _POINT = {"load": "force", "load_direction": "angle", "speed": "speed", "excitation": "speed"}
 
 
@@ -84,8 +84,7 @@ def diagnose(
     demo: All pivots have 37.6 ± 1.9 % of the formula's stiffness
     """
     opened = as_campaign(campaign, "campaign")
-    chosen = settings or DiagnoseSettings()
-    return diagnose_campaign(opened, _bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), chosen)
+    return diagnose_campaign(opened, _bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), settings)
 
 
 def plan(
@@ -146,8 +145,7 @@ def points_of(given: Mapping[str, Any]) -> list[OperatingPoint]:
             raise ArgumentError(f"points: {name} is missing. Give load, speed and excitation.")
         value = given.get(name, -math.pi / 2)
         lists[name] = np.atleast_1d(np.asarray(to_si(value, dimension, f"points: {name}"), dtype=float))
-    every = itertools.product(*(lists[name] for name in ("load", "load_direction", "speed", "excitation")))
-    return [OperatingPoint(float(load), float(angle), float(speed), float(line)) for load, angle, speed, line in every]
+    return [OperatingPoint(*map(float, point)) for point in itertools.product(*lists.values())]
 
 
 def planned_layout(bearing: Bearing, points: Sequence[OperatingPoint], static: tuple[int, bool, float, bool]) -> Layout:

@@ -22,13 +22,12 @@ import numpy as np
 
 from model.effects import Effect, kind_of
 from model.setup import Setup
-from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.forward import Change, Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
-from tpjb_ident.diagnosis.observations.observe import DynamicTest, Layout, Observations
+from tpjb_ident.diagnosis.observations.observe import Layout, Observations
 from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
 
 HZ = 2 * math.pi
@@ -96,72 +95,63 @@ class _OperatingRange:
     def shaft(self) -> str:
         return f"{abs(self.speed) / HZ:.0f} Hz"
 
-    def tests(
-        self, loads: Sequence[float], lines: Sequence[float], sensors: bool = False, faster: float = 1.0
-    ) -> tuple[DynamicTest, ...]:
+    def run(
+        self, words: str, loads: Sequence[float], lines: Sequence[float], sensors: bool = False, faster: float = 1.0
+    ) -> Design:
+        """Dynamic tests."""
         pads = self.pads if sensors else 0
-        return dynamic(loads, lines, faster * self.speed, self.direction, pads)
+        return Design(words, Layout(dynamic(loads, lines, faster * self.speed, self.direction, pads)))
+
+    def sweep(self, words: str, faster: float = 1.0) -> Design:
+        """The load sweep with pad temperatures."""
+        loads = [self.low, self.load, self.top]
+        return self.run(f"the load sweep repeated {words}, with pad temperatures", loads, self.lines[:1], True, faster)
 
 
 def _other_lines(at: _OperatingRange) -> list[Design]:
     sweep = [HZ * f for f in (10.0, 20.0, 30.0, 40.0, 50.0)]
     far = [HZ * f for f in (60.0, 90.0, 120.0, 150.0)]
+    words = f"a frequency sweep 60-150 Hz at {at.load:.0f} N, {at.shaft} shaft speed, if the actuators reach that far"
     return [
-        Design(f"a frequency sweep 10-50 Hz at {w:.0f} N, {at.shaft} shaft speed", Layout(at.tests([w], sweep)))
-        for w in (at.top, at.low)
-    ] + [
-        Design(
-            f"a frequency sweep 60-150 Hz at {at.load:.0f} N, {at.shaft} shaft speed, if the actuators reach that far",
-            Layout(at.tests([at.load], far)),
-        )
+        *(
+            at.run(f"a frequency sweep 10-50 Hz at {w:.0f} N, {at.shaft} shaft speed", [w], sweep)
+            for w in (at.top, at.low)
+        ),
+        at.run(words, [at.load], far),
     ]
 
 
 def _other_points(at: _OperatingRange) -> list[Design]:
     between = replace(at, direction=at.direction + math.pi / at.pads)
-    loads = [at.low, at.load, at.top]
-    out = [
-        Design(f"dynamic tests at half the load, {0.5 * at.low:.0f} N, {at.shaft}",
-               Layout(at.tests([0.5 * at.low], at.lines))),
-        Design(f"dynamic tests at a quarter more than the highest load, {1.25 * at.top:.0f} N, {at.shaft}",
-               Layout(at.tests([1.25 * at.top], at.lines, True))),
-        Design(f"dynamic tests with the load between pads ({at.load:.0f} N turned by half a pad pitch)",
-               Layout(between.tests([at.load], at.lines, True))),
-        Design(f"pad temperatures at {at.low:.0f} N and {at.top:.0f} N, {at.shaft}",
-               Layout(at.tests([at.low, at.top], at.lines[:1], True))),
+    half, more = 0.5 * at.low, 1.25 * at.top
+    return [
+        at.run(f"dynamic tests at half the load, {half:.0f} N, {at.shaft}", [half], at.lines),
+        at.run(
+            f"dynamic tests at a quarter more than the highest load, {more:.0f} N, {at.shaft}", [more], at.lines, True
+        ),
+        between.run(
+            f"dynamic tests with the load between pads ({at.load:.0f} N turned by half a pad pitch)",
+            [at.load], at.lines, True,
+        ),
+        at.run(
+            f"pad temperatures at {at.low:.0f} N and {at.top:.0f} N, {at.shaft}",
+            [at.low, at.top], at.lines[:1], True,
+        ),
+        *(at.sweep(f"at {by * abs(at.speed) / HZ:.0f} Hz shaft speed", by) for by in (1.5, 0.5)),
     ]  # fmt: skip
-    return out + [
-        Design(
-            f"the load sweep repeated at {factor * abs(at.speed) / HZ:.0f} Hz shaft speed, with pad temperatures",
-            Layout(at.tests(loads, at.lines[:1], True, factor)),
-        )
-        for factor in (1.5, 0.5)
-    ]
 
 
 def _other_rigs(setup: Setup, at: _OperatingRange) -> list[Design]:
     """Tests for which the rig is changed."""
-    sweep = Layout(at.tests([at.low, at.load, at.top], at.lines[:1], True))
+    outside = f"dynamic tests at {at.low:.0f} N and {at.top:.0f} N with the probes carried by the housing itself"
+    hotter = at.sweep(f"with the oil {_HOTTER:.0f} K hotter at the inlet")
+    drowned = at.sweep("with so much oil that more changes nothing")
     out = [
-        Design(
-            f"dynamic tests at {at.low:.0f} N and {at.top:.0f} N with the probes carried by the housing itself",
-            Layout(at.tests([at.low, at.top], at.lines)), blind=frozenset({"housing_flexibility"}),
-        ),
-        Design(
-            f"the load sweep repeated with the oil {_HOTTER:.0f} K hotter at the inlet, with pad temperatures", sweep,
-            change=functools.partial(_hotter, by=_HOTTER),
-        ),
-        Design(
-            "the load sweep repeated with so much oil that more changes nothing, with pad temperatures", sweep,
-            blind=frozenset({"starvation"}), unsure=frozenset({"hot_oil_carryover"}),
-        ),
-    ]  # fmt: skip
-    if reversible(setup):
-        out.append(
-            Design("the load sweep repeated with the shaft turning the other way, with pad temperatures",
-                   Layout(at.tests([at.low, at.load, at.top], at.lines[:1], True, faster=-1.0)))
-        )  # fmt: skip
-    return out
+        replace(at.run(outside, [at.low, at.top], at.lines), blind=frozenset({"housing_flexibility"})),
+        replace(hotter, change=functools.partial(_hotter, by=_HOTTER)),
+        replace(drowned, blind=frozenset({"starvation"}), unsure=frozenset({"hot_oil_carryover"})),
+    ]
+    return [*out, *([at.sweep("with the shaft turning the other way", -1.0)] if reversible(setup) else [])]
 
 
 def _hotter(setup: Setup, by: float) -> Setup:
@@ -191,16 +181,13 @@ def grown(setup: Setup) -> Setup:
 
 
 def _dry(layout: Layout, pads: int) -> list[Design]:
-    done = {d.pad for d in layout.dry}
-    missing = [k for k in range(1, pads + 1) if k not in done]
+    every = range(1, pads + 1)
+    missing = [k for k in every if k not in {d.pad for d in layout.dry}]
     if missing:
         return [
             Design(f"a dry load-deflection test on pad #{k}, 0.5-5 kN", Layout((), dry=dry([k]))) for k in missing
         ]  # fmt: skip
-    return [
-        Design("the dry tests repeated up to 8 kN on all pads",
-               Layout((), dry=dry(range(1, pads + 1), (2000.0, 5000.0, 7600.0))))
-    ]  # fmt: skip
+    return [Design("the dry tests repeated up to 8 kN on all pads", Layout((), dry=dry(every, (2e3, 5e3, 7.6e3))))]
 
 
 def reversible(setup: Setup) -> bool:
@@ -243,17 +230,13 @@ def separated(
         others = [forward(design.acting(rival)) for rival in rivals]
     except NoEquilibriumError:
         return None
-    return Separation(design, tuple(apart(planned, columns, prediction - other) for other in others))
+    white = np.linalg.solve(usual_factor(planned, columns), prediction[:, None] - np.column_stack(others))
+    return Separation(design, tuple(np.linalg.norm(white, axis=0).tolist()))
 
 
 def ranked(tests: Sequence[Separation]) -> tuple[Separation, ...]:
     """The furthest from the nearest rival first."""
     return tuple(sorted(tests, key=lambda s: -s.expected))
-
-
-def apart(seen: Observations, columns: FloatArray, difference: FloatArray) -> float:
-    """Whitened length of a difference (n,) of two predictions [standard deviations]; `columns` (n, m)."""
-    return float(np.linalg.norm(np.linalg.solve(usual_factor(seen, columns), difference)))
 
 
 def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:

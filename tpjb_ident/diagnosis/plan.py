@@ -22,7 +22,7 @@ from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
-from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
+from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations, named, places
 from tpjb_ident.diagnosis.planned import planned_observations
 from tpjb_ident.presentation import json_data
 
@@ -42,7 +42,7 @@ class CampaignPlan:
     def floor(self) -> FloatArray:
         """Smallest change of every parameter that would be seen (3 standard deviations), in its nearly linear form."""
         with np.errstate(divide="ignore"):  # what cannot be detected has an infinite floor
-            return Deciding.visible * np.array([c.step for c in self.candidates]) / self.detectable
+            return Deciding.visible * np.array([c.steps[0] for c in self.candidates]) / self.detectable
 
     @property
     def confusable(self) -> tuple[tuple[str, str], ...]:
@@ -89,14 +89,14 @@ class CampaignPlan:
         for i, c in enumerate(self.candidates):
             apart = zip(self.candidates, self.separation[i], strict=True)
             like = [other.label for other, distance in apart if distance < Deciding.visible]
-            at = c.parameter.from_linear(c.neutral + self.floor[i]) if np.isfinite(self.floor[i]) else np.nan
+            end, (low,), (high,) = c.neutral + self.floor[i], *c.limits
             rows.append(
                 {
                     "effect": c.label,
                     "parameter": c.parameter.name,
                     "unit": c.parameter.unit,
                     "typical_size_sigma": self.detectable[i],
-                    "seen_from": at if c.bounds[0] <= c.neutral + self.floor[i] <= c.bounds[1] else np.nan,
+                    "seen_from": c.parameter.from_linear(end) if low <= end <= min(high, 1e300) else np.nan,
                     "mistaken_for": ", ".join(like),
                 }
             )
@@ -123,12 +123,15 @@ class _Signatures:
         factor = usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
         # rows of a Cholesky factor have the covariance of those elements
         lower = np.asarray(np.linalg.qr(factor[mine].T, mode="r")).T
-        return separated(self.candidates, np.asarray(np.linalg.solve(lower, self.columns[mine])))
+        white = np.asarray(np.linalg.solve(lower, self.columns[mine]))
+        apart = separations(white)
+        np.fill_diagonal(apart, np.nan)
+        return CampaignPlan(self.candidates, np.linalg.norm(white, axis=0), apart)
 
 
 def _shown(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None) -> _Signatures:
     """Work out the signature of every candidate on a layout."""
-    chosen = tuple(pool if pool is not None else one_amplitude(setup.bearing))
+    chosen = tuple(pool if pool is not None else one_amplitude(setup))
     observations = planned_observations(setup, layout)
     forward = Forward(setup, layout, observations.elements)
     base = forward()
@@ -139,32 +142,21 @@ def _shown(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None
 
 def _signature(forward: Forward, base: FloatArray, candidate: Candidate) -> FloatArray:
     """Change by a typical size, from half of it; zero where the model has no equilibrium on either side."""
-    low, high = candidate.bounds
+    (low,), (high,) = candidate.limits
+    (step,), neutral = candidate.steps, candidate.neutral
     for share in (0.5, -0.5, 0.05, -0.05):
-        value = min(max(candidate.neutral + share * candidate.step, low), high)
-        if value == candidate.neutral:
+        value = min(max(neutral + share * step, low), high)
+        if value == neutral:
             continue
         try:
             moved = forward.fresh()((candidate.effect(value),)) - base
         except NoEquilibriumError:
             continue
-        return np.asarray(moved / (value - candidate.neutral) * candidate.step)
+        return np.asarray(moved / (value - neutral) * step)
     return np.zeros_like(base)
 
 
-def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
-    """Sizes and separations of whitened signatures (n, k)."""
-    apart = separations(white)
-    np.fill_diagonal(apart, np.nan)
-    return CampaignPlan(tuple(chosen), np.linalg.norm(white, axis=0), apart)
-
-
-_DIRECT = frozenset({"kxx", "kyy", "cxx", "cyy"})
-_FAMILIES = {
-    "B": frozenset({"h"}),
-    "C": frozenset({"h", "locus", "load", "clearance"}),
-    "D": frozenset({"h", "locus", "load", "clearance", "dry", "temperature"}),
-}
+_DIRECT = ["kxx", "kyy", "cxx", "cyy"]
 #: Second speed of data set E over the planned one.
 _FASTER = 1.5
 
@@ -182,11 +174,10 @@ class DataSet:
         """Counts, flat."""
         row: dict[str, object] = {"data_set": self.name, "numbers": self.numbers}
         k = len(self.known.candidates)
-        for words, labels in (("known", self.known), ("free", self.free)):
-            row |= {
-                f"detectable_nuisances_{words}": k - len(labels.below_floor),
-                f"confusable_pairs_nuisances_{words}": len(labels.confusable), "pairs": k * (k - 1) // 2,
-            }  # fmt: skip
+        for words, part in (("known", self.known), ("free", self.free)):
+            row[f"detectable_nuisances_{words}"] = k - len(part.below_floor)
+            row[f"confusable_pairs_nuisances_{words}"] = len(part.confusable)
+            row["pairs"] = k * (k - 1) // 2
         return {**row, "mixed_up": "; ".join(" / ".join(pair) for pair in self.free.confusable)}
 
 
@@ -194,23 +185,23 @@ def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
     """Work out what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free."""
     faster = tuple(replace(t, speed=_FASTER * t.speed) for t in layout.dynamic)
     shown = _shown(setup, replace(layout, dynamic=(*layout.dynamic, *faster)))
-    planned = {t.speed for t in layout.dynamic}
+    masks = _masks(shown.observations.elements, [t.speed for t in layout.dynamic])
     return tuple(
-        DataSet(name, int(mask.sum()), shown.by(mask, free=False), shown.by(mask))
-        for name, mask in _masks(shown.observations.elements, planned).items()
+        DataSet(name, int(mask.sum()), shown.by(mask, free=False), shown.by(mask)) for name, mask in masks.items()
     )
 
 
-def _masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
+def _masks(elements: Sequence[Element], planned: Sequence[float]) -> dict[str, BoolArray]:
     """Elements of every data set."""
-    families = np.array([e.family for e in elements])
-    first = np.array([not np.isfinite(e.place("speed")) or e.place("speed") in planned for e in elements])
-    line = np.array([e.place("excitation") for e in elements])
+    family, line, speed = named(elements, "family"), places(elements, "excitation"), places(elements, "speed")
+    first = ~np.isfinite(speed) | np.isin(speed, planned)
     # the frequency that is there at the most loads, the middle one among equals
     frequencies, counts = np.unique(line[np.isfinite(line)], return_counts=True)
     usual = frequencies[counts == counts.max()]
-    usual_line = line == usual[len(usual) // 2]
-    direct = np.array([e.observable in _DIRECT for e in elements])
-    masks = {"A": direct & usual_line & first}
-    masks |= {name: np.isin(families, sorted(families_used)) & first for name, families_used in _FAMILIES.items()}
-    return {**masks, "E": np.ones(len(elements), dtype=bool)}
+    return {
+        "A": first & np.isin(named(elements, "observable"), _DIRECT) & (line == usual[len(usual) // 2]),
+        "B": first & (family == "h"),
+        "C": first & ~np.isin(family, ["dry", "temperature"]),
+        "D": first,
+        "E": np.ones(len(elements), dtype=bool),
+    }

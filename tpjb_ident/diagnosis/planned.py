@@ -15,13 +15,13 @@ from tpjb_ident.diagnosis.observations.observe import (
     LocusTest,
     Observations,
     all_elements,
-    direct_scale,
+    by_family,
     stated_sigma,
 )
 
 #: Standard errors that a well-run test reaches (the sample campaigns' own): share of the mean direct coefficient,
-#: position [m], temperature [K], share of a dry compliance, angle of a polygon side [rad].
-_STIFFNESS, _POSITION, _TEMPERATURE, _DRY, _ANGLE = 0.001, 0.1e-6, 0.05, 0.008, 3e-4
+#: temperature [K], positions [m], share of a dry compliance, angle of a polygon side [rad].
+_NOISE = {"h": 0.001, "temperature": 0.05, "locus": 0.1e-6, "clearance": 0.1e-6, "dry": 0.008, "side_angle": 3e-4}
 
 
 def planned_observations(setup: Setup, layout: Layout) -> Observations:
@@ -29,12 +29,7 @@ def planned_observations(setup: Setup, layout: Layout) -> Observations:
     tolerance = Tolerance()
     elements = all_elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
     value = Forward(setup, layout, elements)()
-    table = {
-        "h": _STIFFNESS, "temperature": _TEMPERATURE, "locus": _POSITION, "load": tolerance.load_miss, "dry": _DRY,
-        "clearance": _POSITION,
-    }  # fmt: skip
-    rows = [_ANGLE if e.observable == "side_angle" else table[e.family] for e in elements]
-    noise = np.array(rows) * direct_scale(elements, value)
+    noise = by_family(elements, value, {**_NOISE, "load": tolerance.load_miss})
     return Observations(layout, value, np.diag(noise**2), stated_sigma(elements, value, tolerance), elements)
 
 

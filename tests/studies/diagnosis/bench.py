@@ -18,7 +18,7 @@ from tpjb_ident.diagnosis.comparison.problem import Problem
 from tpjb_ident.diagnosis.comparison.search import Comparison, compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.candidates import Candidate
-from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel, NoEquilibriumError
+from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import predict
 from tpjb_ident.diagnosis.forward.workers import workers
 from tpjb_ident.diagnosis.observations.gap import coordinate
@@ -109,7 +109,7 @@ def noise(observations: Observations, value: FloatArray, rng: np.random.Generato
     return np.asarray(smooth + factor * rng.standard_normal(len(value)))
 
 
-def solve(problem: Problem, forward: ForwardModel, settings: DiagnoseSettings) -> tuple[Decision, Comparison]:
+def solve(problem: Problem, forward: Forward, settings: DiagnoseSettings) -> tuple[Decision, Comparison]:
     """Compare and decide in this process, whatever stands behind the model; without a next test."""
     with workers(forward, problem, 1) as run:
         comparison = compare(run, problem, settings)

@@ -208,8 +208,8 @@ def faults(one: Stranger, kind: str, rng: np.random.Generator) -> list[Effect]:
 def _sized(able: Sequence[Candidate], rng: np.random.Generator) -> Effect:
     """One place of an effect, its size between 0.7 and 3 typical ones, as likely small as large."""
     one = able[int(rng.integers(len(able)))]
-    low, high = one.bounds
-    size = one.step * float(np.exp(rng.uniform(math.log(0.7), math.log(3.0))))
+    (low,), (high,) = one.limits
+    size = float(one.steps[0]) * float(np.exp(rng.uniform(math.log(0.7), math.log(3.0))))
     ends = [one.neutral + sign * size for sign in rng.permutation([-1.0, 1.0])]
     amplitude = next((end for end in ends if low < end < high), 0.5 * (one.neutral + high))
     parameters = one.values(np.array([amplitude]))
@@ -269,7 +269,7 @@ def run(one: Stranger, number: int, seed: int, settings: DiagnoseSettings) -> di
         "kind": kind, "bearing": number, "seed": seed, "words": one.words, **hidden(drawn), **said(verdict),
         "gap": verdict.gap, "reasons": list(verdict.reasons), "scale": decision.model.posterior.scale,
         "far": [(d.name, d.size, d.significance) for d in decision.model.tolerances[:3]],
-        "fits": [(f.label, f.posterior.total, p) for f, p in zip(comparison.fits[:6], comparison.probabilities)],
+        "fits": [(f.label, f.posterior.total, p) for f, p in list(comparison.probabilities.items())[:6]],
         "seconds": time.process_time() - began, "tried": len(comparison.fits),
     }  # fmt: skip
 

@@ -38,7 +38,7 @@ from tests.studies.diagnosis.tables import tables
 from tests.studies.results import Rows, report, study_parser
 from tpjb_ident.compare.rig_from_model import erring_instruments, is_of_records, truth_of
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.forward.nuisance import Nuisance, Shift
+from tpjb_ident.diagnosis.forward.nuisance import Nuisance, shifted
 from tpjb_ident.diagnosis.from_python import diagnose
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.errors import TpjbError
@@ -89,8 +89,8 @@ def rig_of(case: Case, seed: int) -> VirtualRig:
     """A virtual rig with what was drawn in it."""
     bearing, drawn, problem = load_bearing(case.text), case.drawn, case.drawn.problem
     known = list(zip(problem.nuisances, map(float, drawn.size), strict=True))
-    physical = [(n, s) for n, s in known if n.change is not None and n.name not in READ]
-    shift = Shift(tuple(n for n, _ in physical), tuple(s for _, s in physical))
+    physical = [(n, s) for n, s in known if n.column is None and n.name not in READ]
+    shift = functools.partial(shifted, known=[n for n, _ in physical], size=[s for _, s in physical])
     inside = [e for e in drawn.hidden if not is_of_records(e)]
     plain = Setup(bearing, pivot_laws("kirk", bearing))
 
@@ -155,7 +155,7 @@ def run(case: Case, seed: int, settings: DiagnoseSettings, keep: Path | None) ->
         stored = diagnosis.observations, result.setup, frozenset(left_out)
         (keep / f"{seed}.pickle").write_bytes(pickle.dumps(stored))
     verdict, comparison = diagnosis.verdict, diagnosis.comparison
-    pairs = zip(comparison.fits[:6], comparison.probabilities)
+    pairs = list(comparison.probabilities.items())[:6]
     return {
         **known, **said(verdict), "gap": verdict.gap, "reasons": list(verdict.reasons),
         "scale": comparison.best.posterior.scale, "below_floor": verdict.below_floor,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -24,7 +25,7 @@ _SHARES = (1.0, 0.4, 0.1)
 #: Share of its deviation within which a number has arrived.
 _ARRIVED = 0.1
 #: Scatters whose mean is a tolerance of the whole bearing, with that tolerance where there is one.
-_MEANS = {"clearance_scatter": "assembled_clearance", "pivot_stiffness_scatter": ""}
+_MEANS = {"clearance_scatter": "assembled_clearance", "bore_scatter": "pad_clearance", "pivot_stiffness_scatter": ""}
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,24 +109,16 @@ class Fit:
     @functools.cached_property
     def tolerances(self) -> tuple[Deviation, ...]:
         """Every tolerance that kept its stated prior, and the means of scatters, the farthest out first."""
-        names, rows = _combinations(self.unknowns)
-        stated = np.sqrt(np.sum(rows**2, axis=1))
-        sizes = rows @ self.posterior.mean / stated
-        heard = self._heard(rows) / stated**2
-        listed = [Deviation(*row) for row in zip(names, map(float, sizes), map(float, heard), strict=True)]
-        return tuple(sorted(listed, key=lambda d: -abs(d.significance)))
+        mean, strain = self.posterior.mean, self.strain
+        columns = (strain.rows @ mean, strain.heard, strain.significance(mean))
+        listed = zip(_combinations(self.unknowns)[0], *(column.tolist() for column in columns), strict=True)
+        return tuple(sorted(itertools.starmap(Deviation, listed), key=lambda d: -abs(d.significance)))
 
     @functools.cached_property
     def strain(self) -> Strain:
-        """The tolerances of which the data say something."""
+        """How far they are out, seen through what the data say of them."""
         _, rows = _combinations(self.unknowns)
-        heard = self._heard(rows)
-        asked = heard > Deciding.silent * np.sum(rows**2, axis=1)
-        return Strain(rows[asked], np.sqrt(heard[asked]))
-
-    def _heard(self, rows: FloatArray) -> FloatArray:
-        """Variance of some combinations (c, k) of tolerances that the data take away."""
-        return np.asarray(np.sum(rows**2 - (rows @ self.posterior.covariance) * rows, axis=1))
+        return Strain(rows, 1.0 - np.sum((rows @ self.posterior.covariance) * rows, axis=1))
 
     @property
     def p(self) -> float:
@@ -140,18 +133,17 @@ class Deviation:
     name: str
     size: float  #: in stated deviations
     heard: float  #: share of its variance that the data take away
-
-    @property
-    def significance(self) -> float:
-        """A posterior mean of something with prior variance 1 and posterior variance v scatters with 1 - v."""
-        return self.size / float(np.sqrt(self.heard)) if self.heard > Deciding.silent else 0.0
+    significance: float  #: standard normal where it holds
 
 
 def _combinations(unknowns: Unknowns) -> tuple[list[str], FloatArray]:
-    """Every tolerance by itself, and the mean of every scatter, which does what all pads do together, (c, k)."""
+    """Every tolerance by itself, and the mean of every scatter, which does what all pads do together, (c, k).
+
+    All of prior variance 1.
+    """
     listed = {int(i): unknowns.problem.nuisances[i - unknowns.amplitudes] for i in unknowns.tolerances}
     each = np.eye(len(unknowns.width))
-    names, rows = [f"{n.name} {n.place}".strip() for n in listed.values()], list(each[unknowns.tolerances])
+    names, rows = [n.label for n in listed.values()], list(each[unknowns.tolerances])
     sigma = {n.name: n.sigma for n in listed.values()}
     for scatter, common in _MEANS.items():
         members = each[[i for i, n in listed.items() if n.name == scatter]].sum(axis=0)
@@ -159,7 +151,8 @@ def _combinations(unknowns: Unknowns) -> tuple[list[str], FloatArray]:
             whole = each[[i for i, n in listed.items() if n.name == common]].sum(axis=0)
             names.append(f"{scatter}, mean of all pads")
             rows.append(sigma[scatter] * members / members.sum() + sigma.get(common, 0.0) * whole)
-    return names, np.array(rows)
+    table = np.reshape(rows, (-1, len(each)))
+    return names, table / np.linalg.norm(table, axis=1)[:, None]
 
 
 @dataclass(frozen=True)

@@ -64,12 +64,11 @@ class Path:
 
         `pull` (c,) and `square` (c, c): columns' products with the residual and with each other.
         """
-        fault = self.fault
-        low = np.maximum(fault.low - fault.origin, -fault.width)
-        high = np.minimum(fault.high - fault.origin, fault.width)
+        _, width, low, high = self.fault.prior
+        low, high = np.maximum(low, -width), np.minimum(high, width)
         if self.nodes is not None:
             return np.linspace(low, high, _POINTS)
-        likeliest = np.linalg.solve(square + np.diag(1.0 / fault.width**2), pull)
+        likeliest = np.linalg.solve(square + np.diag(1.0 / width**2), pull)
         return np.clip(likeliest, low, high)[None, :]
 
 

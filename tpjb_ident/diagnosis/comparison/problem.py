@@ -14,7 +14,7 @@ from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
 from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, TOGETHER, Nuisance
 from tpjb_ident.diagnosis.observations.constants import Deciding, Tolerance
-from tpjb_ident.diagnosis.observations.folds import held_out
+from tpjb_ident.diagnosis.observations.gap import held_out
 from tpjb_ident.diagnosis.observations.model_error import model_error
 from tpjb_ident.diagnosis.observations.observe import Observations
 
@@ -30,10 +30,7 @@ class Fault:
 
     label: str
     candidate: Candidate = field(compare=False)
-    origin: FloatArray = field(compare=False, repr=False)  #: (k,): where nothing happens
-    width: FloatArray = field(compare=False, repr=False)  #: (k,): standard deviations of the prior
-    low: FloatArray = field(compare=False, repr=False)  #: (k,)
-    high: FloatArray = field(compare=False, repr=False)  #: (k,)
+    prior: FloatArray = field(compare=False, repr=False)  #: (4, k): see `Candidate.prior`
     own: int = field(default=-1, compare=False)  #: number of its tolerance; -1: it has none
     sigma: float = field(default=math.nan, compare=False)  #: what is stated of that tolerance
 
@@ -43,6 +40,11 @@ class Fault:
         return self.candidate.name
 
     @property
+    def width(self) -> FloatArray:
+        """Standard deviations of the prior, (k,)."""
+        return self.prior[1]
+
+    @property
     def is_term(self) -> bool:
         """Whether it is a generic term and no effect of the library."""
         return self.name in TERMS
@@ -50,15 +52,13 @@ class Fault:
     def turned(self) -> Fault:
         """The same with its direction free beside the grid."""
         free = self.candidate.refined()
-        if free is self.candidate:
-            return self
-        return Fault(self.label, free, free.origin, free.width, *free.limits)
+        return self if free is self.candidate else Fault(self.label, free, free.prior)
 
     def values(self, amplitudes: FloatArray) -> dict[str, float]:
         """Parameters of the effect at amplitudes (k,); bounded as the library has them."""
         if self.own < 0:
             return self.candidate.values(amplitudes)
-        parameter = self.candidate.free[0]
+        parameter = self.candidate.parameter
         value = OWN_NUMBERS[self.name].parameter(float(amplitudes[0]) * self.sigma)
         return {parameter.name: min(max(value, parameter.low), parameter.high), **self.candidate.fixed}
 
@@ -66,26 +66,25 @@ class Fault:
 def faults_of(pool: Sequence[Candidate], nuisances: Sequence[Nuisance]) -> tuple[Fault, ...]:
     """Every fault of a campaign, a direction once for each of its grid."""
     out = []
+    numbers = {nuisance.effect: i for i, nuisance in enumerate(nuisances)}
     for candidate in pool:
-        if candidate.name in _TOLERANCES_ALREADY:
-            continue
-        own = [i for i, nuisance in enumerate(nuisances) if nuisance.effect == candidate.label]
-        if own:
-            out.append(_on_tolerance(candidate, own[0], nuisances[own[0]]))
-        else:
+        own = numbers.get(candidate.label)
+        if own is not None:
+            out.append(_on_tolerance(candidate, own, nuisances[own]))
+        elif candidate.name not in _TOLERANCES_ALREADY:
             label = candidate.name if "direction" in candidate.fixed else candidate.label
-            out.append(Fault(label, candidate, candidate.origin, candidate.width, *candidate.limits))
+            out.append(Fault(label, candidate, candidate.prior))
     return tuple(out)
 
 
 def _on_tolerance(candidate: Candidate, index: int, nuisance: Nuisance) -> Fault:
     """The wide prior reaches where the effect's three typical sizes do; bounds are those that the effect has."""
-    number, parameter = OWN_NUMBERS[candidate.name], candidate.free[0]
-    ends = [number.change(parameter.from_linear(candidate.neutral + s * candidate.width[0])) for s in (-1.0, 1.0)]
-    inside = [abs(end) for end in ends if end > -10.0]
-    width = np.array([min(inside) / nuisance.sigma])
-    limits = np.sort([number.change(v) / nuisance.sigma for v in (parameter.low, parameter.high)])
-    return Fault(candidate.label, candidate, np.zeros(1), width, limits[:1], limits[1:], index, nuisance.sigma)
+    number, parameter = OWN_NUMBERS[candidate.name], candidate.parameter
+    reach = candidate.prior[1, 0] * np.array([-1.0, 1.0])
+    ends = [number.change(parameter.from_linear(v)) for v in candidate.neutral + reach]
+    bounds = sorted(number.change(v) for v in (parameter.low, parameter.high))
+    prior = np.array([[0.0], [min(abs(end) for end in ends if end > -10.0)], *([v] for v in bounds)])
+    return Fault(candidate.label, candidate, prior / nuisance.sigma, index, nuisance.sigma)
 
 
 @dataclass(frozen=True)

@@ -32,17 +32,22 @@ class Score:
 
 @dataclass(frozen=True)
 class Strain:
-    """How far tolerances are out: ``rows @ theta / deviation`` is standard normal where they hold."""
+    """How far combinations of tolerances are out."""
 
-    rows: FloatArray = field(repr=False)  #: (c, k)
-    deviation: FloatArray = field(repr=False)  #: (c,)
+    rows: FloatArray = field(repr=False)  #: (c, k): of prior variance 1
+    heard: FloatArray = field(repr=False)  #: (c,): share of that which the data take away
+
+    def significance(self, theta: FloatArray) -> FloatArray:
+        """Standard normal where they hold, since a posterior mean scatters so; 0 where data say nothing, (c,)."""
+        out, asked = np.zeros(len(self.rows)), self.heard > Deciding.silent
+        out[asked] = self.rows[asked] @ theta / np.sqrt(self.heard[asked])
+        return out
 
     def p(self, theta: FloatArray) -> float:
         """Probability that one of them is as far out as the farthest one; `theta` (k,)."""
-        if not len(self.rows):
-            return 1.0
-        farthest = float(np.max(np.abs(self.rows @ theta) / self.deviation))
-        return min(1.0, len(self.rows) * 2.0 * float(ndtr(-farthest)))
+        farthest = np.max(np.abs(self.significance(theta)), initial=0.0)
+        count = max(int(np.sum(self.heard > Deciding.silent)), 1)
+        return min(1.0, count * 2.0 * float(ndtr(-farthest)))
 
 
 def separations(white: FloatArray) -> FloatArray:
@@ -57,7 +62,7 @@ def scores(errors: ErrorModel, linear: Linear, paths: Sequence[Path], strain: St
     if not paths:
         return []
     levels = Levels.of(errors, linear, np.column_stack([path.columns for path in paths]))
-    widths = Strain(strain.rows * linear.width, strain.deviation)
+    widths = Strain(strain.rows * linear.width, strain.heard)
     out, start = [], 1
     for path in paths:
         at = slice(start, start + path.columns.shape[1])

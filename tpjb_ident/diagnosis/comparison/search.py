@@ -9,7 +9,7 @@ others that already do a look-alike's work a score says little.
 import functools
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -32,10 +32,14 @@ Progress = Callable[[str, float], None]
 class Comparison:
     """All explanations that were fitted, with their probabilities."""
 
-    fits: tuple[Fit, ...]  #: the most probable first; those that are not tenable last
-    probabilities: tuple[float, ...]
-    tenable: tuple[bool, ...]
+    probabilities: Mapping[Fit, float]  #: the most probable first; those that are not tenable last
+    tenable: frozenset[Fit]  #: those that no tolerance and no bound speaks against
     paths: tuple[Path, ...] = field(repr=False)
+
+    @property
+    def fits(self) -> tuple[Fit, ...]:
+        """The explanations, the most probable first."""
+        return tuple(self.probabilities)
 
     @property
     def nothing(self) -> Fit:
@@ -50,19 +54,8 @@ class Comparison:
     @property
     def shares(self) -> dict[str, float]:
         """Inclusion probability of every name, on whichever pad or direction."""
-        out: Counter[str] = Counter()
-        for fit, probability in zip(self.fits, self.probabilities, strict=True):
-            for name in fit.names:
-                out[name] += probability  # type: ignore[assignment]
-        return dict(out)
-
-    def probability(self, wanted: Fit) -> float:
-        """Probability of a fit."""
-        return self.probabilities[self.fits.index(wanted)]
-
-    def is_tenable(self, wanted: Fit) -> bool:
-        """Whether no tolerance and no bound speaks against a fit."""
-        return self.tenable[self.fits.index(wanted)]
+        names = {name for fit in self.fits for name in fit.names}
+        return {name: sum(p for fit, p in self.probabilities.items() if name in fit.names) for name in names}
 
 
 def compare(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Progress | None = None) -> Comparison:
@@ -135,20 +128,23 @@ class _Search:
 
     def _alike(self, fit: Fit, fault: Fault) -> list[Path]:
         """Paths of effects that a campaign could not tell from a fault at a size that it sees."""
-        others = [path for path in self.paths if path.fault.label not in fit.labels and not path.fault.is_term]
         at, linear, level = fit.unknowns.slices[fit.faults.index(fault)], fit.linear, fit.posterior.leading
         beside = np.delete(linear.jacobian * linear.width, at, axis=1)  # everything else that is free
-        factor = np.linalg.cholesky(self.problem.errors.covariance(level) + beside @ beside.T)
-        own = linear.jacobian[:, at]
-        apart = separations(np.linalg.solve(factor, np.column_stack([own, *(path.columns for path in others)])))
-        ends = np.cumsum([own.shape[1], *(path.columns.shape[1] for path in others)])
-        nearest = np.split(np.nan_to_num(apart[: own.shape[1]], nan=np.inf).min(axis=0), ends[:-1])[1:]
-        return [path for path, part in zip(others, nearest, strict=True) if part.min() < Deciding.visible]
+        whitening = np.linalg.inv(np.linalg.cholesky(self.problem.errors.covariance(level) + beside @ beside.T))
+        own = whitening @ linear.jacobian[:, at]
+        alike = []
+        for path in self.paths:
+            apart = separations(np.hstack([own, whitening @ path.columns]))[: own.shape[1], own.shape[1] :]
+            near = np.nan_to_num(apart, nan=np.inf).min() < Deciding.visible
+            if near and not (path.fault.label in fit.labels or path.fault.is_term):
+                alike.append(path)
+        return alike
 
     def _exchange(self, fit: Fit, fault: Fault, path: Path) -> Start:
         """A fit with another fault in the place of one of its own."""
         faults, linear = self._without(fit, fault)
-        score = scores(self.problem.errors, linear, [path], Strain(np.zeros((0, len(linear.theta))), np.zeros(0)))[0]
+        nothing = Strain(np.zeros((0, len(linear.theta))), np.zeros(0))
+        score = scores(self.problem.errors, linear, [path], nothing)[0]
         return replace(self._with(score, faults, linear), solved=None)
 
     @property
@@ -193,6 +189,10 @@ class _Search:
         fit, leader = fitted(self.run, self.problem, start), self._leader()
         if fit is None or not fit.faults:
             return fit
+        if start.coarse:  # derivatives from before a jump led here, and say little of what lies behind it
+            before, fit = fit, self._renewed(fit)
+            if fit is before:  # refused once, they would be refused again
+                return fit
         right = min(f.posterior.scale for f in (leader or fit, fit)) <= self.settings.right
         # where a fit keeps what its start foretold, derivatives of its own would say the same
         worth = min(Deciding.worth_derivatives, Deciding.foretold * abs(self._log_probability(fit) - start.estimate))
@@ -204,9 +204,7 @@ class _Search:
             fit = self._renewed(fit, whole=False)  # where all that is fitted is wrong, most promises are
             if not self._near(fit, fit.posterior.total, 0.0):
                 return fit
-        again = self._renewed(fit)
-        # those from before a jump led here; refused once, they would be refused again
-        return self._renewed(again) if start.coarse and again is not fit else again
+        return self._renewed(fit)
 
     def _fit(self, proposal: Start) -> None:
         """Fit a proposal; one that leads and is surely wrong, or stopped at a jump, once more with a coarse start."""
@@ -228,7 +226,8 @@ class _Search:
             return
         self.fits[proposal.labels] = fit
         self.estimates[proposal.labels] = math.inf if proposal.coarse else proposal.estimate
-        if fit.faults and self._near(fit, fit.posterior.total, self.settings.near):
+        # one cause that does most of it is far behind until what stands beside it is there too
+        if fit.faults and (proposal.coarse or self._near(fit, fit.posterior.total, self.settings.near)):
             self._propose_neighbours(fit)
 
     def _near(self, fit: Fit, total: float, nats: float) -> bool:
@@ -374,15 +373,12 @@ class _Search:
     def _weighed(self) -> Comparison:
         """Probabilities among the tenable fits; among all where none is."""
         rows = list(self.fits.values())
-        tenable = [_tenable(fit, self.settings) for fit in rows]
+        tenable = frozenset(fit for fit in rows if _tenable(fit, self.settings))
         logs = np.array([self._log_probability(fit) for fit in rows])
-        counted = np.where(tenable, logs, -np.inf) if any(tenable) else logs
+        counted = np.where([fit in tenable for fit in rows], logs, -np.inf) if tenable else logs
         probabilities = np.exp(counted - logsumexp(counted))
-        order = sorted(range(len(rows)), key=lambda i: (-probabilities[i], -logs[i]))
-        return Comparison(
-            tuple(rows[i] for i in order), tuple(float(probabilities[i]) for i in order),
-            tuple(tenable[i] for i in order), self.paths,
-        )  # fmt: skip
+        order = np.lexsort((-logs, -probabilities))
+        return Comparison({rows[i]: float(probabilities[i]) for i in order}, tenable, self.paths)
 
 
 def _tenable(fit: Fit, settings: DiagnoseSettings) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from model.effects import Effect
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
-from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel
+from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.forward.nuisance import predict
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.errors import TpjbError
@@ -27,26 +27,22 @@ class Unknowns:
 
     def __init__(self, problem: Problem, faults: Sequence[Fault]) -> None:
         self.problem, self.faults = problem, tuple(faults)
-        effects = [fault for fault in faults if fault.own < 0]
-        count = len(problem.nuisances)
-        reach = np.full(count, Deciding.reach)
-        self.origin = np.concatenate([*(fault.origin for fault in effects), np.zeros(count)])
-        self.width = np.concatenate([*(fault.width for fault in effects), np.ones(count)])
-        self.low = np.concatenate([*(fault.low for fault in effects), -reach]) - self.origin
-        self.high = np.concatenate([*(fault.high for fault in effects), reach]) - self.origin
-        self.amplitudes = len(self.width) - count  #: of effects without a tolerance of their own: the first ones
+        plain = np.tile([[0.0], [1.0], [-Deciding.reach], [Deciding.reach]], len(problem.nuisances))
+        priors = np.hstack([*(fault.prior for fault in faults if fault.own < 0), plain])
+        #: of effects without a tolerance of their own: the first ones
+        self.amplitudes = priors.shape[1] - plain.shape[1]
         self.slices: list[slice] = []  #: where every fault's amplitudes are
         start = 0
         for fault in faults:
-            at = start if fault.own < 0 else self.amplitudes + fault.own
-            self.slices.append(slice(at, at + len(fault.width)))
-            if fault.own < 0:
-                start += len(fault.width)
-            else:
-                self.width[at], self.low[at], self.high[at] = fault.width[0], fault.low[0], fault.high[0]
-        taken = {fault.own for fault in faults}
+            count = len(fault.width)
+            first = start if fault.own < 0 else self.amplitudes + fault.own
+            start += count if fault.own < 0 else 0
+            self.slices.append(slice(first, first + count))
+            priors[:, self.slices[-1]] = fault.prior
+        self.origin, self.width, self.low, self.high = priors
+        stated = np.delete(np.arange(plain.shape[1]), [fault.own for fault in faults if fault.own >= 0])
         #: (t,): where tolerances with their stated prior are
-        self.tolerances = self.amplitudes + np.array([i for i in range(count) if i not in taken], dtype=int)
+        self.tolerances = self.amplitudes + stated
 
     @property
     def is_reading(self) -> list[bool]:
@@ -59,7 +55,7 @@ class Unknowns:
         values = [fault.values(amplitudes[at]) for fault, at in zip(self.faults, self.slices, strict=True)]
         return tuple(Effect(fault.name, **table) for fault, table in zip(self.faults, values, strict=True))
 
-    def predict(self, forward: ForwardModel, theta: FloatArray) -> FloatArray | None:
+    def predict(self, forward: Forward, theta: FloatArray) -> FloatArray | None:
         """Prediction in units of sigma, (n,); None where the model has no equilibrium."""
         amplitudes = theta + self.origin
         pairs = zip(self.faults, self.slices, strict=True)
@@ -71,15 +67,13 @@ class Unknowns:
             return None
 
 
-def prediction(
-    forward: ForwardModel, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray
-) -> FloatArray | None:
+def prediction(forward: Forward, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray) -> FloatArray | None:
     """Job: the prediction at a point."""
     return Unknowns(problem, faults).predict(forward, theta)
 
 
 def derivatives(
-    forward: ForwardModel, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray, indices: Sequence[int]
+    forward: Forward, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray, indices: Sequence[int]
 ) -> list[FloatArray | None]:
     """Job: derivatives of the prediction by some numbers, each from the point's own solved state, (n,) each."""
     unknowns = Unknowns(problem, faults)
@@ -94,7 +88,7 @@ def derivatives(
 
 
 def _difference(
-    forward: ForwardModel, unknowns: Unknowns, theta: FloatArray, at_point: FloatArray, moved: tuple[int, float]
+    forward: Forward, unknowns: Unknowns, theta: FloatArray, at_point: FloatArray, moved: tuple[int, float]
 ) -> FloatArray | None:
     """One difference; the other way where the first is out of bounds or has no equilibrium."""
     index, step = moved

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from model.bearing import Bearing
 from model.effects import Effect, Parameter, known_effects
 from model.effects.kind import EffectKind
+from model.setup import Setup
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.observations.constants import Deciding
 
@@ -22,13 +22,12 @@ class Candidate:
     free: tuple[Parameter, ...]
     fixed: Mapping[str, float] = field(default_factory=dict, hash=False)
     form: str = ""
-    basis: tuple[tuple[float, ...], ...] = ()
-    about: Mapping[str, float] = field(default_factory=dict, hash=False)
+    basis: tuple[tuple[float, ...], ...] = ()  #: parameters per amplitude, for several in common; one each by default
 
     @property
     def label(self) -> str:
         """Name with its fixed parameters: ``soft_pivot pad 5``."""
-        spoken = (f"{k} {v:g}" for k, v in {**self.fixed, **self.about}.items())
+        spoken = (f"{k} {v:g}" for k, v in self.fixed.items())
         return " ".join([self.name, *([self.form] if self.form else []), *spoken])
 
     @property
@@ -37,83 +36,63 @@ class Candidate:
         return self.free[0]
 
     @property
-    def origin(self) -> FloatArray:
-        """Amplitudes at which nothing happens, (k,)."""
-        if self.basis:
-            return np.zeros(len(self.basis))
-        return np.array([self.about.get(p.name, 0.0) if p.name in self.about else p.to_linear(p.neutral)
-                         for p in self.free])  # fmt: skip
+    def _leading(self) -> tuple[Parameter, ...]:
+        """The parameter whose sizes every amplitude has; those of a matrix are alike."""
+        return self.free[:1] * len(self.basis) or self.free
 
     @property
-    def width(self) -> FloatArray:
-        """Standard deviations of the prior, (k,)."""
-        width = Deciding.width * self.steps
-        if not self.basis:
-            width[[p.name in self.about for p in self.free]] = Deciding.turn
-        return width
+    def origin(self) -> FloatArray:
+        """Amplitudes at which nothing happens, (k,)."""
+        return np.array([p.to_linear(p.neutral) for p in self._leading])
 
     @property
     def steps(self) -> FloatArray:
         """Sizes that would not surprise, (k,)."""
-        if self.basis:
-            return np.full(len(self.basis), self.free[0].typical_step)
-        return np.array([0.1 if p.name in self.about else p.typical_step for p in self.free])
+        return np.array([p.typical_step for p in self._leading])
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
         """Physical bounds of the amplitudes, (k,) each."""
-        if self.basis:
-            reach = max(abs(self.free[0].low), abs(self.free[0].high))
-            return np.full(len(self.basis), -reach), np.full(len(self.basis), reach)
-        ends = np.array([sorted(p.to_linear(v) for v in (p.low, p.high)) for p in self.free])
+        ends = np.array([sorted(p.to_linear(v) for v in (p.low, p.high)) for p in self._leading])
         return ends[:, 0], ends[:, 1]
+
+    @property
+    def prior(self) -> FloatArray:
+        """Where nothing happens, standard deviations of the prior, and bounds counted from there, (4, k)."""
+        low, high = self.limits
+        return np.array([self.origin, Deciding.width * self.steps, low - self.origin, high - self.origin])
 
     @property
     def neutral(self) -> float:
         """The first of `origin`."""
         return float(self.origin[0])
 
-    @property
-    def step(self) -> float:
-        """The first of `steps`."""
-        return float(self.steps[0])
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """The first of `limits`."""
-        low, high = self.limits
-        return float(low[0]), float(high[0])
-
-    def values(self, amplitudes: FloatArray) -> dict[str, float]:
+    def values(self, amplitudes: FloatArray | float) -> dict[str, float]:
         """Parameters at amplitudes (k,), clipped to their bounds; fixed ones too."""
-        amplitudes = np.atleast_1d(np.asarray(amplitudes, float))
-        if self.basis:
-            sizes = np.asarray(self.basis).T @ amplitudes
-            table = {p.name: float(v) for p, v in zip(self.free, sizes, strict=True)}
-        else:
-            low, high = self.limits
-            inside = np.clip(amplitudes, low, high)
-            # inverse forms may round past their own bound
-            table = {p.name: min(max(p.from_linear(float(v)), p.low), p.high)
-                     for p, v in zip(self.free, inside, strict=True)}  # fmt: skip
-        return {**table, **self.fixed}
+        inside = np.clip(np.atleast_1d(np.asarray(amplitudes, float)), *self.limits)
+        sizes = np.transpose(self.basis) @ inside if self.basis else inside
+        # inverse forms may round past their own bound
+        pairs = zip(self.free, map(float, sizes), strict=True)
+        return {**{p.name: min(max(p.from_linear(v), p.low), p.high) for p, v in pairs}, **self.fixed}
 
     def effect(self, amplitudes: FloatArray | float) -> Effect:
         """Build the effect with these amplitudes (clipped to their bounds); `amplitudes` (k,)."""
-        return Effect(self.name, **self.values(np.atleast_1d(np.asarray(amplitudes, float))))
+        return Effect(self.name, **self.values(amplitudes))
 
     def refined(self) -> Candidate:
         """Return the same with its direction free beside the grid; itself where it has none."""
         if "direction" not in self.fixed:
             return self
-        kind = known_effects()[self.name]
-        direction = next(p for p in kind.parameters if p.name == "direction")
-        fixed = {k: v for k, v in self.fixed.items() if k != "direction"}
-        return replace(self, free=(*self.free, direction), fixed=fixed, about={"direction": self.fixed["direction"]})
+        fixed = dict(self.fixed)
+        about = fixed.pop("direction")
+        direction = next(p for p in known_effects()[self.name].parameters if p.name == "direction")
+        free = replace(direction, neutral=about, typical=Deciding.turn / Deciding.width)
+        return replace(self, free=(*self.free, free), fixed=fixed)
 
 
-def candidates(bearing: Bearing, skip: frozenset[str] = frozenset()) -> tuple[Candidate, ...]:
-    """List every effect of the library (registered ones too) for a bearing."""
+def candidates(setup: Setup, skip: frozenset[str] = frozenset()) -> tuple[Candidate, ...]:
+    """List every effect of the library (registered ones too) that can act on a set-up."""
+    bearing = setup.bearing
     out: list[Candidate] = []
     for kind in known_effects().values():
         if kind.name in skip or kind.missing(bearing):
@@ -121,7 +100,7 @@ def candidates(bearing: Bearing, skip: frozenset[str] = frozenset()) -> tuple[Ca
         if kind.name in TERMS:
             out += _terms(kind)
             continue
-        parameters = kind.parameters_of(len(bearing.pads))
+        parameters = [parameter.within(setup) for parameter in kind.parameters_of(len(bearing.pads))]
         free = tuple(p for p in parameters if p.neutral == p.neutral)
         choices: list[dict[str, float]] = [{}]
         for parameter in parameters:
@@ -133,9 +112,9 @@ def candidates(bearing: Bearing, skip: frozenset[str] = frozenset()) -> tuple[Ca
     return tuple(out)
 
 
-def one_amplitude(bearing: Bearing) -> tuple[Candidate, ...]:
+def one_amplitude(setup: Setup) -> tuple[Candidate, ...]:
     """Return the candidates with one amplitude each, generic terms left out: what a plan asks about."""
-    return tuple(c for c in candidates(bearing) if len(c.steps) == 1 and c.name not in TERMS)
+    return tuple(c for c in candidates(setup) if len(c.steps) == 1 and c.name not in TERMS)
 
 
 #: Generic terms beyond the library: effects with a 2 x 2 matrix as parameters.

@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -101,23 +101,9 @@ class ModelCache:
         return SolvedPoint(h, in_rig(running, equilibrium.position), force, warm, loads)
 
 
-__all__ = ["Forward", "ForwardModel", "NoEquilibriumError"]
-
 Change = Callable[[Setup], Setup]
 #: Fraction of the arc at which a pad carries its thermometer where nothing is said.
 SENSOR = 0.75
-
-
-class ForwardModel(Protocol):
-    """Anything that predicts an observation vector: the bearing model, or a surrogate of it."""
-
-    elements: tuple[Element, ...]
-
-    def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
-        """Predict with effects; see `Forward`."""
-
-    def fresh(self) -> ForwardModel:
-        """Return a copy whose answers depend on nothing that this one goes on to solve."""
 
 
 @dataclass
@@ -168,8 +154,7 @@ class Forward:
 
     @property
     def _sensors(self) -> tuple[float, ...]:
-        positions = self.layout.temperature_position
-        return (*positions, *(SENSOR for _ in range(len(self.setup.bearing.pads) - len(positions))))
+        return self.layout.temperature_position or (SENSOR,) * len(self.setup.bearing.pads)
 
     def _solve(self, setup: Setup, test: LocusTest, excitation: Sequence[float] = ()) -> SolvedPoint:
         return self.cache.ask(setup, test.point, tuple(excitation), self._sensors)

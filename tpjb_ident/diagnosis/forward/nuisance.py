@@ -7,7 +7,7 @@ viscosity, one pad that stands further out) counts only where it exceeds what is
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,10 +15,10 @@ import numpy as np
 from model.effects import Effect, kind_of
 from model.setup import Setup
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.forward.forward import ForwardModel
+from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.observations.gap import centre_shifts
-from tpjb_ident.diagnosis.observations.observe import Element
+from tpjb_ident.diagnosis.observations.observe import Element, named, places
 
 #: Step of derivatives, in standard deviations: small, so that a nuisance and the effect that does the same have the
 #: same derivative, and their curvature does not tell them apart.
@@ -46,12 +46,14 @@ OWN_NUMBERS = {
     "clearance_error": OwnNumber("assembled_clearance", "m"),
     "preload_error": OwnNumber("pad_clearance", "m"),
     "pivot_offset_error": OwnNumber("pivot_offset"),
+    "pad_arc_error": _ratio("pad_arc"),
     "heat_loss": OwnNumber(
         "film_heat",
         parameter=lambda change: 1.0 - math.exp(change),
         change=lambda value: math.log(max(1.0 - value, 1e-9)),
     ),
     "pad_offset": OwnNumber("clearance_scatter", "m", "pad"),
+    "pad_bore": OwnNumber("bore_scatter", "m", "pad"),
     "soft_pivot": _ratio("pivot_stiffness_scatter", place="pad"),
     "one_probe_gain": _ratio("probe_gain", place="probe"),
     "one_cell_gain": _ratio("cell_gain", place="cell"),
@@ -70,42 +72,35 @@ class Nuisance:
     sigma: float
     unit: str
     place: str = ""
-    change: Callable[[Setup, float], Setup] | None = None
-    #: (n,): change of the observation vector per `sigma`
+    #: (n,): change of the observation vector per `sigma`, for one that acts on readings
     column: FloatArray | None = field(default=None, repr=False, compare=False)
     effect: str = ""  #: label of the effect whose own number it is
 
-
-@dataclass(frozen=True)
-class Shift:
-    """A change of a `Setup` by nuisances of given sizes, for `Forward`."""
-
-    nuisances: tuple[Nuisance, ...]
-    size: tuple[float, ...]
-
-    def __call__(self, setup: Setup) -> Setup:
-        """Apply them one after the other."""
-        for nuisance, size in zip(self.nuisances, self.size, strict=True):
-            if nuisance.change is not None and size:
-                setup = nuisance.change(setup, size * nuisance.sigma)
-        return setup
-
     @property
-    def readings(self) -> FloatArray | float:
-        """Change of the observation vector by those that act on readings."""
-        parts = [
-            nuisance.column * s
-            for nuisance, s in zip(self.nuisances, self.size, strict=True)
-            if nuisance.column is not None
-        ]
-        return np.sum(parts, axis=0) if parts else 0.0
+    def label(self) -> str:
+        """Name with its place."""
+        return f"{self.name} {self.place}".strip()
+
+    def change(self, setup: Setup, size: float) -> Setup:
+        """Apply the effect of the size that this being off is."""
+        effect, *place = self.effect.split()
+        kind, where = kind_of(effect), {name: int(number) for name, number in zip(place[::2], place[1::2], strict=True)}
+        return kind.apply(setup, **where, **{kind.parameters[-1].name: OWN_NUMBERS[effect].parameter(size)})
+
+
+def shifted(setup: Setup, known: Sequence[Nuisance], size: Sequence[float]) -> Setup:
+    """Change a set-up by nuisances of given sizes (in standard deviations), one after the other."""
+    for nuisance, s in zip(known, size, strict=True):
+        if nuisance.column is None and s:
+            setup = nuisance.change(setup, s * nuisance.sigma)
+    return setup
 
 
 def nuisances(
     elements: Sequence[Element], setup: Setup, tolerances: Tolerances, by_pad: bool = True
 ) -> tuple[Nuisance, ...]:
     """List what may be off for an observation vector; `by_pad`: what may be off pad by pad, too."""
-    pads = np.array([e.place("pad") if e.observable == "pad_temperature" else math.nan for e in elements])
+    pads = np.where(named(elements, "family") == "temperature", places(elements, "pad"), math.nan)
     warm = sorted({int(pad) for pad in pads[np.isfinite(pads)]})
     listed = []
     for effect, own in OWN_NUMBERS.items():
@@ -113,12 +108,9 @@ def nuisances(
         count = len(setup.bearing.pads) * by_pad if own.place == "pad" else 2
         numbers = warm if reads else range(1, count + 1) if own.place else (0,)
         for number in numbers:
-            sigma, where = tolerances[own.tolerance], {own.place: number} if own.place else {}
-            change = functools.partial(_changed, effect=effect, where=where)
+            sigma, place = tolerances[own.tolerance], f"{own.place} {number}" if own.place else ""
             column = np.where(pads == number, sigma, 0.0) if reads else None
-            place = f"{own.place} {number}" if own.place else ""
-            label = f"{effect} {place}".strip()
-            listed.append(Nuisance(own.tolerance, sigma, own.unit, place, None if reads else change, column, label))
+            listed.append(Nuisance(own.tolerance, sigma, own.unit, place, column, f"{effect} {place}".strip()))
     shifts = centre_shifts(elements) * tolerances.centre
     listed += [
         Nuisance("centre", tolerances.centre, "m", letter, column=shifts[:, axis])
@@ -128,7 +120,7 @@ def nuisances(
 
 
 def at_baseline(
-    forward: ForwardModel, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
+    forward: Forward, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
 ) -> FloatArray:
     """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
     columns = []
@@ -138,15 +130,9 @@ def at_baseline(
     return np.column_stack(columns)
 
 
-def predict(
-    forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], size: FloatArray
-) -> FloatArray:
+def predict(forward: Forward, effects: Sequence[Effect], known: Sequence[Nuisance], size: FloatArray) -> FloatArray:
     """Predict with effects and with nuisances of given sizes (in standard deviations), (n,); `size` (m,)."""
-    shift = Shift(tuple(known), tuple(map(float, size)))
-    return forward(effects, shift if np.any(size) else None) + shift.readings
-
-
-def _changed(setup: Setup, change: float, effect: str, where: Mapping[str, int]) -> Setup:
-    """Apply an effect of the size that a tolerance's change is."""
-    kind = kind_of(effect)
-    return kind.apply(setup, **where, **{kind.parameters[-1].name: OWN_NUMBERS[effect].parameter(change)})
+    sizes = size.tolist()
+    change = functools.partial(shifted, known=known, size=sizes) if any(sizes) else None
+    readings = [nuisance.column * s for nuisance, s in zip(known, sizes, strict=True) if nuisance.column is not None]
+    return forward(effects, change) + np.sum(readings, axis=0)

@@ -7,12 +7,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from tpjb_ident.diagnosis.forward.forward import ForwardModel
+from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.runtime.executors import Workers, cores, local_workers
 
 #: What the workers of this process share: they are forked from it and have it from there. Sent with every job it would
 #: be megabytes of equilibria each time.
-_shared: dict[int, tuple[ForwardModel, Any]] = {}
+_shared: dict[int, tuple[Forward, Any]] = {}
 _numbers = itertools.count()
 
 
@@ -35,7 +35,7 @@ class Map:
 
 
 @contextmanager
-def workers(forward: ForwardModel, problem: Any, count: int | None = None) -> Iterator[Map]:
+def workers(forward: Forward, problem: Any, count: int | None = None) -> Iterator[Map]:
     """Open workers whose tasks get a `Forward` and what else they share as their first arguments."""
     number = next(_numbers)
     _shared[number] = (forward, problem)

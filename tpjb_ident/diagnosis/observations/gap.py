@@ -1,13 +1,48 @@
-"""Gap: the root mean square of (measured - predicted) / sigma, over everything and by observable; what scales it."""
+"""Gap: the root mean square of (measured - predicted) / sigma, over everything, by observable and held out.
+
+Held out are whole operating points to which a model must extrapolate, and which no fit has seen; not random elements:
+neighbours are near copies of each other.
+"""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
-from tpjb_ident.diagnosis.observations.observe import Element, Observations
+from tpjb_ident.diagnosis.observations.constants import Deciding
+from tpjb_ident.diagnosis.observations.observe import Element, Observations, named, places
+
+
+def held_out(observations: Observations) -> BoolArray:
+    """The top load, outer frequencies, further speeds and a sector of the locus; all where there are none, (n,)."""
+    family = named(observations.elements, "family")
+    load, direction, speed, line = (
+        places(observations.elements, name) for name in ("load", "direction", "speed", "excitation")
+    )
+    moving, still = np.isin(family, ["h", "temperature"]), np.isin(family, ["locus", "load"])
+    speeds = Counter(speed[moving].tolist())
+    usual = moving & (speed == (speeds.most_common(1)[0][0] if speeds else 0.0))
+    out = (moving & ~usual) | (still & np.isin(direction % (2 * np.pi), _sector(direction[still])))
+    swept = usual & (family == "h")
+    points = set(zip(load[swept].tolist(), direction[swept].tolist(), strict=True))
+    for weight, way in points:
+        there = (load == weight) & (direction == way)
+        lines = np.unique(line[swept & there])
+        if len(lines) >= Deciding.sweep:
+            out |= usual & there & np.isin(line, lines[[0, -1]])
+        elif len(points) > 2 and weight == load[swept].max():
+            out |= usual & there
+    return out if out.any() else ~out
+
+
+def _sector(directions: FloatArray) -> FloatArray:
+    """Neighbouring directions of a locus that are held out."""
+    around = np.unique(directions % (2 * np.pi))
+    part = Deciding.sectors * np.arange(len(around)) // max(len(around), 1) + 1
+    return np.asarray(around[part == Deciding.sector])
 
 
 def residuals(observations: Observations, prediction: FloatArray) -> FloatArray:
@@ -51,17 +86,13 @@ def gap_by_observable(
     observations: Observations, before: FloatArray, after: FloatArray, chosen: BoolArray
 ) -> dict[str, dict[str, float]]:
     """Held-out gap before and after, per observable; observables without held-out points use all of theirs."""
-    out: dict[str, dict[str, float]] = {}
-    names = np.array([e.observable for e in observations.elements])
-    for name in dict.fromkeys(names):
+    names, out = named(observations.elements, "observable"), {}
+    for name in dict.fromkeys(names.tolist()):
         selected = names == name
-        part = selected & chosen
-        key = "heldout" if part.any() else "fitted"
-        part = part if part.any() else selected
-        out[str(name)] = {
-            f"{key}_before": gap(observations, before, part),
-            f"{key}_after": gap(observations, after, part),
-        }
+        seen = bool((selected & chosen).any())
+        part, key = (selected & chosen, "heldout") if seen else (selected, "fitted")
+        ends = {"before": before, "after": after}
+        out[name] = {f"{key}_{end}": gap(observations, prediction, part) for end, prediction in ends.items()}
     return out
 
 
@@ -72,7 +103,7 @@ def gap_at(gaps: Mapping[str, float], end: str) -> float:
 
 def coordinate(elements: Sequence[Element], name: str) -> FloatArray:
     """A coordinate of every element, spread over -1 .. 1; 0 where it has none or all are alike, (n,)."""
-    values = np.array([e.place(name) for e in elements])
+    values = places(elements, name)
     finite_values = values[np.isfinite(values)]
     if len(finite_values) == 0 or np.ptp(finite_values) <= 1e-12 * max(abs(finite_values).max(), 1e-300):
         return np.zeros(len(values))
@@ -97,15 +128,13 @@ _MOST = 12
 def localise(observations: Observations, prediction: FloatArray) -> tuple[Disagreement, ...]:
     """Split the squared gap by observable and region, largest share first; `prediction` (n,)."""
     z = residuals(observations, prediction)
-    total = float(np.sum(z**2))
+    total, names = float(np.sum(z**2)), named(observations.elements, "observable")
     rows: list[Disagreement] = []
-    for name in dict.fromkeys(e.observable for e in observations.elements):
-        mine = np.array([e.observable == name for e in observations.elements])
-        for where, part in _regions(observations, mine):
+    for name in dict.fromkeys(names.tolist()):
+        for where, part in _regions(observations.elements, names == name):
             square = float(np.sum(z[part] ** 2))
             rows.append(Disagreement(name, where, math.sqrt(square / part.sum()), square / total if total else 0.0))
-    rows.sort(key=lambda d: -d.share)
-    return tuple(rows[:_MOST])
+    return tuple(sorted(rows, key=lambda d: -d.share)[:_MOST])
 
 
 #: A factor between these is the one between a radius and a diameter.
@@ -114,8 +143,7 @@ _TWICE = 1.75, 2.3
 
 def contradictions(observations: Observations, base: FloatArray) -> tuple[str, ...]:
     """What static tests say of the bearing file without any search; `base` (n,)."""
-    names = np.array([e.observable for e in observations.elements])
-    said = []
+    names, said = named(observations.elements, "observable"), []
     polygon = names == "clearance_pushed"
     if polygon.any():
         measured, drawn = float(np.mean(observations.value[polygon])), float(np.mean(base[polygon]))
@@ -136,21 +164,24 @@ def contradictions(observations: Observations, base: FloatArray) -> tuple[str, .
 _LOADS = 0.05
 
 
-def _regions(observations: Observations, mine: BoolArray):  # type: ignore[no-untyped-def]
-    """Halves of the range of the coordinate that varies most among the elements, or single pads."""
-    elements = observations.elements
-    for coordinate, unit, factor in (("pad", "", 1.0), ("load", "N", 1.0), ("direction", "deg", 180 / math.pi)):
-        values = np.array([e.place(coordinate) for e in elements])
-        levels = sorted(set(values[mine & np.isfinite(values)]))
-        if len(levels) < 2:
-            continue
-        if coordinate == "pad":
-            yield from ((f"pad {int(k)}", mine & (values == k)) for k in levels)
-        else:
+#: Coordinates by which a gap is split, in words, with the factor of their unit.
+_COORDINATES = {"load": ("static_load", "N", 1.0), "direction": ("static_load_direction", "deg", 180 / math.pi)}
+
+
+def _regions(elements: Sequence[Element], mine: BoolArray) -> Iterator[tuple[str, BoolArray]]:
+    """Single pads, or halves of the range of the coordinate that varies among the elements."""
+    pads = places(elements, "pad")
+    levels = np.unique(pads[mine & np.isfinite(pads)])
+    if len(levels) > 1:
+        yield from ((f"pad {int(k)}", mine & (pads == k)) for k in levels)
+        return
+    for coordinate, (words, unit, factor) in _COORDINATES.items():
+        values = places(elements, coordinate)
+        levels = np.unique(values[mine & np.isfinite(values)])
+        if len(levels) > 1:
             half = len(levels) // 2
             for part in (levels[:half], levels[half:]):
-                low, high = part[0] * factor, part[-1] * factor
-                name = {"load": "static_load", "direction": "static_load_direction"}[coordinate]
-                yield f"{name} {low:.0f}-{high:.0f} {unit}", mine & np.isin(values, part)
-        return
+                ends = f"{part[0] * factor:.0f}-{part[-1] * factor:.0f}"
+                yield f"{words} {ends} {unit}", mine & np.isin(values, part)
+            return
     yield "everywhere", mine

@@ -12,16 +12,15 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import coordinate
-from tpjb_ident.diagnosis.observations.observe import Element, Observations
+from tpjb_ident.diagnosis.observations.observe import Element, Observations, named, places
 
 
 def model_error(observations: Observations) -> FloatArray:
     """Covariance of the stated model tolerance in units of `total_sigma`, (n, n)."""
     share = observations.sigma / observations.total_sigma
-    families = np.array([e.family for e in observations.elements])
-    out = np.zeros_like(observations.covariance)
-    for family in dict.fromkeys(families):
-        rows = np.flatnonzero(families == family)
+    family, out = named(observations.elements, "family"), np.zeros_like(observations.covariance)
+    for name in set(family):
+        rows = np.flatnonzero(family == name)
         correlation = _correlation([observations.elements[i] for i in rows])
         out[np.ix_(rows, rows)] = correlation * np.outer(share[rows], share[rows])
     return out
@@ -29,13 +28,13 @@ def model_error(observations: Observations) -> FloatArray:
 
 def _correlation(elements: Sequence[Element]) -> FloatArray:
     """Correlation between elements of one kind: only the same observable of the same pad has any."""
-    keys = [(e.observable, e.place("pad") if e.place("pad") == e.place("pad") else 0.0) for e in elements]
-    equal = np.array([[a == b for b in keys] for a in keys], dtype=float)
-    distance = np.zeros_like(equal)
+    names, pads = named(elements, "observable"), np.nan_to_num(places(elements, "pad"))
+    equal = (names[:, None] == names) & (pads[:, None] == pads)
+    distance = np.zeros(equal.shape)
     for name in ("load", "excitation", "speed"):
         x = coordinate(elements, name)
         distance += 0.5 * (x[:, None] - x[None, :]) ** 2
-    angle = np.nan_to_num(np.array([e.place("direction") for e in elements]))
+    angle = np.nan_to_num(places(elements, "direction"))
     distance += 1.0 - np.cos(angle[:, None] - angle[None, :])
     around = elements[0].family in {"locus", "load"}
     # the constant part of a locus is its centre, which is free

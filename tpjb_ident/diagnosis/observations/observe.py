@@ -6,11 +6,12 @@ their angles), ``dry`` (tangent compliance of every pivot), ``temperature``.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from rigdata.arrays import FloatArray
@@ -81,6 +82,16 @@ class Element:
     def place(self, name: str) -> float:
         """Coordinate of the operating point; NaN where it has none."""
         return dict(self.where).get(name, math.nan)
+
+
+def places(elements: Sequence[Element], name: str) -> FloatArray:
+    """A coordinate of every element; NaN where it has none, (n,)."""
+    return np.array([e.place(name) for e in elements], dtype=float)
+
+
+def named(elements: Sequence[Element], what: str) -> NDArray[np.str_]:
+    """The ``family`` or ``observable`` of every element, (n,)."""
+    return np.array([getattr(e, what) for e in elements], dtype=np.str_)
 
 
 def _at_point(*point: float) -> Where:
@@ -160,14 +171,19 @@ def direct_scale(elements: Sequence[Element], value: FloatArray) -> FloatArray:
     return np.array([float(np.mean(sums[part])) for part in parts])
 
 
+def by_family(elements: Sequence[Element], value: FloatArray, sizes: Mapping[str, float]) -> FloatArray:
+    """A size per family or observable, shares of K and omega C in their unit, (n,)."""
+    rows = [sizes.get(e.observable, sizes.get(e.family, math.nan)) for e in elements]
+    return np.array(rows) * direct_scale(elements, value)
+
+
 def stated_sigma(elements: Sequence[Element], value: FloatArray, tolerance: Tolerance) -> FloatArray:
     """Stated model tolerance of every element, (n,)."""
-    table = {
+    sizes = {
         "h": tolerance.stiffness, "temperature": tolerance.temperature, "locus": tolerance.position,
-        "load": tolerance.load, "dry": tolerance.dry, "clearance": tolerance.position,
+        "load": tolerance.load, "dry": tolerance.dry, "clearance": tolerance.position, "side_angle": tolerance.angle,
     }  # fmt: skip
-    rows = [tolerance.angle if e.observable == "side_angle" else table[e.family] for e in elements]
-    return np.array(rows) * direct_scale(elements, value)
+    return by_family(elements, value, sizes)
 
 
 @dataclass
@@ -177,7 +193,6 @@ class _Builder:
     covariance: list[FloatArray] = field(default_factory=list)
 
     def add(self, elements: Sequence[Element], value: FloatArray, covariance: FloatArray) -> None:
-        value = np.atleast_1d(value)
         finite = np.isfinite(value) & np.isfinite(np.diag(covariance))
         self.value += list(value[finite])
         self.elements += [e for e, k in zip(elements, finite, strict=True) if k]

@@ -1,7 +1,7 @@
 """Behaviour: what lies beyond the library, in few numbers, and what of the library drifts.
 
-A spring in series, a parallel stiffness or damping; a pad whose clearance or whose pivot is further off than stated; an
-amplitude that is not the same at every load, speed and frequency.
+A spring in series, a parallel stiffness or damping; a pad whose clearance, bore or pivot is further off than stated;
+an amplitude that is not the same at every load, speed and frequency.
 """
 
 import math
@@ -9,16 +9,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from model.effects import kind_of
 from rigdata.arrays import FloatArray
+from tpjb_ident.compare.effect_words import Estimate, finding
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Fault
+from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS
 from tpjb_ident.diagnosis.observations.constants import Deciding
+from tpjb_ident.diagnosis.observations.observe import named, places
 
-#: What a pad by itself may be off by: kind, effect and parameter that say it, unit.
-_PADS = {
-    "clearance_scatter": ("clearance by pad", "pad_offset", "radial_offset", "m"),
-    "pivot_stiffness_scatter": ("pivot law of a pad", "soft_pivot", "stiffness_factor", "1"),
+#: What a pad by itself may be off by: the effect that says it, and the kind of behaviour.
+_PADS = {"pad_offset": "clearance by pad", "pad_bore": "bore of a pad", "soft_pivot": "pivot law of a pad"}
+#: What a generic term is: noun, unit and place.
+_TERMS = {
+    "series_compliance": ("a spring", "N/m", "between bearing and probes"),
+    "parallel_stiffness": ("a stiffness", "N/m", "beside the bearing"),
+    "parallel_damping": ("a damping", "N s/m", "beside the bearing"),
 }
 
 
@@ -50,29 +57,27 @@ def behaviours(fit: Fit) -> tuple[Behaviour, ...]:
 
 
 def _pads(fit: Fit) -> list[Behaviour]:
-    """Pads whose clearance or pivot is off by more than `visible` standard deviations of what is stated."""
-    nuisances = {f"{n.name} {n.place}".strip(): n for n in fit.problem.nuisances}
+    """Pads of which a number is off by more than `visible` standard deviations of what is stated."""
+    nuisances = {n.label: n for n in fit.problem.nuisances if n.effect.partition(" ")[0] in _PADS}
     out = []
     for deviation in fit.tolerances:
         nuisance = nuisances.get(deviation.name)
-        if nuisance is None or nuisance.name not in _PADS or abs(deviation.significance) < Deciding.visible:
+        if nuisance is None or abs(deviation.significance) < Deciding.visible:
             continue
-        pad, change = int(nuisance.place.split()[-1]), deviation.size * nuisance.sigma
-        spread = math.sqrt(max(1.0 - deviation.heard, 0.0)) / abs(deviation.size)
-        kind, effect, parameter, unit = _PADS[nuisance.name]
-        if effect == "pad_offset":
-            size, words = change, f"pad #{pad} stands {1e6 * change:+.1f} um from where the drawing has it"
-        else:
-            size = math.exp(change)
-            words = f"the pivot of pad #{pad} has {100 * size:.0f} % of the stiffness that its law says"
-        parameters = {"pad": float(pad), parameter: size}
-        out.append(Behaviour(kind, size, unit, None, spread, words, effect, parameters))
+        effect, _, number = nuisance.effect.split()
+        own, pad = OWN_NUMBERS[effect], float(number)
+        error = math.sqrt(max(1.0 - deviation.heard, 0.0))
+        size, low, high = (own.parameter((deviation.size + k * error) * nuisance.sigma) for k in (0.0, -1.96, 1.96))
+        parameter = kind_of(effect).parameters[-1]
+        estimate = Estimate(size, low, high, parameter.unit)
+        words = finding(effect, {"pad": Estimate(pad, pad, pad), parameter.name: estimate})
+        spread, parameters = error / abs(deviation.size), {"pad": pad, parameter.name: size}
+        out.append(Behaviour(_PADS[effect], size, parameter.unit, None, spread, words, effect, parameters))
     return out
 
 
 def _described(name: str, form: str, matrix: FloatArray, spread: float, values: dict[str, float]) -> Behaviour:
-    kind = name.replace("_", " ")
-    unit = "N s/m" if name == "parallel_damping" else "N/m"
+    noun, unit, place = _TERMS[name]
     direction: float | None = None
     if form == "cross-coupled":
         size, how = float(matrix[0, 1]), "cross-coupled"
@@ -81,19 +86,15 @@ def _described(name: str, form: str, matrix: FloatArray, spread: float, values: 
     else:
         sizes, axes = np.linalg.eigh(0.5 * (matrix + matrix.T))
         first = int(np.argmax(np.abs(sizes)))
-        size = float(sizes[first])
-        angle = math.degrees(math.atan2(axes[1, first], axes[0, first]))
-        direction = (angle + 90.0) % 180.0 - 90.0
-        second = float(sizes[1 - first])
+        size, second = float(sizes[first]), float(sizes[1 - first])
+        direction = (math.degrees(math.atan2(axes[1, first], axes[0, first])) + 90.0) % 180.0 - 90.0
         how = f"in one direction, {direction:.0f} deg"
         if abs(second) > Deciding.one_way * abs(size):
             how = f"unequal: {direction:.0f} deg and, {second / size:.2f} times as much, across"
     if name == "series_compliance":
         size = 1.0 / size if size else math.inf
-    noun = {"series_compliance": "a spring", "parallel_stiffness": "a stiffness", "parallel_damping": "a damping"}[name]
-    place = "between bearing and probes" if name == "series_compliance" else "beside the bearing"
     words = f"{noun} of {size:.3g} {unit} {how}, {place}"
-    return Behaviour(kind, size, unit, direction, spread, words, name, values)
+    return Behaviour(name.replace("_", " "), size, unit, direction, spread, words, name, values)
 
 
 @dataclass(frozen=True)
@@ -130,41 +131,30 @@ def _over(fit: Fit, fault: Fault, index: int, row: tuple[str, str, int]) -> tupl
     """Rise of the log evidence where an amplitude may grow over a coordinate, and how it does."""
     name, coordinate, levels = row
     elements = fit.problem.observations.elements
-    places = np.array([abs(e.place(coordinate)) if e.family in {"h", "temperature"} else math.nan for e in elements])
-    finite_values = sorted(set(places[np.isfinite(places)]))
+    moving = np.isin(named(elements, "family"), ["h", "temperature"])
+    where = np.where(moving, np.abs(places(elements, coordinate)), math.nan)
+    finite_values = np.unique(where[np.isfinite(where)]).tolist()
     if len(finite_values) < levels:
         return None
     middle = float(np.mean(finite_values))
-    slope = np.nan_to_num(places / middle - 1.0)
-    linear, moved = fit.linear, float(fit.posterior.mean[index])
+    slope = np.nan_to_num(where / middle - 1.0)
+    linear, moved, errors = fit.linear, float(fit.posterior.mean[index]), fit.problem.errors
     # per unit of relative growth; a prior of one: up to twice, down to nothing
-    column = linear.jacobian[:, index] * slope * moved
     wider = Linear(
-        linear.residual, np.append(linear.theta, 0.0), np.column_stack([linear.jacobian, column]),
-        np.append(linear.width, 1.0),
+        linear.residual, np.append(linear.theta, 0.0),
+        np.column_stack([linear.jacobian, linear.jacobian[:, index] * slope * moved]), np.append(linear.width, 1.0),
     )  # fmt: skip
-    state = posterior(fit.problem.errors, wider)
-    plain = posterior(fit.problem.errors, linear)
-    growth = float(state.mean[-1])
-    ends = [
-        _value(fault, index, fit, moved * (1.0 + growth * (v / middle - 1.0)))
-        for v in finite_values[:: len(finite_values) - 1]
-    ]
-    size = abs(ends[1] - ends[0]) / max(abs(ends[0]), abs(ends[1]), 1e-300)
-    if size < Deciding.same:
+    state = posterior(errors, wider)
+    at, first = fit.unknowns.slices[fit.faults.index(fault)], fault.candidate.parameter.name
+    ends = []
+    for level in (finite_values[0], finite_values[-1]):
+        amplitudes = fit.posterior.mean[at].copy()
+        amplitudes[0] = moved * (1.0 + float(state.mean[-1]) * (level / middle - 1.0))
+        ends.append(fault.values(amplitudes + fit.unknowns.origin[at])[first])
+    if abs(ends[1] - ends[0]) < Deciding.same * max(*map(abs, ends), 1e-300):
         return None
-    parameter = fault.candidate.free[0]
-    words = _words(ends, finite_values, name)
-    rise = state.promised - plain.promised
-    return rise, Drift(fault.label, parameter.name, name, ends[0], ends[1], words)
-
-
-def _value(fault: Fault, index: int, fit: Fit, amplitude: float) -> float:
-    """The fault's first parameter at an amplitude counted from where nothing happens."""
-    at = next(s for s in fit.unknowns.slices if s.start == index)
-    amplitudes = fit.posterior.mean[at] + fault.origin
-    amplitudes[0] = amplitude + fault.origin[0]
-    return fault.values(amplitudes)[fault.candidate.free[0].name]
+    rise = state.promised - posterior(errors, linear).promised
+    return rise, Drift(fault.label, first, name, ends[0], ends[1], _words(ends, finite_values, name))
 
 
 def _words(ends: list[float], known: list[float], over: str) -> str:

@@ -1,6 +1,7 @@
 """Decide: from a comparison to a verdict with everything that it rests on."""
 
 import math
+from collections import defaultdict
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,13 +13,13 @@ from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.search import Comparison
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
+from tpjb_ident.diagnosis.forward.nuisance import Nuisance
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import contradictions, gap, gap_by_observable, localise, noise_floor
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.verdict.behaviour import behaviours
-from tpjb_ident.diagnosis.verdict.held_out import free_gap, free_prediction
+from tpjb_ident.diagnosis.verdict.held_out import as_stated, free_gap, free_prediction
 from tpjb_ident.diagnosis.verdict.rules import Judgement, judge
 from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
 
@@ -62,13 +63,13 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
     """Turn a comparison into a verdict."""
     observations, rows = problem.observations, problem.held
     judgement = judge(run, comparison, settings)
-    effects, held = _effects(comparison, judgement) if judgement.has_effects else (), judgement.held
+    held, model = judgement.held, judgement.held.fit
+    effects = _effects(comparison, judgement) if judgement.has_effects else ()
     after = unseen = problem.base
     if effects and held.stated is not None:
-        (exact,) = tuple(run(_exact, [(effects,)]))
-        unseen = held.stated
+        unseen, exact = held.stated, as_stated(run, model, model.posterior.mean)
         after = unseen if exact is None else exact
-    model, heldout_after = held.fit, gap(observations, unseen, rows)
+    heldout_after = gap(observations, unseen, rows)
     worst = localise(observations, free_prediction(model))
     verdict = Verdict(
         verdict=judgement.name,
@@ -103,14 +104,6 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
     return Decision(verdict, model, after)
 
 
-def _exact(forward: Forward, problem: Problem, effects: tuple[FoundEffect, ...]) -> FloatArray | None:
-    """Job: the prediction with exactly the effects listed; None where it has no equilibrium."""
-    try:
-        return forward([effect.effect for effect in effects])
-    except NoEquilibriumError:
-        return None
-
-
 def _effects(comparison: Comparison, judgement: Judgement) -> tuple[FoundEffect, ...]:
     """The effects of the model, the largest change of the prediction first."""
     fit, shares = judgement.held.fit, comparison.shares
@@ -128,40 +121,41 @@ def _effects(comparison: Comparison, judgement: Judgement) -> tuple[FoundEffect,
 def parameters_of(fit: Fit, index: int) -> dict[str, Estimate]:
     """Parameters of one fault of a fit with their 95 % intervals."""
     fault, amplitudes = fit.faults[index], fit.amplitudes[index]
-    value, out = fault.values(amplitudes), {}
-    steps = 1.96 * np.diag(fit.errors[index])
-    ends = [[fault.values(amplitudes + sign * step) for sign in (-1.0, 1.0)] for step in steps]
-    for parameter in fault.candidate.free:
-        size = value[parameter.name]
-        moved = np.array([[end[parameter.name] for end in pair] for pair in ends]) - size
-        below, above = np.linalg.norm(moved.min(axis=1)), np.linalg.norm(moved.max(axis=1))
-        out[parameter.name] = Estimate(size, size - float(below), size + float(above), parameter.unit)
+    free = fault.candidate.free
+
+    def sizes(at: FloatArray) -> FloatArray:
+        values = fault.values(at)
+        return np.array([values[parameter.name] for parameter in free])
+
+    value, steps = sizes(amplitudes), 1.96 * np.diag(fit.errors[index])
+    ends = np.array([[sizes(amplitudes - step), sizes(amplitudes + step)] for step in steps]) - value
+    below, above = (np.linalg.norm(end, axis=0) for end in (ends.min(axis=1), ends.max(axis=1)))
+    rows = zip(free, value.tolist(), (value - below).tolist(), (value + above).tolist(), strict=True)
+    out = {parameter.name: Estimate(size, low, high, parameter.unit) for parameter, size, low, high in rows}
     for name, fixed in fault.candidate.fixed.items():
-        unit = next((p.unit for p in kind_of(fault.name).parameters if p.name == name), "1")
-        out[name] = Estimate(fixed, fixed, fixed, "1" if unit == "pad" else unit)
+        units = {parameter.name: parameter.unit for parameter in kind_of(fault.name).parameters}
+        out[name] = Estimate(fixed, fixed, fixed, units[name].replace("pad", "1"))
     return out
 
 
 def _below_floor(problem: Problem, comparison: Comparison, settings: DiagnoseSettings) -> tuple[str, ...]:
     """Effects that this campaign could not have seen at a typical size."""
     paths = [path for path in comparison.paths if not path.fault.is_term]
-    rows = [problem.sigma * (path.neutral_slope @ path.fault.width) for path in paths]
-    typical = np.reshape(rows, (-1, len(problem.sigma))).T
-    white = np.linalg.solve(usual_factor(problem.observations, problem.columns), typical / settings.width)
-    sizes: dict[str, float] = {}
-    for path, size in zip(paths, np.linalg.norm(white, axis=0), strict=True):
-        sizes[path.fault.name] = max(sizes.get(path.fault.name, 0.0), float(size))
-    beyond = [d.name for d in comparison.best.tolerances if abs(d.significance) > settings.visible]
-    far = {n.effect.split()[0] for n in problem.nuisances if f"{n.name} {n.place}".strip() in beyond and n.effect}
-    names = comparison.best.names | far
-    return tuple(sorted(name for name, size in sizes.items() if size < settings.visible and name not in names))
+    typical = [problem.sigma * (path.neutral_slope @ path.fault.width) / settings.width for path in paths]
+    factor = usual_factor(problem.observations, problem.columns)
+    white = np.linalg.solve(factor, np.reshape(typical, (-1, len(factor))).T)
+    seen = np.linalg.norm(white, axis=0) >= settings.visible
+    names, best = [path.fault.name for path in paths], comparison.best
+    beyond = {d.name for d in best.tolerances if abs(d.significance) > settings.visible}
+    told = {n.effect.split()[0] for n in problem.nuisances if n.label in beyond and n.effect} | best.names
+    return tuple(sorted({*names} - {name for name, is_seen in zip(names, seen, strict=True) if is_seen} - told))
 
 
 def _ranked(comparison: Comparison) -> tuple[RankedCandidate, ...]:
     """The most probable explanations with their sizes; score: log evidence beside no fault at all."""
     rest = comparison.nothing.posterior.total
     out = []
-    for fit, probability in zip(comparison.fits, comparison.probabilities, strict=True):
+    for fit, probability in comparison.probabilities.items():
         if fit.faults:
             parameters = {
                 fault.label: {k: vars(p) for k, p in parameters_of(fit, i).items()}
@@ -174,21 +168,16 @@ def _ranked(comparison: Comparison) -> tuple[RankedCandidate, ...]:
 
 def _assumptions(problem: Problem, fit: Fit, settings: DiagnoseSettings) -> tuple[Assumption, ...]:
     """Every tolerance that took part, with what the fit made of it, and how far out its farthest number is."""
-    farthest: dict[str, float] = {}
-    for deviation in fit.tolerances:
-        farthest.setdefault(deviation.name.split(" ")[0], deviation.significance)
-    fitted: dict[str, list[float]] = {}
-    units: dict[str, tuple[float, str]] = {}
+    farthest = {d.name.split(" ")[0]: d.significance for d in reversed(fit.tolerances)}
+    tolerances, fitted = settings.tolerances.stated, defaultdict[Nuisance, list[float]](list)
+    firsts: dict[str, Nuisance] = {}
     for nuisance, size in zip(problem.nuisances, fit.sizes, strict=True):
-        fitted.setdefault(nuisance.name, []).append(float(size * nuisance.sigma))
-        units[nuisance.name] = nuisance.sigma, nuisance.unit
-    tolerances = settings.tolerances.stated
+        fitted[firsts.setdefault(nuisance.name, nuisance)].append(float(size * nuisance.sigma))
     out = []
-    for name, values in fitted.items():
-        sigma, unit = units[name]
-        source = tolerances[name].source if name in tolerances else "default"
+    for first, values in fitted.items():
+        source = tolerances[first.name].source if first.name in tolerances else "default"
         value = values if len(values) > 1 else values[0]
-        out.append(Assumption(name, sigma, value, unit, source, farthest.get(name, 0.0)))
+        out.append(Assumption(first.name, first.sigma, value, first.unit, source, farthest.get(first.name, 0.0)))
     stated = settings.tolerance.stiffness
     learnt = stated * fit.posterior.scale
     return (*out, Assumption("model", stated, learnt, "1", tolerances["model"].source))

@@ -80,18 +80,31 @@ def _share(after: float, before: float, floor: float) -> float:
 
 def held_out_gap(run: Map, fit: Fit) -> HeldOut:
     """Solve a model with amplitudes from all other points, without its generic terms, every tolerance as stated."""
-    unknowns = fit.unknowns
-    theta = np.clip(_from_others(fit), unknowns.low, unknowns.high)
-    parts = list(zip(fit.faults, unknowns.slices, strict=True))
-    known = [(fault, at) for fault, at in parts if not fault.is_term]
-    there = _neutral(theta, *(at for fault, at in parts if fault.is_term))
-    places = [_neutral(there, unknowns.tolerances), there, *(_neutral(there, at) for _, at in known)]
-    stated, whole, *partial = run(prediction, [(fit.faults, place) for place in places])
+    theta = _from_others(fit)
+    stated = as_stated(run, fit, theta)
     if stated is None:
         return HeldOut(fit, None)
+    there, known = _without_terms(fit, theta)
+    places = [there, *(_neutral(there, at) for _, at in known)]
+    whole, *partial = run(prediction, [(fit.faults, place) for place in places])
     moved = [] if any(one is None for one in (whole, *partial)) else zip(known, partial, strict=True)
-    touched = [_touched(fit, theta, fault, (part, whole)) for (fault, _), part in moved]
-    return HeldOut(fit, stated * fit.problem.sigma, tuple(sorted(touched, key=lambda one: -one.remaining)))
+    touched = [_touched(fit, there, fault, (part, whole)) for (fault, _), part in moved]
+    return HeldOut(fit, stated, tuple(sorted(touched, key=lambda one: -one.remaining)))
+
+
+def as_stated(run: Map, fit: Fit, theta: FloatArray) -> FloatArray | None:
+    """What the faults of a fit predict alone, every tolerance as stated, SI, (n,); None: no equilibrium."""
+    there = _neutral(_without_terms(fit, theta)[0], fit.unknowns.tolerances)
+    (stated,) = run(prediction, [(fit.faults, there)])
+    return None if stated is None else np.asarray(stated * fit.problem.sigma)
+
+
+def _without_terms(fit: Fit, theta: FloatArray) -> tuple[FloatArray, list[tuple[Fault, slice]]]:
+    """Free numbers within their bounds without generic terms, (k,), and where the other faults' are."""
+    parts = list(zip(fit.faults, fit.unknowns.slices, strict=True))
+    inside = np.clip(theta, fit.unknowns.low, fit.unknowns.high)
+    terms = [at for fault, at in parts if fault.is_term]
+    return _neutral(inside, *terms), [part for part in parts if not part[0].is_term]
 
 
 def _neutral(theta: FloatArray, *parts: slice | IntArray) -> FloatArray:

@@ -1,5 +1,6 @@
 """Rules: what a comparison says, in their order. Constants and what set them: `settings.DiagnoseSettings`."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from tpjb_ident.diagnosis.comparison.fit import Fit
@@ -30,32 +31,35 @@ class Judgement:
 def judge(run: Map, comparison: Comparison, settings: DiagnoseSettings) -> Judgement:
     """Apply the rules in their order."""
     nothing = comparison.nothing
-    chance = comparison.probability(nothing)
     held = held_out_gap(run, nothing)
-    if held.before <= settings.quiet or (comparison.is_tenable(nothing) and chance >= settings.nothing):
+    likely = nothing in comparison.tenable and comparison.probabilities[nothing] >= settings.nothing
+    if held.before <= settings.quiet or likely:
         return _without_effects(held, settings)
     sure = frozenset(name for name, share in comparison.shares.items() if share >= settings.included)
     model = _exactly(comparison, sure, settings) or comparison.best
-    held = held_out_gap(run, model)
-    judgement = _of_model(comparison, model, sure, held, settings)
-    return replace(judgement, drift=drifts(model, settings.drifting)) if model.faults else judgement
+    held, drift = held_out_gap(run, model), drifts(model, settings.drifting)
+    return replace(_of_model(comparison, sure, held, drift, settings), drift=drift)
 
 
 def _of_model(
-    comparison: Comparison, model: Fit, sure: frozenset[str], held: HeldOut, settings: DiagnoseSettings
+    comparison: Comparison, sure: frozenset[str], held: HeldOut, drift: Sequence[Drift], settings: DiagnoseSettings
 ) -> Judgement:
     """What is said of the model that counts: the one with exactly the sure names, or the most probable one."""
+    model = held.fit
     if model.needs_more(settings):
         reason = (
             f"the best explanation ({model.label}) leaves a model error of {model.posterior.scale:.2f} times the "
             f"stated one; right ones need {settings.right:g} at the most"
         )
-        return Judgement("unexplained", held, (reason,))
-    if not comparison.is_tenable(model):
-        return Judgement("unexplained", held, (_untenable(model),))
-    if model.names != sure:
-        return look_alikes(model, held, _family(comparison, sure, settings))
-    return _named(model, held, settings)
+    elif model not in comparison.tenable:
+        reason = _untenable(model)
+    elif model.names != sure:
+        return look_alikes(held, _family(comparison, sure, settings))
+    elif model.faults and all(fault.is_term for fault in model.faults):
+        reason = "what describes it is a term that no effect of the library stands for"
+    else:
+        return _named(held, drift, settings)
+    return Judgement("unexplained", held, (reason,))
 
 
 def _without_effects(held: HeldOut, settings: DiagnoseSettings) -> Judgement:
@@ -72,8 +76,8 @@ def _without_effects(held: HeldOut, settings: DiagnoseSettings) -> Judgement:
 
 def _exactly(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSettings) -> Fit | None:
     """The most probable tenable fit with exactly these names, unless it is as sure that one of a few stands beside."""
-    fit = next((f for f in comparison.fits if sure and f.names == sure and comparison.is_tenable(f)), None)
-    beside = fit is not None and comparison.probability(fit) <= 1.0 - settings.included
+    fit = next((f for f in comparison.fits if sure and f.names == sure and f in comparison.tenable), None)
+    beside = fit is not None and comparison.probabilities[fit] <= 1.0 - settings.included
     return None if beside and _family(comparison, sure, settings) else fit
 
 
@@ -87,27 +91,24 @@ def _family(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSett
     return ()
 
 
-def look_alikes(model: Fit, held: HeldOut, family: tuple[str, ...]) -> Judgement:
+def look_alikes(held: HeldOut, family: tuple[str, ...]) -> Judgement:
     """The most probable model with what a campaign cannot tell from it, which sentences count from the second on."""
-    if not family or model.has_terms:
+    if not family or held.fit.has_terms:
         reason = "no effect, and no group of three, reaches the probability that a name takes"
         return Judgement("unexplained", held, (reason,))
-    listed_first = tuple(sorted(family, key=lambda name: name not in model.names))
+    listed_first = tuple(sorted(family, key=lambda name: name not in held.fit.names))
     return Judgement("ambiguous", held, (_shrunk(held),), listed_first)
 
 
-def _named(model: Fit, held: HeldOut, settings: DiagnoseSettings) -> Judgement:
+def _named(held: HeldOut, drift: Sequence[Drift], settings: DiagnoseSettings) -> Judgement:
     """Named where each effect halves the gap along what it moves, and no effect changes over the operating range."""
-    if model.has_terms and all(fault.is_term for fault in model.faults):
-        reason = "what describes it is a term that no effect of the library stands for"
-        return Judgement("unexplained", held, (reason,))
-    drift = drifts(model, settings.drifting)
-    if held.is_shrunk(settings) and not (drift or model.has_terms):
+    terms = held.fit.has_terms
+    if held.is_shrunk(settings) and not (drift or terms):
         return Judgement("named", held, (_shrunk(held),))
     reason = f"{_shrunk(held)}: a name leaves half of the first above noise at the most, and the second no larger"
     if drift:
         reason = f"the size of {drift[0].effect} {drift[0].words}, so its name is not the whole story"
-    if model.has_terms:
+    if terms:
         reason = f"{_shrunk(held)}; beside it stands a term that no effect of the library stands for"
     partly = held.remaining(held.free) <= settings.rest
     return Judgement("partly-explained" if partly else "unexplained", held, (reason,))

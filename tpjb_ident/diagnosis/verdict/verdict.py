@@ -1,6 +1,7 @@
 """Verdict: what a diagnosis says, and nothing that it cannot say."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
@@ -124,14 +125,12 @@ class Verdict:
         counted = ['counted_from = "measured pivots"'] if from_measured else []
         lines = ['schema = "tpjb-effects/1"', *counted, ""]
         for effect in before:
-            values = [f"{k} = {v!r}" for k, v in effect.parameters.items()]
-            lines += ["[[effects]]", f'name = "{effect.name}"', *values, ""]
+            lines += _table(effect.name, effect.parameters)
         for e in self.effects:
             kind = kind_of(e.name)
-            lines += ["[[effects]]", f'name = "{e.name}"']
-            lines += [f"{k} = {p.value!r}  # 95 %: {p.lo:.6g} to {p.hi:.6g} {p.unit}" for k, p in e.parameters.items()]
-            lines += [f"# prior: {p.name} {p.low:g} to {p.high:g} {p.unit}" for p in kind.parameters]
-            lines += [f"# {kind.source}", *([f"# {e.stands_in}"] if e.stands_in else []), ""]
+            ends = [f"{name}, 95 %: {p.lo:.6g} to {p.hi:.6g} {p.unit}" for name, p in e.parameters.items()]
+            prior = [f"prior: {p.name} {p.low:g} to {p.high:g} {p.unit}" for p in kind.parameters]
+            lines += _table(e.name, e.effect.parameters, *ends, *prior, kind.source, e.stands_in)
         return "\n".join(lines)
 
     def terms_toml(self, before: tuple[Effect, ...] = (), from_measured: bool = False) -> str:
@@ -144,6 +143,11 @@ class Verdict:
         """
         lines = [self.effects_toml(before, from_measured)]
         for b in self.behaves_like:
-            values = [f"{k} = {v!r}" for k, v in b.parameters.items()]
-            lines += ["[[effects]]", f'name = "{b.effect}"', *values, f"# {b.words}", ""]
+            lines += _table(b.effect, b.parameters, b.words)
         return "\n".join(lines)
+
+
+def _table(name: str, values: Mapping[str, float], *comments: str) -> list[str]:
+    """One effect of an effects file, with what is said of it."""
+    said = [f"# {comment}" for comment in comments if comment]
+    return ["[[effects]]", f'name = "{name}"', *(f"{key} = {value!r}" for key, value in values.items()), *said, ""]
