@@ -29,6 +29,13 @@ def test_the_command_line_wins_over_the_bearing_file_and_that_over_defaults():
     assert (found["film_heat"], found.stated["film_heat"].source) == (DEFAULTS["film_heat"][0], "default")
 
 
+def test_a_bearing_file_states_every_tolerance():
+    texts = {"ratio": "2 %", "length": "3 um", "temperature difference": "1 K"}
+    lines = [f'{name} = "{texts[dimension]}"' for name, (_, dimension) in DEFAULTS.items()]
+    stated = Tolerances().layered(bearing_with("\n".join(lines))).stated
+    assert {tolerance.source for tolerance in stated.values()} == {"bearing file"}
+
+
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [("viscosty", "4 %", "viscosity"), ("viscosity", "4 um", "ratio"), ("viscosity", "-4 %", "zero or more")],

@@ -144,8 +144,9 @@ def points_of(given: Mapping[str, Any]) -> list[OperatingPoint]:
         if name not in given and name != "load_direction":
             raise ArgumentError(f"points: {name} is missing. Give load, speed and excitation.")
         value = given.get(name, -math.pi / 2)
-        lists[name] = np.atleast_1d(np.asarray(to_si(value, dimension, f"points: {name}"), dtype=float))
-    return [OperatingPoint(*map(float, point)) for point in itertools.product(*lists.values())]
+        lists[name] = np.atleast_1d(np.asarray(to_si(value, dimension, f"points: {name}"), dtype=float)).tolist()
+    every = itertools.product(*lists.values())
+    return [OperatingPoint(load, angle, speed, line) for load, angle, speed, line in every]
 
 
 def planned_layout(bearing: Bearing, points: Sequence[OperatingPoint], static: tuple[int, bool, float, bool]) -> Layout:

@@ -16,7 +16,7 @@ import numpy as np
 from model.setup import Setup
 from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnosis.comparison.scores import separations
-from tpjb_ident.diagnosis.forward.candidates import Candidate, one_amplitude
+from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate, candidates
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
@@ -131,7 +131,8 @@ class _Signatures:
 
 def _shown(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None) -> _Signatures:
     """Work out the signature of every candidate on a layout."""
-    chosen = tuple(pool if pool is not None else one_amplitude(setup))
+    everything = [c for c in candidates(setup) if len(c.steps) == 1 and c.name not in TERMS]
+    chosen = tuple(everything if pool is None else pool)
     observations = planned_observations(setup, layout)
     forward = Forward(setup, layout, observations.elements)
     base = forward()

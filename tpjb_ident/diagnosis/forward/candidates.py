@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -101,20 +103,12 @@ def candidates(setup: Setup, skip: frozenset[str] = frozenset()) -> tuple[Candid
             out += _terms(kind)
             continue
         parameters = [parameter.within(setup) for parameter in kind.parameters_of(len(bearing.pads))]
-        free = tuple(p for p in parameters if p.neutral == p.neutral)
-        choices: list[dict[str, float]] = [{}]
-        for parameter in parameters:
-            if parameter.neutral == parameter.neutral:
-                continue
-            options = range(1, len(bearing.pads) + 1) if parameter.discrete else parameter.options
-            choices = [{**c, parameter.name: v} for c in choices for v in options]
-        out += [Candidate(kind.name, free, c) for c in choices]
+        free = tuple(p for p in parameters if not math.isnan(p.neutral))
+        pads = range(1, len(bearing.pads) + 1)
+        places = {p.name: pads if p.discrete else p.options for p in parameters if math.isnan(p.neutral)}
+        for chosen in itertools.product(*places.values()):
+            out.append(Candidate(kind.name, free, dict(zip(places, chosen, strict=True))))
     return tuple(out)
-
-
-def one_amplitude(setup: Setup) -> tuple[Candidate, ...]:
-    """Return the candidates with one amplitude each, generic terms left out: what a plan asks about."""
-    return tuple(c for c in candidates(setup) if len(c.steps) == 1 and c.name not in TERMS)
 
 
 #: Generic terms beyond the library: effects with a 2 x 2 matrix as parameters.

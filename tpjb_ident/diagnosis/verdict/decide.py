@@ -15,7 +15,6 @@ from tpjb_ident.diagnosis.comparison.search import Comparison
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.nuisance import Nuisance
 from tpjb_ident.diagnosis.forward.workers import Map
-from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import contradictions, gap, gap_by_observable, localise, noise_floor
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.verdict.behaviour import behaviours
@@ -33,9 +32,8 @@ _RANGES = {
 
 def _stands_in(fault: Fault, value: Estimate) -> str:
     """What to say of a size that lies wholly beyond what its source allows; empty where it does not."""
-    parameter = fault.candidate.parameter
-    origin, reach = parameter.to_linear(parameter.neutral), Deciding.width * parameter.typical_step
-    ends = sorted(parameter.from_linear(origin + sign * reach) for sign in (-1.0, 1.0))
+    parameter, (neutral, width, _, _) = fault.candidate.parameter, fault.candidate.prior[:, 0].tolist()
+    ends = sorted(parameter.from_linear(end) for end in (neutral - width, neutral + width))
     low, high = _RANGES.get(fault.name, (max(ends[0], parameter.low), min(ends[1], parameter.high)))
     if value.lo <= high and value.hi >= low:
         return ""
