@@ -1,7 +1,6 @@
 """Pads, shaft and housing that stand otherwise than drawn."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +9,7 @@ from model.bearing import Pad
 from model.effects.kind import DIRECTION, PAD, Parameter, effect_on
 from model.setup import Setup
 
-
-def _least(name: str) -> Callable[[Setup], float]:
-    """The smallest of a number that every pad has: no change takes more away."""
-    return lambda setup: min(getattr(pad, name) for pad in setup.bearing.pads)
-
-
-_CLEARANCE, _BORE = _least("assembled_clearance"), _least("pad_clearance")
+_BORE = Parameter("pad_clearance_change", "m", "length", 0.0, -0.0001, 0.0002, 1.2e-05)
 
 
 def _moved(setup: Setup, name: str, change: float, number: int | None = None) -> Setup:
@@ -31,13 +24,10 @@ def _moved(setup: Setup, name: str, change: float, number: int | None = None) ->
 @effect_on(
     "bearing",
     PAD,
-    Parameter("radial_offset", "m", "length", 0.0, -6e-05, 6e-05, 1e-05, most_missing=_CLEARANCE),
+    Parameter("radial_offset", "m", "length", 0.0, -6e-05, 6e-05, 1e-05),
     source="Machining tolerance; the paper explains an irregular clearance polygon so (Fig. 14)",
     finding="{pad} stands {radial_offset:size} too far {radial_offset:out|in}",
-    physics=(
-        "The assembled clearance of one pad differs from the drawing. Its film is thicker or thinner than the "
-        "others', so the load shares itself out anew among the pads."
-    ),
+    physics="One pad's assembled clearance is not as drawn, so the load shares itself out anew among the pads.",
     on_the_rig="One side of the clearance polygon stands off; kxx and kyy part when the load turns.",
     check="the pad's seat and shims, and the clearance sweep",
 )
@@ -51,10 +41,7 @@ def pad_offset(setup: Setup, pad: int, radial_offset: float) -> Setup:
     source="Machining of pads and seats holds a few micrometres from pad to pad",
     per_pad=Parameter("offset", "m", "length", 0.0, -6e-05, 6e-05, 2.5e-06),
     finding="the pads stand unevenly: {offset}",
-    physics=(
-        "Machining of pads and seats leaves each pad at its own assembled clearance. The load shares itself out "
-        "anew among them."
-    ),
+    physics="Machining leaves each pad at its own assembled clearance. The load shares itself out anew among them.",
     on_the_rig="The clearance polygon is irregular; coefficients part where the load turns.",
     check="the clearance sweep, pad by pad",
 )
@@ -76,16 +63,11 @@ def uneven_pads(setup: Setup, **offsets: float) -> Setup:
 
 @effect_on(
     "bearing",
-    Parameter("pad_clearance_change", "m", "length", 0.0, -0.0001, 0.0002, 1.2e-05, most_missing=_BORE),
+    _BORE,
     source="Boring tolerance of a pad of 100 mm: IT6 to IT7",
     finding="the pads are bored {pad_clearance_change:size} {pad_clearance_change:wider|tighter} than drawn",
-    physics=(
-        "The pads' own radius differs from the drawing, so the preload does. The film converges more or less "
-        "strongly at the same assembled clearance."
-    ),
-    on_the_rig=(
-        "The clearance polygon agrees with the drawing; stiffness is off alike in both directions, most at low load."
-    ),
+    physics="The pads' radius and so the preload differ from the drawing: the film converges more or less strongly.",
+    on_the_rig="The clearance polygon agrees with the drawing; stiffness is off in both directions, most at low load.",
     check="the bore of the pads",
 )
 def preload_error(setup: Setup, pad_clearance_change: float) -> Setup:
@@ -96,7 +78,7 @@ def preload_error(setup: Setup, pad_clearance_change: float) -> Setup:
 @effect_on(
     "bearing",
     PAD,
-    Parameter("pad_clearance_change", "m", "length", 0.0, -0.0001, 0.0002, 1.2e-05, most_missing=_BORE),
+    _BORE,
     source="Boring tolerance of a pad of 100 mm: IT6 to IT7",
     finding="{pad} is bored {pad_clearance_change:size} {pad_clearance_change:wider|tighter} than drawn",
     physics="One pad has another radius, so another preload. Its film converges more or less than the others'.",
@@ -110,7 +92,7 @@ def pad_bore(setup: Setup, pad: int, pad_clearance_change: float) -> Setup:
 
 @effect_on(
     "bearing",
-    Parameter("assembled_clearance_change", "m", "length", 0.0, -0.0002, 0.0005, 8e-06, most_missing=_CLEARANCE),
+    Parameter("assembled_clearance_change", "m", "length", 0.0, -0.0002, 0.0005, 8e-06),
     source="Drawings state clearances as radius or as diameter; shims and seats move them by some micrometres",
     finding=(
         "the assembled clearance is {assembled_clearance_change:size} {assembled_clearance_change:larger|smaller} "
@@ -155,13 +137,10 @@ def pad_arc_error(setup: Setup, factor: float) -> Setup:
 
 @effect_on(
     "bearing",
-    Parameter("clearance_change", "m", "length", 0.0, -6e-05, 6e-05, 8e-06, most_missing=_CLEARANCE),
+    Parameter("clearance_change", "m", "length", 0.0, -6e-05, 6e-05, 8e-06),
     source="12e-6 1/K x 66 mm x 8 K = 6 um if only the housing heats",
     finding="the running clearance is {clearance_change:size} {clearance_change:larger|smaller} than cold",
-    physics=(
-        "Housing, pads and shaft warm up unequally, and the clearance follows. A larger clearance softens the "
-        "film and lets the shaft sink deeper."
-    ),
+    physics="Housing, pads and shaft warm up unequally. A larger clearance softens the film; the shaft sinks deeper.",
     on_the_rig="The cold clearance sweep agrees with the drawing, the running locus does not.",
     check="temperatures of housing and shaft; a hot clearance sweep right after a run",
 )
@@ -176,10 +155,7 @@ def thermal_growth(setup: Setup, clearance_change: float) -> Setup:
     DIRECTION,
     source="Half the clearance over half the length is 1e-3 rad",
     finding="the shaft is tilted by {angle:mm/m} towards {direction:°}",
-    physics=(
-        "The shaft axis is tilted in the bearing, so the film is thinner at one end. Stiffness rises, most across "
-        "the loaded pad."
-    ),
+    physics="The shaft is tilted, so the film is thinner at one end. Stiffness rises, most across the loaded pad.",
     on_the_rig="Probes at the two ends read differently; the pads wear at one edge.",
     check="the alignment of shaft and housing under load",
 )

@@ -43,8 +43,6 @@ class Parameter:
         In which form the parameter acts nearly linearly: fits move ``to_linear(value)``.
     options : tuple of float
         For a parameter without a neutral value other than a pad number: what to try.
-    most_missing : callable, optional
-        ``most_missing(setup) -> float``: how much of the number that the parameter is added to can be missing at most.
     """
 
     name: str
@@ -56,19 +54,6 @@ class Parameter:
     typical: float = math.nan
     form: Literal["linear", "inverse", "square"] = "linear"
     options: tuple[float, ...] = ()
-    most_missing: Callable[[Setup], float] | None = None
-
-    def within(self, setup: Setup) -> "Parameter":
-        """Return the same with the bounds that a set-up's own number leaves.
-
-        Parameters
-        ----------
-        setup : Setup
-            Where the effect is to act.
-        """
-        if self.most_missing is None:
-            return self
-        return replace(self, low=max(self.low, -self.most_missing(setup)))
 
     def to_linear(self, value: float) -> float:
         """Value in the form in which the effect is nearly linear.

@@ -9,12 +9,6 @@ from model.effects.kind import PAD, Parameter, effect_on
 from model.setup import Setup
 from rigdata.arrays import ComplexArray, FloatArray
 
-
-def _half_of_the_housing(setup: Setup) -> float:
-    """Who weighs a housing, or adds its parts up, is not wrong by more."""
-    return 0.5 * setup.instruments.housing_mass
-
-
 _PROBE_GAIN = Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.03)
 _CELL_GAIN = Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.02)
 
@@ -112,7 +106,7 @@ def loadcell_crosstalk(setup: Setup, fraction: float) -> Setup:
 
 @effect_on(
     "measurement",
-    Parameter("mass_error", "kg", "mass", 0.0, -500.0, 1000.0, 5.0, most_missing=_half_of_the_housing),
+    Parameter("mass_error", "kg", "mass", 0.0, -500.0, 1000.0, 5.0),
     source="Hoses, plates and cells move along",
     finding="{mass_error:size} {mass_error:more|less} move with the housing than stated",
     physics=(

@@ -102,13 +102,25 @@ def candidates(setup: Setup, skip: frozenset[str] = frozenset()) -> tuple[Candid
         if kind.name in TERMS:
             out += _terms(kind)
             continue
-        parameters = [parameter.within(setup) for parameter in kind.parameters_of(len(bearing.pads))]
+        parameters = [_within(parameter, setup) for parameter in kind.parameters_of(len(bearing.pads))]
         free = tuple(p for p in parameters if not math.isnan(p.neutral))
         pads = range(1, len(bearing.pads) + 1)
         places = {p.name: pads if p.discrete else p.options for p in parameters if math.isnan(p.neutral)}
         for chosen in itertools.product(*places.values()):
             out.append(Candidate(kind.name, free, dict(zip(places, chosen, strict=True))))
     return tuple(out)
+
+
+def _within(parameter: Parameter, setup: Setup) -> Parameter:
+    """A parameter with the bounds that a set-up's own number leaves: no more can be missing than there is."""
+    pads, housing = setup.bearing.pads, setup.instruments.housing_mass
+    clearance, bore = (min(getattr(pad, name) for pad in pads) for name in ("assembled_clearance", "pad_clearance"))
+    most_missing = {
+        "mass_error": 0.5 * housing,  # who weighs a housing, or adds its parts up, is not wrong by more
+        "radial_offset": clearance, "assembled_clearance_change": clearance, "clearance_change": clearance,
+        "pad_clearance_change": bore,
+    }  # fmt: skip
+    return replace(parameter, low=max(parameter.low, -most_missing.get(parameter.name, math.inf)))
 
 
 #: Generic terms beyond the library: effects with a 2 x 2 matrix as parameters.
