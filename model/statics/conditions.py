@@ -31,15 +31,15 @@ HOTTEST_FILM = 150.0
 
 
 def unsupported(setup: Setup, load: FloatArray) -> bool:
-    """Whether no pads can hold a load, wherever the journal goes: free pads push along their pivots only."""
-    size = float(np.hypot(load[0], load[1]))
-    if size == 0.0 or setup.rotational_stiffness > 0.0:
-        return False
-    from scipy.optimize import nnls
+    """Whether no pads can hold a load, wherever the journal goes: free pads push along their pivots only.
 
-    angles = np.array([pad.pivot_angle for pad in setup.bearing.pads])
-    _, missing = nnls(np.array([np.cos(angles), np.sin(angles)]), np.asarray(load, float) / size)
-    return bool(missing > 1e-9)
+    Those nearest to the load on its two sides hold it, unless they stand half a turn apart or more.
+    """
+    if not load.any() or setup.rotational_stiffness > 0.0:
+        return False
+    turns = np.array([pad.pivot_angle for pad in setup.bearing.pads]) - math.atan2(load[1], load[0])
+    aside = np.round((turns + math.pi) % math.tau - math.pi, 9)  # a pad in the load's way stands on both its sides
+    return bool((aside % math.tau).min() + (-aside % math.tau).min() > math.pi - 1e-8)
 
 
 def overloaded_pads(films: Sequence[PadFilm]) -> list[int]:
