@@ -20,14 +20,17 @@ from model.film.slopes import shape_slopes, squeeze_slopes
 from model.mirror import MIRROR
 from model.pad.bending import force_weights
 from model.setup import Setup
+from model.statics.compiled.bending import axial_levers, axial_shape
 from model.statics.equilibrium import Equilibrium
-from model.statics.pad_film import PadFilm, axial_shape
-from model.tilt_hold import friction_limits, tilt_hold
+from model.statics.pad_film import PadFilm
+from model.tilt_hold import friction_limits, held_moment, hold_numbers
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
 
 #: Turns of pressure and deformation at most, and the share of a deformation, or of a temperature, at which turns end.
 _MOST_TURNS, _SETTLED = 40, 1e-7
+#: A pivot this stiff lets eta take no part [N/m].
+_RIGID = 1e30
 #: Halvings of the amplitude with which a pivot with friction vibrates.
 _HALVINGS = 60
 #: Conditions of pads whose pivots rub.
@@ -45,9 +48,7 @@ class AxialTilt(NamedTuple):
     inertia: float  #: [kg m^2]
 
 
-def flexing_impedance(
-    film: PadFilm, position: FloatArray, omega: FloatArray, factor: float, axial: AxialTilt | None = None
-) -> ComplexArray:
+def flexing_impedance(film: PadFilm, omega: FloatArray, factor: float, axial: AxialTilt | None = None) -> ComplexArray:
     """What bending and axial tilting with the motion add to a film's impedance.
 
     The perturbation of the baseline moves pads as rigid bodies. Here a pad's deformation w is an internal degree of
@@ -62,10 +63,10 @@ def flexing_impedance(
     (`AxialTilt`) is one more column of S_ab, and leaves by its own equation of motion about the
     pivot.
 
-    `position` (2,) [m], `omega` (n,) [rad/s].
+    `omega` (n,) [rad/s].
     """
     weights = force_weights(film.grid)
-    conductance = conductances(film.grid, film.work, (film.pad.pad_clearance, *film.approach(position)))
+    conductance = conductances(film.grid, film.work, film.wedge)
 
     def slopes(shapes: Any) -> tuple[Any, Any]:
         still = shape_slopes(film.grid, film.work, conductance, shapes)
@@ -159,19 +160,18 @@ class PadMatrices:
     pad_mass: FloatArray  #: (2, 2) each: Eq. (12), in (theta, eta); a rigid pivot has infinite k_eta.
     pad_damping: FloatArray
     pad_stiffness: FloatArray
-    friction: tuple[float, float] = (0.0, math.inf)
+    friction: tuple[float, float]  #: See `friction_limits`; (0, infinite): there is none.
 
 
 def pad_matrices(setup: Setup, films: Sequence[PadFilm]) -> list[PadMatrices]:
     """Assemble the full matrices of the pads that carry."""
-    # friction vibrates otherwise than it holds
-    smooth = setup.change(friction=0.0) if setup.friction else setup
+    smooth = hold_numbers(setup)._replace(slip=0.0)  # friction vibrates otherwise than it holds
     matrices = []
     for film in films:
         if film.forces is None:
             continue
         pad, load = film.pad, float(film.forces.force[0])
-        hold = tilt_hold(smooth, film.tilt, load)
+        hold = held_moment(smooth, film.tilt, load)
         frame = np.array([[*film.normal, 0.0, -1.0], [*film.tangent, film.pivot_radius, 0.0]])
         moments = frame.copy()
         moments[0, 2] = hold.arm
@@ -234,24 +234,14 @@ def reduce_pads(
 def _impedances(
     pads: list[PadMatrices], omega: FloatArray, added: list[ComplexArray] | None = None
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Film impedance (pads, n, 4, 4), with more beside it, and that of tilt and deflection with pad and pivot.
-
-    A rigid pivot lets eta take no part.
-    """
-    s = omega[:, None, None]
-    z = np.array([p.stiffness for p in pads])[:, None] + 1j * s * np.array([p.damping for p in pads])[:, None]
+    """Film impedance (pads, n, 4, 4), with more beside it, and that of tilt and deflection with pad and pivot."""
+    s = 1j * omega[:, None, None]
+    parts = zip(*[(p.stiffness, p.damping, p.pad_stiffness, p.pad_damping, p.pad_mass) for p in pads], strict=True)
+    film_stiffness, film_damping, stiffness, damping, mass = (np.array(part)[:, None] for part in parts)
+    z = film_stiffness + s * film_damping
     if added is not None:
         z = z + np.array(added)
-    stiffness = np.array([p.pad_stiffness for p in pads])
-    rigid = np.isinf(stiffness[:, 1, 1])
-    mass = np.array([p.pad_mass for p in pads])
-    damping = np.array([p.pad_damping for p in pads])
-    if rigid.any():
-        z[rigid, :, 3] = z[rigid, :, :, 3] = 0.0
-        mass[rigid, 1] = mass[rigid, :, 1] = 0.0
-        stiffness[rigid, 1, 1], damping[rigid, 1] = 1.0, 0.0
-    pivot = stiffness[:, None] - s**2 * mass[:, None] + 1j * s * damping[:, None]
-    return z, z[..., 2:, 2:] + pivot
+    return z, z[..., 2:, 2:] + np.minimum(stiffness, _RIGID) + s * (damping + s * mass)
 
 
 def _broken_loose(pads: list[PadMatrices], z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
@@ -270,20 +260,24 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
     heat = setup.options.perturbed_heat and setup.thermal != "isothermal"
     added = None
     if heat or setup.pads_follow or (setup.options.perturbed_bending and setup.flexible_pads):
-        follow = _following_heat if heat else _following_shape
         added = []
         for pad in pads:
-            more = follow(setup, equilibrium, equilibrium.films[pad.number - 1], omega)
+            film = equilibrium.films[pad.number - 1]
+            if heat:
+                held = film.grid, film.work, film.wedge, equilibrium.running
+                more = np.array([heat_impedance(*held, w, _SETTLED) for w in omega.tolist()])
+            else:
+                more = _following_shape(setup, film, omega)
             added.append(pad.moments.T @ more @ pad.frame)
     h = with_structure(setup, reduce_pads(pads, omega, setup.vibration, added), omega)
     return np.asarray(MIRROR @ h @ MIRROR) if setup.mirrored else h
 
 
-def _following_shape(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
+def _following_shape(setup: Setup, film: PadFilm, omega: FloatArray) -> ComplexArray:
     """What bending and axial tilting with the motion add to a pad's film, (n, 2, 2)."""
     factor = setup.bending_factor if setup.options.perturbed_bending else 0.0
     axial = _axial_tilt(setup, film) if setup.pads_follow else None
-    return flexing_impedance(film, equilibrium.position, omega, factor, axial)
+    return flexing_impedance(film, omega, factor, axial)
 
 
 def _axial_tilt(setup: Setup, film: PadFilm) -> AxialTilt:
@@ -291,37 +285,26 @@ def _axial_tilt(setup: Setup, film: PadFilm) -> AxialTilt:
     assert film.forces is not None
     pad = film.pad
     grid = film.grid
-    shape = axial_shape(film.grid)
-    hold = tilt_hold(setup, film.axial_tilt, float(film.forces.force[0]))
-    weights = (grid.area * (shape - hold.arm * grid.cos[:, None]))[1:-1, grid.first : -1].ravel()
+    hold = held_moment(hold_numbers(setup), film.axial, float(film.forces.force[0]))
+    weights = axial_levers(grid, hold.arm)[grid.node]
     inner, outer = _radii(setup, film)
     ends = pad.leading_edge, pad.leading_edge + pad.arc
     mean, square = (math.sin(ends[1]) - math.sin(ends[0])) / pad.arc, 0.5
     square += 0.25 * (math.sin(2.0 * ends[1]) - math.sin(2.0 * ends[0])) / pad.arc
     reach = 0.5 * (outer**2 + inner**2) * square + film.pivot_radius**2
     reach -= 2.0 * film.pivot_radius * _mean_radius(inner, outer) * mean
-    return AxialTilt(shape, weights, hold.stiffness, pad.mass * (reach + setup.bearing.length**2 / 12.0))
-
-
-def _following_heat(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
-    """What a temperature that follows the motion adds to a pad's film, (n, 2, 2)."""
-    wedge = (film.pad.pad_clearance, *film.approach(equilibrium.position))
-    return np.array(
-        [heat_impedance(film.grid, film.work, wedge, equilibrium.running, float(w), _SETTLED) for w in omega]
-    )
+    return AxialTilt(axial_shape(grid), weights, hold.stiffness, pad.mass * (reach + setup.bearing.length**2 / 12.0))
 
 
 def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:
     """What the structure around a bearing makes of its impedance: `omega` (n,) [rad/s]."""
-    if setup.added_mass:
-        h = h - (omega**2)[:, None, None] * setup.added_mass * np.eye(2)
+    s = 1j * omega[:, None, None]
+    h = h + s**2 * setup.added_mass * np.eye(2)
     if any(setup.series_compliance):
         # of C and h both may be singular: (1 + h C)^-1 h needs neither inverse
         h = np.linalg.solve(np.eye(2) + h @ setup.structure, h).astype(np.complex128, copy=False)
-    if any(setup.parallel_stiffness) or any(setup.parallel_damping):
-        k, c = (np.reshape(v, (2, 2)) for v in (setup.parallel_stiffness, setup.parallel_damping))
-        h = h + k + 1j * omega[:, None, None] * c
-    return h
+    k, c = (np.reshape(v, (2, 2)) for v in (setup.parallel_stiffness, setup.parallel_damping))
+    return h + k + s * c
 
 
 def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> tuple[Condition, ...]:

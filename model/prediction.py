@@ -186,7 +186,7 @@ class Prediction:
     @property
     def axial_tilt(self) -> FloatArray:
         """Of pads about the axis across them, ends at positive z outward (`Options.axial_tilt`); idle ones 0 [rad]."""
-        return np.array([0.0 if f.idle else f.axial_tilt for f in self._films])
+        return np.array([0.0 if f.idle else f.axial for f in self._films])
 
     @property
     def pressure(self) -> tuple[FloatArray, ...]:
@@ -212,7 +212,7 @@ class Prediction:
     def max_temperature(self) -> float:
         """Hottest film of a pad that carries [degC], anywhere across it."""
         films = [f for f in self._films if not f.idle]
-        return max((float(max(t.max() for t in f.heat_state)) for f in films), default=self.setup.inlet_temperature)
+        return max((f.hottest for f in films), default=self.setup.inlet_temperature)
 
     @property
     def min_film(self) -> float:

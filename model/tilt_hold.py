@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.bearing import Pivot
-from model.compilation import compiled
+from model.compilation import inner
 from model.setup import Setup
 
 
@@ -27,7 +27,6 @@ class TiltHold(NamedTuple):
     moment: float
     stiffness: float
     arm: float
-    slides: bool
 
 
 class HoldNumbers(NamedTuple):
@@ -39,10 +38,10 @@ class HoldNumbers(NamedTuple):
     stick: float  #: k per cubic root of the load [N^(2/3) m/rad]
 
 
-@compiled
+@inner
 def held_moment(hold: HoldNumbers, tilt: float, load: float) -> TiltHold:
     """What holds at a tilt [rad] and pad load [N]."""
-    stiffness, arm, slides = hold.flexure, 0.0, False
+    stiffness, arm = hold.flexure, 0.0
     if load > 0.0:
         stiffness += hold.roll * load
         arm = hold.roll * tilt
@@ -51,12 +50,11 @@ def held_moment(hold: HoldNumbers, tilt: float, load: float) -> TiltHold:
         stick, slip = hold.stick * load ** (1.0 / 3.0), hold.slip * load
         share = min(abs(tilt) * stick / (1.5 * slip), 1.0)
         held = 1.0 - (1.0 - share) ** 1.5
-        slides = share == 1.0
         moment += np.copysign(slip * held, tilt)
         stiffness += stick * np.sqrt(1.0 - share)
         # with the load the limit grows, and by a third of it the contact's stiffness
         arm += np.copysign(slip / load * (held - share * np.sqrt(1.0 - share)), tilt)
-    return TiltHold(moment, stiffness, arm, slides)
+    return TiltHold(moment, stiffness, arm)
 
 
 def hold_numbers(setup: Setup) -> HoldNumbers:
@@ -64,14 +62,6 @@ def hold_numbers(setup: Setup) -> HoldNumbers:
     roll = setup.rolling * rolling_radius(setup.bearing.pivot) if setup.rolling else 0.0
     stick, slip = friction_limits(setup, 1.0) if setup.friction else (0.0, 0.0)
     return HoldNumbers(float(setup.rotational_stiffness), roll, slip, stick)
-
-
-def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
-    """Moment that holds a pad back at a tilt [rad] and pad load [N]."""
-    hold = hold_numbers(setup)
-    if not any(hold):
-        return TiltHold(0.0, 0.0, 0.0, False)
-    return held_moment(hold, float(tilt), float(load))
 
 
 def rolling_radius(pivot: Pivot) -> float:

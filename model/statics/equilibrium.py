@@ -1,6 +1,5 @@
 """Static equilibrium of a bearing: where the journal stands, and what the films are then."""
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,9 +26,8 @@ class Equilibrium:
     position: FloatArray  #: (2,): Journal centre from the bearing centre [m].
     films: tuple[PadFilm, ...]
     iterations: int
-    force_residual: float
-    temperature_residual: float
     journal_temperature: float
+    grown: float  #: Temperature of a journal that grows [degC], see `SearchState.figures`.
     status: tuple[Condition, ...]
     running: Running  #: What every film runs with for itself.
     begun: Begun
@@ -38,17 +36,3 @@ class Equilibrium:
     def converged(self) -> bool:
         """Whether the residuals are below the tolerances."""
         return has_answer(self.status)
-
-    @property
-    def mean_journal_temperature(self) -> float:
-        """The journal's temperature, or where it takes no heat that of the films that carry, by area [degC].
-
-        The oil's where it enters if none does.
-        """
-        if math.isfinite(self.journal_temperature):
-            return self.journal_temperature
-        carrying = [f for f in self.films if not f.idle]
-        if not carrying:
-            return self.films[0].inlet
-        area = sum(float(f.grid.area.sum()) for f in carrying)
-        return sum(float((f.grid.area * f.work.temperature).sum()) for f in carrying) / area

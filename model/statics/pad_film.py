@@ -8,7 +8,7 @@ import numpy as np
 
 from model.bearing import Oil, Pad
 from model.film.cross_film import CrossFilm, cross_film
-from model.film.mesh import FilmGrid, FilmWork, OilConstants, film_grid, film_works
+from model.film.mesh import FilmGrid, FilmWork, OilConstants, Wedge, film_grid, film_works
 from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces
 from model.pad.bending import PadDeformation, pad_deformation
@@ -30,8 +30,10 @@ class PadFilm:
     grid: FilmGrid
     work: FilmWork
     inlet: float
-    bent: FloatArray  #: (nt + 1, nz + 1): The pad's deformation, part of `work.extra` [m].
     deformation: PadDeformation | None = None
+    #: (nt + 1, nz + 1): The pad's deformation, part of `work.extra` [m]; a rigid one has none.
+    bent: FloatArray | float = 0.0
+    wedge: Wedge = (math.nan, math.nan, math.nan)
     tilt: float = 0.0
     deflection: float = 0.0
     idle: bool = False
@@ -40,13 +42,14 @@ class PadFilm:
     resting: RestingFilm | None = None
     cross: CrossFilm | None = None
     outlet: float = math.nan
-    axial_tilt: float = 0.0
+    axial: float = 0.0  #: Tilt along the shaft [rad].
     supplied: float = math.inf  #: Oil there is at the leading edge [kg/s/m].
 
     @property
-    def heat_state(self) -> tuple[FloatArray, ...]:
-        """Temperatures that the iteration finds; whoever writes to them sets the film's."""
-        return (self.work.temperature,) if self.cross is None else (self.cross.temperature, self.cross.face)
+    def hottest(self) -> float:
+        """Anywhere across the film [degC]."""
+        fields = (self.work.temperature,) if self.cross is None else (self.cross.temperature, self.cross.face)
+        return float(max(field.max() for field in fields))
 
     @property
     def face_temperature(self) -> FloatArray:
@@ -63,12 +66,6 @@ class PadFilm:
         """Approach a of the film if the pivot were rigid [m]: `position` (2,) [m]."""
         return self.preload_distance + float(self.normal @ position)
 
-    def approach(self, position: FloatArray) -> tuple[float, float]:
-        """(a, b) of the film for a journal position and the pad's present tilt and deflection [m]."""
-        a = self.rigid_approach(position) - self.deflection
-        b = float(self.tangent @ position) + self.pivot_radius * self.tilt
-        return a, b
-
 
 def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFilm | None]:
     """Lay out every pad's film; all of them side by side besides."""
@@ -82,7 +79,6 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFil
     shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))
     grids, stack = _grids(spans, bearing.journal_radius, bearing.length, shape, symmetric)
     works, each = film_works(grids, setup.inlet_temperature)
-    bent = np.zeros_like(works.extra)
     crosses = cross_film(works, setup.inlet_temperature) if across else None
     for k, (pad, grid, work) in enumerate(zip(bearing.pads, grids, each, strict=True)):
         work.pressure[0, grid.first : -1] = pad.leading_edge_pressure
@@ -100,7 +96,6 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFil
                 grid=grid,
                 work=work,
                 inlet=setup.inlet_temperature,
-                bent=bent[k],
                 deformation=pad_deformation(pad, bearing, grid, setup.options.conduction) if solid else None,
                 rupture=rupture_of(setup),
                 cross=None if crosses is None else CrossFilm(crosses.edges, *(values[k] for values in crosses[1:])),
@@ -116,19 +111,6 @@ def _grids(
     """Meshes of films that start and end at angles from their pivots, one by one and as one."""
     grids = [film_grid(start, end, radius, length, shape, symmetric) for start, end in spans]
     return grids, stacked_grids(grids)
-
-
-def axial_shape(grid: FilmGrid) -> FloatArray:
-    """What a unit of axial tilt adds to the film thickness, (nt + 1, nz + 1) [m/rad].
-
-    A ball in its socket turns about any axis. Turned by psi (the pad's end at positive z outward) it adds psi z
-    cos(alpha); a shaft that leans by its slope towards a pad takes just as much away there, so that a pad which
-    nothing holds lies as along an aligned shaft. What is left, slope z sin(alpha), the pad would have to follow by
-    turning about the line of its load: the stops that keep it in its place hold that. Its axial tilt is where the
-    film's moment about the pivot, the integral of p z cos(alpha) dA, is what flexure, rolling or friction of the
-    pivot hold.
-    """
-    return np.outer(grid.cos, grid.z)
 
 
 def rupture_of(setup: Setup) -> str:

@@ -46,13 +46,9 @@ def through_flow(film: PadFilm) -> tuple[float, float]:
     """What passes the leading edge and the trailing edge [kg/s]; see `edge_flows`."""
     if film.resting is not None:
         return film.resting.flow, film.resting.flow
-    entering, sides = edge_flows(film.grid, film.work, _limit(film))
+    # films that do not conserve mass take what they ask for
+    entering, sides = edge_flows(film.grid, film.work, film.supplied if film.rupture == "jfo" else math.inf)
     return entering, entering - sides
-
-
-def _limit(film: PadFilm) -> float:
-    """What a film takes at most [kg/s/m]: films that do not conserve mass take what they ask for."""
-    return film.supplied if film.rupture == "jfo" else math.inf
 
 
 def starved(films: Sequence[PadFilm]) -> list[int]:

@@ -20,16 +20,17 @@ from model.pad.pivot import OTHER
 from model.pivots import ask_laws, encoded
 from model.setup import Setup
 from model.statics.compiled import iteration
-from model.statics.compiled.case import ALONE, COUPLED, ISOTHERMAL, Problem
+from model.statics.compiled.bending import axial_shape
+from model.statics.compiled.case import ACROSS, ALONE, COUPLED, ISOTHERMAL, Problem
 from model.statics.compiled.cross_heat import across_of, set_cross_viscosities, settle_cross_temperatures
 from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place_pads, rescue
 from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PAD, PadStack, SearchState
 from model.statics.compiled.start import first_position, pivot_curve
 from model.statics.conditions import status_of
 from model.statics.equilibrium import Begun, Equilibrium
-from model.statics.pad_film import axial_shape, pad_films
+from model.statics.pad_film import pad_films
 from model.statics.pad_flow import through_flow
-from model.statics.physics import bodies_of, case_of, couples_heat, running_of
+from model.statics.physics import bodies_of, case_of, running_of
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Condition
 
@@ -99,13 +100,10 @@ class Search:
         faces, warmth = (works.temperature,) * 2 if crosses is None else (crosses.face, crosses.temperature)
         bends = self.setup.flexible_pads or self.case.axial
         bent = np.zeros(works.extra.shape if bends else (len(self.films), 0, 0))
-        if self.case.axial:
-            if not any(self.case.hold):  # nothing holds it: that is nearly there
-                lean, toward = self.setup.misalignment
-                # along the shaft
-                self.pads["axial"] = [lean * math.cos(f.pad.pivot_angle - toward) for f in self.films]
-            for film, tilt in zip(self.films, self.pads["axial"].tolist(), strict=True):
-                film.work.extra[:] += tilt * axial_shape(film.grid)
+        if self.case.axial and not any(self.case.hold):  # nothing holds it: along the shaft is nearly there
+            lean, toward = self.setup.misalignment
+            for m, film in enumerate(self.films):
+                self._lean(m, lean * math.cos(film.pad.pivot_angle - toward))
         return SearchState(
             position=np.zeros(2),
             shift=np.zeros_like(works.unknown),
@@ -115,6 +113,12 @@ class Search:
             warmth=warmth.reshape(len(self.films), -1),
             figures=np.array([math.nan, self.case.supply, 0.0, 0.0]),
         )
+
+    def _lean(self, m: int, tilt: float) -> None:
+        """Tilt a pad along the shaft, and its film with it [rad]."""
+        film = self.films[m]
+        film.work.extra[:] += (tilt - self.pads["axial"][m]) * axial_shape(film.grid)
+        self.pads["axial"][m] = tilt
 
     def _find_curves(self) -> None:
         """Find the curve of every pad's loaded attitudes; pads that are alike share it."""
@@ -157,11 +161,10 @@ class Search:
 
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
-        pads, position = self.pads, self.state.position
-        place_pads(pads, self.works, loaded, position)
+        pads, reach = self.pads, self._reach
+        place_pads(pads, self.works, loaded, self.state.position)
         if self.case.thermal == ISOTHERMAL:
             return
-        reach = pads["preload"] + pads["frame"][:, 0] @ position
         for m in np.flatnonzero(loaded).tolist():
             curve = pads["attitudes"][m, 0, : pads["rows"][m]]
             (low, rises), film, temperature = self.rises[m], self.films[m], self.works.temperature[m]
@@ -176,12 +179,15 @@ class Search:
                 film.cross.temperature[:] = temperature[:, :, None]
                 film.cross.face[:] = temperature
 
+    @property
+    def _reach(self) -> FloatArray:
+        """Approach of every film if its pivot were rigid, (n,) [m]."""
+        return np.asarray(self.pads["preload"] + self.pads["frame"][:, 0] @ self.state.position)
+
     def margins(self) -> FloatArray:
         """How far pads are above the folds of their curves, as shares of their clearances, (n,)."""
-        pads = self.pads
-        reach = pads["preload"] + pads["frame"][:, 0] @ self.state.position
-        folds = np.where(pads["rows"] >= 2, pads["attitudes"][:, 0, 0], math.inf)
-        return np.asarray((reach - folds) / pads["clearance"])
+        folds = np.where(self.pads["rows"] >= 2, self.pads["attitudes"][:, 0, 0], math.inf)
+        return np.asarray((self._reach - folds) / self.pads["clearance"])
 
     def let_idle(self, numbers: list[int]) -> None:
         """Let pads (from 0) carry nothing."""
@@ -210,7 +216,7 @@ class Search:
 
     def start_from(self, start: Equilibrium) -> bool:
         """Take over a neighbour's state, moved as the curves are; False if it has none or its mesh does not fit."""
-        coupled, pads, state = couples_heat(self.setup), self.pads, self.state
+        coupled, pads, state = self.case.thermal in (COUPLED, ACROSS), self.pads, self.state
         mesh = self.works.pressure.shape
         if not start.converged or mesh != (len(start.films), *start.films[0].work.pressure.shape):
             return False
@@ -241,13 +247,12 @@ class Search:
                 state.bent[m] = other.bent
                 film.work.extra[:] += other.bent
             if self.case.axial:
-                film.work.extra[:] += (other.axial_tilt - pads["axial"][m]) * axial_shape(film.grid)
-                pads["axial"][m] = other.axial_tilt
+                self._lean(m, other.axial)
         state.position[:] = start.position + shift.position
         if coupled:
             state.figures[JOURNAL] = start.journal_temperature
         if self.setup.growth is not None:
-            hotter = start.mean_journal_temperature - state.figures[GROWN]
+            hotter = start.grown - state.figures[GROWN]
             state.figures[GROWN] += hotter
             pads["clearance"] -= self.case.closing * hotter
         return True
@@ -300,28 +305,28 @@ class Search:
 
     def _take_over(self) -> None:
         """Leave the films where the arrays stand."""
-        names = ("tilt", "deflection", "idle", "inlet", "supplied")
-        pads, values = self.pads, [self.pads[name].tolist() for name in names]
-        solved, resting = pads["solved"].tolist(), pads["resting"].tolist()
-        forces, least, steps = (pads["force"], pads["stiffness"], pads["damping"]), pads["least"], pads["steps"]
+        pads = self.pads
+        for name in ("tilt", "deflection", "axial", "idle", "inlet", "supplied"):
+            for film, value in zip(self.films, pads[name].tolist(), strict=True):
+                setattr(film, name, value)
+        solved, resting, clearances = pads["solved"].tolist(), pads["resting"].tolist(), pads["clearance"].tolist()
+        wedges, least, steps = pads["wedge"].tolist(), pads["least"].tolist(), pads["steps"].tolist()
         for m, film in enumerate(self.films):
-            film.tilt, film.deflection, film.idle, film.inlet, film.supplied = (numbers[m] for numbers in values)
-            film.axial_tilt = float(pads["axial"][m])
+            film.wedge = (clearances[m], *wedges[m])
             if self.across is not None:
                 film.outlet = float(self.across.outlet[m])
             if self.setup.flexible_pads:
                 film.bent = self.state.bent[m]
-            force, stiffness, damping = (values[m] for values in forces)
-            film.forces = FilmForces(force, stiffness, damping, float(least[m]), int(steps[m])) if solved[m] else None
+            forces = pads["force"][m], pads["stiffness"][m], pads["damping"][m]
+            film.forces = FilmForces(*forces, least[m], steps[m]) if solved[m] else None
             film.resting = None if solved[m] else RestingFilm(*resting[m])
             if self.setup.growth is not None:
-                clearance = float(pads["clearance"][m])
-                assembled = film.pad.assembled_clearance + clearance - film.pad.pad_clearance
-                film.pad = replace(film.pad, pad_clearance=clearance, assembled_clearance=assembled)
+                assembled = film.pad.assembled_clearance + clearances[m] - film.pad.pad_clearance
+                film.pad = replace(film.pad, pad_clearance=clearances[m], assembled_clearance=assembled)
 
     def _ended(self, code: int, memory: iteration.Memory) -> Equilibrium:
         """The state as an answer."""
-        films, figures, trail = self.films, self.state.figures, memory.trail
+        films, figures = self.films, self.state.figures
         names: list[Condition] = []
         if code in _FAILURES:
             names.append(named(_FAILURES[code]))
@@ -332,8 +337,7 @@ class Search:
         if code != iteration.SETTLED:
             names.append(named("not converged"))
         status = status_of(self.setup, self.load, films, self.running.speed, float(figures[BACKFLOW]), names)
-        steps, residual, heat = trail[[iteration.ITERATION, iteration.RESIDUAL, iteration.HEAT]].tolist()
-        ended = (int(steps), residual, heat, float(figures[JOURNAL]))
+        ended = (int(memory.trail[iteration.ITERATION]), float(figures[JOURNAL]), float(figures[GROWN]))
         return Equilibrium(self.state.position.copy(), tuple(films), *ended, status, self.running, self.begun)
 
 

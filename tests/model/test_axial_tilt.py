@@ -18,7 +18,7 @@ from model.pad.bending import force_weights
 from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Mesh
-from model.statics.pad_film import axial_shape
+from model.statics.compiled.bending import axial_shape
 
 DOWN, SPEED, ANGLE = -math.pi / 2, 2 * math.pi * 22, 6e-4
 FOLLOWING = Options(axial_tilt=True)
@@ -97,7 +97,7 @@ def test_the_film_by_tilt_is_the_slope_of_its_forces_and_its_damping_is_symmetri
     p = run(spherical, toward=0.4)
     film = p.equilibrium.films[0]
     grid, work, speed = film.grid, film.work, p.equilibrium.running.speed
-    wedge, shape = (film.pad.pad_clearance, *film.approach(p.bearing_position)), axial_shape(film.grid)
+    wedge, shape = film.wedge, axial_shape(film.grid)
     solve_film(grid, work, wedge, speed, False)
     shapes = shape[:, :, None] + 0j  # complex, as the dynamics ask: compiled already
     still = shape_slopes(grid, work, conductances(grid, work, wedge), shapes)[:, 0].real

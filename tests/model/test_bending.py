@@ -60,7 +60,7 @@ def test_pressure_slopes_by_shape_are_finite_differences(bearing):
     film = p.equilibrium.films[0]
     assert film.deformation is not None
     grid, work = film.grid, film.work
-    wedge = (film.pad.pad_clearance, *film.approach(p.equilibrium.position))
+    wedge = film.wedge
     surface = SPEED * bearing.journal_radius
 
     def pressure(amplitudes: np.ndarray) -> np.ndarray:

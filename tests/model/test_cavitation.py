@@ -49,7 +49,7 @@ def test_pads_that_are_held_notice(rocker):
 def test_what_lies_behind_the_rupture_is_known(spherical):
     p = run(spherical, 8750.0)
     film = p.equilibrium.films[0]
-    wedge = (film.pad.pad_clearance, *film.approach(p.bearing_position))
+    wedge = film.wedge
     theta = fluid_fraction(film.grid, film.work, wedge, SPEED * spherical.journal_radius)
     ruptured = film.work.ruptured.copy()
     ruptured[0] = False

@@ -81,7 +81,7 @@ class _Marched:
         grid, work, bearing = film.grid, film.work, p.setup.bearing
         self.speed, self.clearance = p.equilibrium.running.speed, film.pad.pad_clearance
         self.viscosity, self.density = float(work.viscosity[1, 1]), float(work.density[1, 1])
-        self.start = np.array(film.approach(p.bearing_position))
+        self.start = np.array(film.wedge[1:])
         self.angle, z = grid.angle, grid.z
         self.step = bearing.journal_radius * (self.angle[1] - self.angle[0])
         edges = np.concatenate([[z[0]], 0.5 * (z[1:] + z[:-1]), [z[-1]]])
@@ -162,7 +162,7 @@ def test_it_is_what_a_film_over_a_flexing_pad_does_when_marched_in_time(rocker):
     omega = 2 * math.pi * 50
     p = run(rocker, omega=omega, mesh=Mesh(20, 4))
     film = p.equilibrium.films[0]
-    added = flexing_impedance(film, p.bearing_position, np.array([omega]), 1.0)[0]
+    added = flexing_impedance(film, np.array([omega]), 1.0)[0]
     marched = _Marched(p, 0)
     marched.still_bent = film.bent
     assert not film.work.ruptured[1:-1, :-1].any()

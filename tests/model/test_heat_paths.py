@@ -139,9 +139,12 @@ class TestGrowth:
     def test_the_journal_settles_at_its_own_temperature(self, rocker):
         growth = Growth()
         p = run(rocker, Options(growth=growth))
-        by_hand = grown(rocker, growth, 40.0, p.equilibrium.mean_journal_temperature)
+        by_hand = grown(rocker, growth, 40.0, p.equilibrium.grown)
         again = run(by_hand)
         np.testing.assert_allclose(again.h, p.h, rtol=1e-4)
+        # it is as warm as its films, in the mean over their area
+        area = [film.grid.area for film in p.equilibrium.films]
+        assert p.equilibrium.grown == pytest.approx(np.average(p.temperature, weights=area), abs=1e-4)
         assert p.setup.bearing.pads[0].assembled_clearance < rocker.pads[0].assembled_clearance
         assert p.mesh_error < 0.01  # the coarser mesh does not grow once more
 

@@ -18,6 +18,26 @@ from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray
 
 
+@inner
+def axial_shape(grid: FilmGrid) -> FloatArray:
+    """What a unit of axial tilt adds to the film thickness, (nt + 1, nz + 1) [m/rad].
+
+    A ball in its socket turns about any axis. Turned by psi (the pad's end at positive z outward) it adds psi z
+    cos(alpha); a shaft that leans by its slope towards a pad takes just as much away there, so that a pad which
+    nothing holds lies as along an aligned shaft. What is left, slope z sin(alpha), the pad would have to follow by
+    turning about the line of its load: the stops that keep it in its place hold that. Its axial tilt is where the
+    film's moment about the pivot, the integral of p z cos(alpha) dA, is what flexure, rolling or friction of the
+    pivot hold.
+    """
+    return np.outer(grid.cos, grid.z)
+
+
+@inner
+def axial_levers(grid: FilmGrid, arm: float) -> FloatArray:
+    """Moment along the shaft by the pressure at every node, less what grows with the load by an arm [m], (nodes,)."""
+    return (grid.area * grid.cos.reshape((-1, 1)) * (grid.z - arm)).reshape(-1)
+
+
 @lru_cache(maxsize=8)
 def stacked_bodies(bodies: tuple[PadDeformation, ...], first: int, factor: float, conducting: bool) -> BodyStack:
     """Matrices of the pads side by side: of their deformation times a factor, of what they conduct."""
@@ -123,9 +143,7 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
         matrix[r, r], right[r, 0] = 1.0, product(bodies.amplitudes[body, r], change)
     if case.axial:
         right[bending, 0], matrix[bending, bending] = _axial_moment(grid, work, problem, m, response[bending])
-        for i in range(rows):
-            for j in range(columns):
-                shapes[i, j, bending] = grid.cos[i] * grid.z[j]
+        shapes[:, :, bending] = axial_shape(grid)
     asked = right[:, 0].copy()
     wedge = (pad.clearance, pad.wedge[0], pad.wedge[1])
     slopes = shape_slopes(grid, work, conductances(grid, work, wedge), shapes)
@@ -146,8 +164,7 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
         mismatch[q] = change[q] - product(flat[q, :bending], asked)
     if not case.axial:
         return 0.0
-    for k in range(3):
-        pad.axial_step[k] = right[bending, k]
+    pad.axial_step[:] = right[bending]
     return abs(right[bending, 0]) * largest(shapes[:, :, bending].copy().reshape(-1))
 
 
@@ -169,16 +186,11 @@ def _axial_moment(grid: FilmGrid, work: FilmWork, problem: Problem, m: int, leve
     `lever` (unknowns,) [m^3] is less what grows with the pad's load.
     """
     pad, shift = problem.pads.each[m], problem.state.shift[m]
-    moment, stiffness, arm, _ = held_moment(problem.case.hold, pad.axial, pad.corrected[0])
-    total, columns = -moment, grid.steps[0]
-    for n in range(work.pressure.size):
-        i, j = divmod(n, columns)
-        total += grid.area[i, j] * grid.cos[i] * grid.z[j] * work.pressure[i, j]
-    for q in range(len(lever)):
-        i, j = divmod(grid.node[q], columns)
-        total += grid.area[i, j] * grid.cos[i] * grid.z[j] * shift[q]
-        lever[q] = grid.area[i, j] * grid.cos[i] * (grid.z[j] - arm)
-    return total, stiffness
+    moment, stiffness, arm = held_moment(problem.case.hold, pad.axial, pad.corrected[0])
+    levers = axial_levers(grid, 0.0)
+    lever[:] = axial_levers(grid, arm)[grid.node]
+    total = product(levers, work.pressure.reshape(-1)) + product(levers[grid.node], shift)
+    return total - moment, stiffness
 
 
 @inner
@@ -195,9 +207,7 @@ def change_shape(bodies: BodyStack | None, problem: Problem, m: int, da: float, 
         shapes = bodies.shapes[bodies.which[m]]
         for r in range(shapes.shape[2]):
             amount = pad.amplitude[r, 0] + pad.amplitude[r, 1] * da + pad.amplitude[r, 2] * db
-            for i in range(out.shape[0]):
-                for j in range(out.shape[1]):
-                    out[i, j] += amount * shapes[i, j, r]
+            out += amount * shapes[:, :, r]
     if not case.axial:
         return 0.0
     axial = pad.axial_step[0] + pad.axial_step[1] * da + pad.axial_step[2] * db

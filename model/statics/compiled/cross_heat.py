@@ -21,7 +21,7 @@ from model.compilation import compiled, inner
 from model.film.cross_energy import cross_operator
 from model.film.cross_film import CrossFilm, CrossOperator, cross_pressure_change, set_cross_viscosity
 from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
-from model.film.dense import times
+from model.film.dense import product, times
 from model.film.models import TURBULENT
 from model.interpolation import largest
 from model.pad.bending import PadDeformation
@@ -120,7 +120,7 @@ def settle_cross_temperatures(problem: Problem, across: Across, relaxation: floa
         change = note_heat(pad, abs(hotter), (0.0, 0.0), change)
         if pad.solved:
             grid, work, cross = grid_of(problem.grids, m), work_of(problem.works, m), _film(across.films, m)
-            weights, running = (1.0, inlets[m], journal), case.running
+            running, weights = case.running, (inlets[m], journal)
             asked = _warm(cross, across.fields[m], across.faces[m], weights, limits)
             across.outlet[m] = outlets[m, 0] + outlets[m, 1] * inlets[m] + outlets[m, 2] * journal
             more = cross_pressure_change(grid, work, cross, running.speed, running.oil, state.shift[m])
@@ -134,23 +134,17 @@ def _warm(
     cross: CrossFilm,
     fields: FloatArray,
     faces: FloatArray,
-    weights: tuple[float, float, float],
+    weights: tuple[float, float],
     limits: tuple[float, float],
 ) -> float:
     """Change a film's temperatures by a share of what is asked for, no more than a limit; returns the largest [K]."""
-    sources, inlet, journal = weights
-    asked = np.empty((fields.shape[0], fields.shape[1]))
-    for i in range(asked.shape[0]):
-        for k in range(asked.shape[1]):
-            asked[i, k] = sources * fields[i, k, 0] + inlet * fields[i, k, 1] + journal * fields[i, k, 2]
-    asked -= cross.temperature.reshape(asked.shape)
-    face = sources * faces[0] + inlet * faces[1] + journal * faces[2] - cross.face
-    change = largest(asked.reshape(-1))
-    hotter = largest(face.reshape(-1))
-    if not change >= hotter:
-        change = hotter
+    inlet, journal = weights
+    cells = cross.temperature.reshape(fields.shape[:2])
+    asked = fields[:, :, 0] + inlet * fields[:, :, 1] + journal * fields[:, :, 2] - cells
+    face = faces[0] + inlet * faces[1] + journal * faces[2] - cross.face
+    change = np.maximum(largest(asked.reshape(-1)), largest(face.reshape(-1)))
     share = _limited_share(change, limits)
-    cross.temperature.reshape(asked.shape)[:] += share * asked
+    cells += share * asked
     cross.face[:] += share * face
     return change
 
@@ -178,9 +172,7 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
     back = cross_operator(grid, work, cross, case.running.speed, heat, operator)
     state.figures[BACKFLOW] = max(state.figures[BACKFLOW], back)
     body = (bodies.flux[bodies.which[m]], bodies.to_coarse[bodies.which[m]], across.guesses[m])
-    around = 0.0  # what the grooves hold
-    for other in problem.pads.each:
-        around += other.inlet / len(problem.pads.each)
+    around = problem.pads.each["inlet"].mean()  # what the grooves hold
     into_pad = times(body[0], times(body[1], (cross.face - around).reshape(-1))).reshape(cross.face.shape)
     operator.dissipation[:, :: len(cross.edges) - 1] -= station_heat(grid, into_pad)
     taken[:] = march_cross(operator, fields, operator.dissipation)
@@ -193,10 +185,6 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
         tolerance = _ROUGH_TOLERANCE if pad.heating > _ROUGH else _CONDUCTION_TOLERANCE
         more = conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
         taken[0] += more if math.isfinite(more) else 0.0
-    carried, total = operator.carried.reshape(-1), 0.0
-    for k in range(len(carried)):
-        total += carried[k]
-        for q in range(3):
-            outlet[q] += carried[k] * fields[-1, k, q]
+    carried = operator.carried.reshape(-1)
     for q in range(3):
-        outlet[q] /= total
+        outlet[q] = product(carried, fields[-1, :, q]) / carried.sum()

@@ -59,7 +59,7 @@ def note_heat(pad: np.record, asked: float, more: tuple[float, float], change: f
     pad.heating = asked
     pad.corrected[0] = pad.force[0] + more[0]
     pad.corrected[1] = pad.force[1] + more[1]
-    return asked if not change >= asked else change  # a NaN is not to be lost
+    return np.maximum(change, asked)  # a NaN is not to be lost
 
 
 @inner
@@ -137,16 +137,11 @@ def _answer(bodies: BodyStack, problem: Problem, m: int, fields: FloatArray) -> 
     count, rows, columns = fields.shape
     sources = np.zeros((count, rows, columns))
     loss = np.empty((rows, columns))
-    for i in range(rows):
-        for j in range(columns):
-            station = grid.dx * grid.height[j]
-            passed = _NUSSELT * case.running.heat[1] / work.thickness[i, j] * station if case.journal else 0.0
-            work.exchange[i, j] = passed
-            if count == 3:
-                sources[2, i, j] = passed
+    if case.journal:
+        work.exchange[:] = _NUSSELT * case.running.heat[1] / work.thickness * (grid.dx * grid.height)
+        sources[2] = work.exchange
     heat_sources(grid, work, case.running, case.kept, sources[0], loss)
-    for j in range(columns):
-        fields[1, 0, j] = 1.0
+    fields[1, 0] = 1.0
     conducts = len(bodies.flux) > 0
     if conducts:
         # what the pad takes at the present temperature is known; its answer to the change is solved for
@@ -217,23 +212,15 @@ def _krylov(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, right
 def _pass_on(work: FilmWork, fields: FloatArray, outlet: FloatArray, taken: FloatArray) -> None:
     """Set what leaves and what the journal takes up: with all else at zero, per kelvin of inlet and journal."""
     count, rows, columns = fields.shape
-    flow = work.flow[0, (rows - 2) * columns :]
-    total = 0.0
-    for j in range(columns):
-        total += flow[j]
-        for k in range(count):
-            outlet[k] += fields[k, rows - 1, j] * flow[j]
+    flow = work.flow[0, (rows - 2) * columns : (rows - 1) * columns]
+    weight = work.exchange.copy()  # all of it is the journal's
+    weight[0] *= 0.5
+    weight[-1] *= 0.5
     for k in range(count):
-        outlet[k] /= total
-    if count < 3:
-        return
-    for i in range(rows):
-        half = 0.5 if i == 0 or i == rows - 1 else 1.0
-        for j in range(columns):
-            weight = half * work.exchange[i, j]  # all of it is the journal's
-            for k in range(3):
-                taken[k] += weight * fields[k, i, j]
-            taken[2] -= weight
+        outlet[k] = product(fields[k, -1], flow) / flow.sum()
+        if count == 3:
+            taken[k] = product(weight.reshape(-1), fields[k].reshape(-1))
+    taken[2] -= weight.sum()
 
 
 @compiled

@@ -17,7 +17,7 @@ from model.statics.compiled.elimination import newton
 from model.statics.compiled.heat import exchange_heat, heat_films
 from model.statics.compiled.place import is_doubtful
 from model.statics.compiled.stack import BACKFLOW, GROWING, GROWN, BodyStack, PadStack
-from model.statics.compiled.step import grow_and_bend, move, solve_pressures
+from model.statics.compiled.step import change_state, grow_and_bend, move, solve_pressures
 from rigdata.arrays import FloatArray
 
 _MAX_ITERATIONS = 80
@@ -161,8 +161,7 @@ def _go_on(problem: Problem, memory: Memory, shift: FloatArray) -> None:
     if trail[_KEPT] > 0.0 and whole and near and trail[_LEFT] > slow * trail[_BEST_LEFT]:
         count = _remember(memory)
         _write_vector(problem, memory.images[count - 1])
-        for q in range(len(memory.before)):
-            memory.residuals[count - 1, q] = memory.images[count - 1, q] - memory.before[q]
+        memory.residuals[count - 1] = memory.images[count - 1] - memory.before
         _read_vector(problem, mixed(memory.images, memory.residuals, count))
     else:
         trail[_COUNT] = 0
@@ -221,26 +220,19 @@ def _part(vector: FloatArray, m: int, count: int) -> FloatArray:
 @inner
 def _read_vector(problem: Problem, vector: FloatArray) -> None:
     """Undo `_write_vector`."""
-    grids, _, pads, works, state, case = problem
-    state.position[0] = vector[0] * _MICROMETRE
-    state.position[1] = vector[1] * _MICROMETRE
-    closing = case.closing * (vector[2] - state.figures[GROWN])
-    state.figures[GROWN] = vector[2]
+    _, _, pads, _, state, case = problem
+    shift, moves = vector[:2] * _MICROMETRE - state.position, np.empty((len(pads.each), 3))
+    state.figures[GROWING] = vector[2] - state.figures[GROWN]
     warm = 3 + state.warmth.shape[1]
     bent = warm + (state.faces[0].size if case.thermal == ACROSS else 0)
     for m in range(len(pads.each)):
         pad, part = pads.each[m], _part(vector, m, len(pads.each))
         unit = _MICROMETRE / pad.pivot_radius
-        pad.clearance -= closing
-        pad.tilt = part[0] * unit
-        pad.deflection = part[1] * _MICROMETRE
-        more = part[2] * unit - pad.axial
-        pad.axial += more
+        moves[m, 0] = part[0] * unit - pad.tilt
+        moves[m, 1] = part[1] * _MICROMETRE - pad.deflection
+        moves[m, 2] = part[2] * unit - pad.axial
         if not pad.idle:
             state.warmth[m] = part[3:warm]
             state.faces[m].reshape(-1)[: bent - warm] = part[warm:bent]
-        change = part[bent:].reshape(state.bent[m].shape) * _MICROMETRE - state.bent[m]
-        state.bent[m] += change
-        for i in range(change.shape[0]):
-            for j in range(change.shape[1]):
-                works.extra[m, i, j] += change[i, j] + more * grids.cos[m, i] * grids.z[m, j]
+        state.mismatch[m] = part[bent:].reshape(state.bent[m].shape) * _MICROMETRE - state.bent[m]
+    change_state(problem, shift, moves, 1.0)

@@ -5,14 +5,13 @@ import math
 import numpy as np
 
 from model.compilation import inner
-from model.film.mesh import FilmGrid
 from model.film.models import solve_by
 from model.film.oil_state import least_share, set_viscosity
-from model.statics.compiled.bending import bend_pads, change_shape
+from model.statics.compiled.bending import axial_shape, bend_pads, change_shape
 from model.statics.compiled.case import ACROSS, BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Problem, along, rigid_approach
 from model.statics.compiled.heat import rest_films
 from model.statics.compiled.place import let_idle, rescue
-from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, SearchState, grid_of, work_of
+from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, grid_of, work_of
 from rigdata.arrays import FloatArray
 
 #: Largest step of the journal, as a share of the least clearance: the films' slopes are those of where it stands.
@@ -43,12 +42,9 @@ def solve_pressures(problem: Problem, sharp: bool) -> bool:
             found = solve_by(case.rupture, grid, work, wedge, speed, sharp, pad.supplied)
             pad.wedge[0], pad.wedge[1], pad.solved = a, b, True
             pad.least, pad.steps = found.min_film, found.steps
-            for i in range(2):
-                pad.force[i] = found.force[i]
-                if not sharp:
-                    pad.corrected[i] = found.force[i]
-                for j in range(2):
-                    pad.stiffness[i, j], pad.damping[i, j] = found.stiffness[i, j], found.damping[i, j]
+            pad.force[:], pad.stiffness[:], pad.damping[:] = found.force, found.stiffness, found.damping
+            if not sharp:
+                pad.corrected[:] = found.force
             if sharp or found.steps < 0 or found.force[0] > 0.0 or case.hold.flexure > 0.0:
                 break
             if not rescue(pad, work, state.position):
@@ -69,10 +65,7 @@ def grow_and_bend(problem: Problem, relaxation: float, change: float) -> float:
         change = max(change, _warm_journal(problem, relaxation))
     for m in range(len(problem.pads.each)):
         pad = problem.pads.each[m]
-        for i in range(2):
-            pad.felt[i] = pad.corrected[i]
-            for j in range(2):
-                pad.felt_stiffness[i, j] = pad.stiffness[i, j]
+        pad.felt[:], pad.felt_stiffness[:] = pad.corrected, pad.stiffness
     # a deformation counts like a temperature change of the same weight in the film's resistance
     share = bend_pads(problem.bodies, problem) if change < BOUNDLESS else 0.0
     return max(change, HEAT_PER_FORCE * share)
@@ -97,10 +90,8 @@ def _mean_temperature(problem: Problem) -> float:
     area, total = 0.0, 0.0
     for m in range(len(pads)):
         if not pads[m].idle:
-            for i in range(temperature.shape[1]):
-                for j in range(temperature.shape[2]):
-                    area += weight[m, i, j]
-                    total += weight[m, i, j] * temperature[m, i, j]
+            area += weight[m].sum()
+            total += (weight[m] * temperature[m]).sum()
     return total / area if area > 0.0 else pads[0].inlet
 
 
@@ -108,51 +99,45 @@ def _mean_temperature(problem: Problem) -> float:
 def move(problem: Problem, shift: FloatArray, damping: float) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
     grids, _, pads, works, state, case = problem
-    scale = damping
-    extra, bending = np.empty((0, 0)), state.bent.size > 0
+    scale, extra = damping, np.empty((0, 0))
     closing = case.closing * state.figures[GROWING]
-    axial = np.zeros(len(pads.each))
+    moves = np.zeros((len(pads.each), 3))
     length = max(math.hypot(shift[0], shift[1]), 1e-30)
     for m in range(len(pads.each)):
-        pad = pads.each[m]
+        pad, frame = pads.each[m], pads.each[m].frame
         scale = min(scale, _LONGEST_STEP * pad.clearance / length)
+        moves[m, 0], moves[m, 1] = pad.moves[0], pad.moves[1]
         if pad.solved:
-            frame, moves = pad.frame, pad.moves
-            da = frame[0, 0] * shift[0] + frame[0, 1] * shift[1] - moves[1] + closing
-            db = frame[1, 0] * shift[0] + frame[1, 1] * shift[1] + pad.pivot_radius * moves[0]
-            if bending:
-                axial[m] = change_shape(problem.bodies, problem, m, da, db)
-                extra = _extra(grid_of(grids, m), state, m, axial[m])
+            da = frame[0, 0] * shift[0] + frame[0, 1] * shift[1] - moves[m, 1] + closing
+            db = frame[1, 0] * shift[0] + frame[1, 1] * shift[1] + pad.pivot_radius * moves[m, 0]
+            if state.bent.size > 0:
+                moves[m, 2] = change_shape(problem.bodies, problem, m, da, db)
+                extra = state.mismatch[m] + moves[m, 2] * axial_shape(grid_of(grids, m))
             worst = least_share(grid_of(grids, m), work_of(works, m), da, db, extra)
             if worst * damping < _SHRINK - 1.0:
                 scale = min(scale, (_SHRINK - 1.0) / worst)
-    state.position[0] += scale * shift[0]
-    state.position[1] += scale * shift[1]
-    state.figures[GROWN] += scale * state.figures[GROWING]
-    for m in range(len(pads.each)):
-        pad = pads.each[m]
-        pad.clearance -= scale * closing
-        # a pad that friction stops where it does not tilt stops there, whatever the step's length
-        stops = pad.moves[0] == -pad.tilt
-        pad.tilt = 0.0 if stops else pad.tilt + scale * pad.moves[0]
-        pad.deflection += scale * pad.moves[1]
-        if bending and pad.solved:
-            extra = _extra(grid_of(grids, m), state, m, axial[m])
-            for i in range(extra.shape[0]):
-                for j in range(extra.shape[1]):
-                    works.extra[m, i, j] += scale * extra[i, j]
-                    state.bent[m, i, j] += scale * state.mismatch[m, i, j]
-            pad.axial += scale * axial[m]
-    state.figures[GROWING] = 0.0
+    change_state(problem, shift, moves, scale)
     return scale == 1.0
 
 
 @inner
-def _extra(grid: FilmGrid, state: SearchState, m: int, axial: float) -> FloatArray:
-    """Change of a film's shape besides its (a, b), (nt + 1, nz + 1) [m]."""
-    out = state.mismatch[m].copy()
-    if axial != 0.0:
-        for i in range(out.shape[0]):
-            for j in range(out.shape[1]):
-                out[i, j] += axial * grid.cos[i] * grid.z[j]
-    return out
+def change_state(problem: Problem, shift: FloatArray, moves: FloatArray, scale: float) -> None:
+    """Change the state by a share of a step: of the journal [m], and of every pad's tilt, deflection, axial tilt.
+
+    What a journal will grow by and what is missing of deformations stand in the state.
+    """
+    grids, _, pads, works, state, case = problem
+    hotter = scale * state.figures[GROWING]
+    state.position[:] += scale * shift
+    state.figures[GROWN] += hotter
+    state.figures[GROWING] = 0.0
+    for m in range(len(pads.each)):
+        pad = pads.each[m]
+        pad.clearance -= case.closing * hotter
+        # a pad that friction stops where it does not tilt stops there, whatever the step's length
+        pad.tilt = 0.0 if moves[m, 0] == -pad.tilt else pad.tilt + scale * moves[m, 0]
+        pad.deflection += scale * moves[m, 1]
+        if state.bent.size > 0 and pad.solved:
+            works.extra[m] += scale * (state.mismatch[m] + moves[m, 2] * axial_shape(grid_of(grids, m)))
+            state.bent[m] += scale * state.mismatch[m]
+            pad.axial += scale * moves[m, 2]
