@@ -290,9 +290,9 @@ def pad_rooms(bearing: Bearing) -> list[tuple[int, int, float]]:
     edges = []
     for number, pad in enumerate(bearing.pads, start=1):
         share = 1.0 - pad.pivot_offset if bearing.rotation == ROTATIONS[1] else pad.pivot_offset
-        edges.append(((pad.pivot_angle - share * pad.arc) % (2.0 * math.pi), number))
+        edges.append(((pad.pivot_angle - share * pad.arc) % math.tau, number))
     edges.sort()
     rooms = []
     for (start, number), (following, other) in zip(edges, edges[1:] + edges[:1], strict=True):
-        rooms.append((number, other, (following - start) % (2.0 * math.pi) if other != number else 2.0 * math.pi))
+        rooms.append((number, other, (following - start) % math.tau if other != number else math.tau))
     return rooms

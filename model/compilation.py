@@ -10,6 +10,7 @@ numba itself is imported at the first call of a loop: a process that only reads,
 import contextlib
 import functools
 import hashlib
+import inspect
 import os
 import warnings
 from collections.abc import Callable
@@ -56,25 +57,16 @@ class _Kernel:
         """Numba's."""
         return _dispatcher(_compiler(), self._function)
 
-    @functools.cached_property
-    def part(self) -> Any:
-        """Numba's, for the loops that call this one."""
-        return _compiler().njit(**_part_options())(self._function)
-
 
 @functools.cache
 def _compiler() -> Any:
-    """numba, with its machine code where we want it, and told that a kernel stands for its dispatcher."""
+    """numba, with its machine code where we want it."""
     import numba
     import numba.extending
 
     folder = os.environ.get("TPJB_CACHE", "").strip()
     if folder.lower() not in ("", "off") and "NUMBA_CACHE_DIR" not in os.environ:  # as pad solutions are
         numba.config.CACHE_DIR = str(Path(folder) / "compiled")  # type: ignore[attr-defined]
-
-    @numba.extending.typeof_impl.register(_Kernel)
-    def type_of(kernel: _Kernel, context: Any) -> Any:
-        return numba.typeof(kernel.part)
 
     return numba
 
@@ -201,9 +193,11 @@ def _digest(key: Any, code: bytes) -> bytes:
 
 
 def _register_inner_loops() -> None:
-    numba = _compiler()
+    overload = _compiler().extending.overload
     while _inner:
-        numba.extending.register_jitable(**_part_options())(_inner.pop())
+        loop = _inner.pop()
+        body = inspect.unwrap(loop)
+        overload(loop, jit_options=_part_options(), strict=False)(lambda *_, body=body: body)
 
 
 @functools.cache
@@ -288,4 +282,5 @@ def inner(function: Function) -> Function:
 def compiled(function: Function) -> Function:
     """Compile with numba, cached on disk under the stamp of all kernels: a way in from Python."""
     kernel: Any = _Kernel(function)
+    _inner.append(kernel)
     return kernel  # type: ignore[no-any-return]

@@ -186,8 +186,8 @@ def pad_matrices(setup: Setup, films: Sequence[PadFilm]) -> list[PadMatrices]:
                 stiffness=moments.T @ film.forces.stiffness @ frame,
                 damping=moments.T @ film.forces.damping @ frame,
                 pad_mass=np.array([[pad.moment_of_inertia, coupling], [coupling, pad.mass]]),
-                pad_damping=np.array([[0.0, 0.0], [0.0, setup.pivot_damping]]),
-                pad_stiffness=np.array([[hold.stiffness + friction[0], 0.0], [0.0, pivot]]),
+                pad_damping=np.diag([0.0, setup.pivot_damping]),
+                pad_stiffness=np.diag([hold.stiffness + friction[0], pivot]),
                 friction=friction,
             )
         )
@@ -197,18 +197,14 @@ def pad_matrices(setup: Setup, films: Sequence[PadFilm]) -> list[PadMatrices]:
 def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
     """b_G, the mass centre's distance from the pivot line [m], positive with rotation; zero for a central pivot."""
     half = 0.5 * film.pad.arc
-    inner, outer = _radii(setup, film)
-    return _mean_radius(inner, outer) * math.sin(half) / half * math.sin((0.5 - film.pad.pivot_offset) * film.pad.arc)
+    return _radii(setup, film)[2] * math.sin(half) / half * math.sin((0.5 - film.pad.pivot_offset) * film.pad.arc)
 
 
-def _radii(setup: Setup, film: PadFilm) -> tuple[float, float]:
+def _radii(setup: Setup, film: PadFilm) -> tuple[float, float, float]:
+    """Inner and outer radius of a pad, and the mean of its sector's area [m]."""
     inner = setup.bearing.journal_radius + film.pad.pad_clearance
-    return inner, inner + film.pad.thickness
-
-
-def _mean_radius(inner: float, outer: float) -> float:
-    """Mean radius of a sector's area [m]."""
-    return 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2)
+    outer = inner + film.pad.thickness
+    return inner, outer, 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2)
 
 
 def reduce_pads(
@@ -267,32 +263,26 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
                 held = film.grid, film.work, film.wedge, equilibrium.running
                 more = np.array([heat_impedance(*held, w, _SETTLED) for w in omega.tolist()])
             else:
-                more = _following_shape(setup, film, omega)
+                factor = setup.bending_factor if setup.options.perturbed_bending else 0.0
+                axial = _axial_tilt(setup, film) if setup.pads_follow else None
+                more = flexing_impedance(film, omega, factor, axial)
             added.append(pad.moments.T @ more @ pad.frame)
     h = with_structure(setup, reduce_pads(pads, omega, setup.vibration, added), omega)
     return np.asarray(MIRROR @ h @ MIRROR) if setup.mirrored else h
 
 
-def _following_shape(setup: Setup, film: PadFilm, omega: FloatArray) -> ComplexArray:
-    """What bending and axial tilting with the motion add to a pad's film, (n, 2, 2)."""
-    factor = setup.bending_factor if setup.options.perturbed_bending else 0.0
-    axial = _axial_tilt(setup, film) if setup.pads_follow else None
-    return flexing_impedance(film, omega, factor, axial)
-
-
 def _axial_tilt(setup: Setup, film: PadFilm) -> AxialTilt:
     """A pad's freedom to tilt along the shaft, a sector of a ring about the axis across it through its pivot."""
     assert film.forces is not None
-    pad = film.pad
-    grid = film.grid
+    pad, grid = film.pad, film.grid
     hold = held_moment(hold_numbers(setup), film.axial, float(film.forces.force[0]))
     weights = axial_levers(grid, hold.arm)[grid.node]
-    inner, outer = _radii(setup, film)
+    inner, outer, middle = _radii(setup, film)
     ends = pad.leading_edge, pad.leading_edge + pad.arc
     mean, square = (math.sin(ends[1]) - math.sin(ends[0])) / pad.arc, 0.5
     square += 0.25 * (math.sin(2.0 * ends[1]) - math.sin(2.0 * ends[0])) / pad.arc
     reach = 0.5 * (outer**2 + inner**2) * square + film.pivot_radius**2
-    reach -= 2.0 * film.pivot_radius * _mean_radius(inner, outer) * mean
+    reach -= 2.0 * film.pivot_radius * middle * mean
     return AxialTilt(axial_shape(grid), weights, hold.stiffness, pad.mass * (reach + setup.bearing.length**2 / 12.0))
 
 

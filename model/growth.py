@@ -41,10 +41,10 @@ def grown(bearing: Bearing, growth: Growth, supply: float, journal: float) -> Be
     out = growth.closing(bearing) * (journal - growth.reference)
 
     def run(number: int, pad: Pad) -> Pad:
-        seat = bearing.journal_radius + pad.pad_clearance + pad.thickness
-        seat_growth = by_housing * seat * (outward - growth.reference)
+        bore = bearing.journal_radius + pad.pad_clearance
+        seat_growth = by_housing * (bore + pad.thickness) * (outward - growth.reference)
         thicker = pad.backing.thermal_expansion * pad.thickness * warm
-        wider = pad.backing.thermal_expansion * (bearing.journal_radius + pad.pad_clearance) * warm
+        wider = pad.backing.thermal_expansion * bore * warm
         assembled = pad.assembled_clearance + seat_growth - thicker - out
         machined = pad.pad_clearance + wider - out
         if not (assembled > 0.0 and machined > 0.0):

@@ -17,7 +17,7 @@ import numpy as np
 from model.bearing import Bearing, BearingError, Pivot
 from model.conditions import named
 from model.measured_pivot import FormulaPivot, MeasuredPivot
-from model.pad.pivot import CONSTANT, OTHER, RIGID, ROCKER, SPHERICAL
+from model.pad.pivot import CONSTANT, OTHER, ROCKER, SPHERICAL
 from model.toml_text import read_page, read_table
 from rigdata.arrays import FloatArray
 from rigdata.near_names import hint
@@ -117,7 +117,7 @@ class ScaledPivot:
         return self.law.vibration_stiffness(load) * self.stiffness_factor
 
 
-RIGID_PIVOT = FormulaPivot((RIGID, 0.0, 0.0, 1.0), "rigid")
+RIGID_PIVOT = FormulaPivot((CONSTANT, math.inf, 0.0, 1.0), "rigid")
 
 
 def encoded(laws: Sequence[PivotLaw]) -> tuple[FloatArray, FloatArray]:
@@ -137,7 +137,7 @@ def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray]:
         while type(law) is ScaledPivot:
             factor, law = factor * law.stiffness_factor, law.law
         # a law derived from one that compiled searches know may deflect otherwise
-        if isinstance(law, (FormulaPivot, MeasuredPivot)) and type(law) in (FormulaPivot, MeasuredPivot):
+        if type(law) is FormulaPivot or type(law) is MeasuredPivot:
             row[:] = law.numbers
             row[3] = factor
             curves.append(law.curve)

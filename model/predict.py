@@ -20,7 +20,7 @@ from model.prediction import Prediction
 from model.setup import Mesh, Setup
 from model.statics.equilibrium import Equilibrium
 from model.statics.solve import solve_equilibrium
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
 from rigdata.units import UnitError, to_si
 
@@ -151,14 +151,17 @@ def predict_setup(
     force = pushing * np.array([math.cos(load_direction), math.sin(load_direction)])
     running, equilibrium = solve_as_it_runs(setup, force, speed, start)
     lines = np.atleast_1d(omega)
-    h, regimes = _impedance(running, equilibrium, lines)
+    h, regimes = np.full((len(lines), 2, 2), complex(math.nan, math.nan)), tuple[Condition, ...]()
+    if equilibrium.converged:
+        h = bearing_impedance(running, equilibrium, lines)
+        regimes = friction_regimes(running, equilibrium, lines) if running.friction else ()
     setup = mirrored(running) if running.mirrored else running
     instruments = setup.instruments
     films = equilibrium.films
     position = in_rig(running, equilibrium.position)
     tilt = np.array([f.tilt for f in films])
     pad_load = np.array([f.forces.force[0] if f.forces is not None else 0.0 for f in films])
-    shape = (2, 2) if omega.ndim == 0 else (len(lines), 2, 2)
+    shape = (*omega.shape, 2, 2)
     return Prediction(
         load=load,
         load_direction=load_direction,
@@ -178,14 +181,6 @@ def predict_setup(
         setup=setup,
         solver=predict_setup,
     )
-
-
-def _impedance(setup: Setup, equilibrium: Equilibrium, lines: FloatArray) -> tuple[ComplexArray, tuple[Condition, ...]]:
-    """Impedance (n, 2, 2) at the excitation frequencies, NaN without an equilibrium; how pivots with friction move."""
-    if not equilibrium.converged:
-        return np.full((len(lines), 2, 2), complex(math.nan, math.nan)), ()
-    regimes = friction_regimes(setup, equilibrium, lines) if setup.friction else ()
-    return bearing_impedance(setup, equilibrium, lines), regimes
 
 
 def solve_as_it_runs(

@@ -83,7 +83,7 @@ class Prediction:
     def __str__(self) -> str:
         x, y = 1e6 * self.position
         return (
-            f"{self.load:g} N at {math.degrees(self.load_direction):.4g} deg, {self.speed / (2 * math.pi):.4g} Hz: "
+            f"{self.load:g} N at {math.degrees(self.load_direction):.4g} deg, {self.speed / math.tau:.4g} Hz: "
             f"shaft at ({x:.4g}, {y:.4g}) um, thinnest film {1e6 * self.min_film:.3g} um, "
             f"hottest {self.max_temperature:.4g} degC; {', '.join(self.status) or 'all well'}"
         )
@@ -97,7 +97,7 @@ class Prediction:
 
     @property
     def _frequencies(self) -> FloatArray:
-        return np.atleast_1d(np.asarray(self.excitation, float)) / (2 * math.pi)
+        return np.atleast_1d(np.asarray(self.excitation, float)) / math.tau
 
     def summary(self) -> str:
         """Operating point, direct coefficients in MN/m and kN s/m, position and extremes, in one line."""
@@ -130,7 +130,7 @@ class Prediction:
         table: dict[str, Any] = {
             "static_load_N": self.load,
             "static_load_direction_deg": math.degrees(self.load_direction),
-            "shaft_speed_Hz": self.speed / (2 * math.pi),
+            "shaft_speed_Hz": self.speed / math.tau,
             "rotation": self.rotation,
             "excitation_Hz": self._frequencies,
         }
@@ -247,7 +247,7 @@ class Prediction:
         """S = mu N D L / W (R / Cb)^2, N in rev/s, mu of the oil that enters, Cb the mean of the pads."""
         bearing, clearance = self.setup.bearing, self._clearance
         viscosity = float(bearing.oil.viscosity(self.setup.inlet_temperature))
-        turns = self.speed / (2.0 * math.pi)
+        turns = self.speed / math.tau
         size = viscosity * turns * bearing.journal_diameter * bearing.length
         return size * (bearing.journal_radius / clearance) ** 2 / self.load if self.load > 0.0 else math.inf
 
@@ -261,7 +261,7 @@ class Prediction:
         """Angle from the load's direction to that of the journal [rad], positive with rotation, within +-pi."""
         x, y = self.bearing_position
         turn = self._sense * (math.atan2(y, x) - self.load_direction)
-        return (turn + math.pi) % (2.0 * math.pi) - math.pi
+        return (turn + math.pi) % math.tau - math.pi
 
     @property
     def _sense(self) -> float:

@@ -20,10 +20,6 @@ _THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 #: Those with pads that deform.
 _BENDING = ("tehd", "thd")
 
-#: lambda of `thermal="thd"` where the effect `hot_oil_carryover` says nothing: the groove's flow balance alone, what a
-#: pad leaves is there for the next one and the supply makes up for the rest.
-_GROOVE_MIXING = 1.0
-
 
 @dataclass(frozen=True)
 class Mesh:
@@ -35,10 +31,6 @@ class Mesh:
     def coarser(self) -> Mesh:
         """Half as many intervals each way (for the two-mesh error), even and no less than 8 x 4."""
         return Mesh(max(8, 2 * (self.along // 4)), max(4, 2 * (self.across // 4)))
-
-    def finer(self) -> Mesh:
-        """Twice as many intervals each way."""
-        return Mesh(2 * self.along, 2 * self.across)
 
 
 @dataclass(frozen=True)
@@ -164,8 +156,11 @@ class Setup:
 
     @property
     def mixing(self) -> float:
-        """Share lambda of the oil leaving a pad that is there for the next: `carryover`, or all of it (`thd`)."""
-        return self.carryover or (_GROOVE_MIXING if self.thermal == "thd" else 0.0)
+        """Share lambda of the oil leaving a pad that is there for the next: `carryover`, or all of it (`thd`).
+
+        All of it is the groove's flow balance alone: the supply makes up for the rest.
+        """
+        return self.carryover or float(self.thermal == "thd")
 
     @property
     def structure(self) -> FloatArray:

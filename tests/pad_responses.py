@@ -1,6 +1,6 @@
 """A pad's response to single films, field by field: what tests ask of `model.pad`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -94,4 +94,6 @@ def pad_solid(
 ) -> PadResponse:
     """Solid of a pad for a film grid."""
     theta, z = np.asarray(film_theta, dtype=float), np.asarray(film_z, dtype=float)
-    return PadResponse(PadGeometry.of(pad, bearing, face), density or MeshDensity(), theta, z)
+    geometry = PadGeometry.of(pad, bearing)
+    geometry = geometry if face is None else replace(geometry, face=face)
+    return PadResponse(geometry, density or MeshDensity(), theta, z)

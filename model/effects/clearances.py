@@ -10,6 +10,7 @@ from model.effects.kind import DIRECTION, PAD, Parameter, effect_on
 from model.setup import Setup
 
 _BORE = Parameter("pad_clearance_change", "m", "length", 0.0, -0.0001, 0.0002, 1.2e-05)
+_BORING = "Boring tolerance of a pad of 100 mm: IT6 to IT7"
 
 
 def _moved(setup: Setup, name: str, change: float, number: int | None = None) -> Setup:
@@ -64,7 +65,7 @@ def uneven_pads(setup: Setup, **offsets: float) -> Setup:
 @effect_on(
     "bearing",
     _BORE,
-    source="Boring tolerance of a pad of 100 mm: IT6 to IT7",
+    source=_BORING,
     finding="the pads are bored {pad_clearance_change:size} {pad_clearance_change:wider|tighter} than drawn",
     physics="The pads' radius and so the preload differ from the drawing: the film converges more or less strongly.",
     on_the_rig="The clearance polygon agrees with the drawing; stiffness is off in both directions, most at low load.",
@@ -79,7 +80,7 @@ def preload_error(setup: Setup, pad_clearance_change: float) -> Setup:
     "bearing",
     PAD,
     _BORE,
-    source="Boring tolerance of a pad of 100 mm: IT6 to IT7",
+    source=_BORING,
     finding="{pad} is bored {pad_clearance_change:size} {pad_clearance_change:wider|tighter} than drawn",
     physics="One pad has another radius, so another preload. Its film converges more or less than the others'.",
     on_the_rig="The clearance polygon agrees with the drawing; coefficients are off along that pad's direction.",

@@ -229,7 +229,7 @@ def _number(value: Any, parameter: Parameter, place: str) -> float:
     if isinstance(value, bool) or not hasattr(value, "__float__"):
         raise EffectError(f"{place}: must be a number [{parameter.unit}], got {value!r}.")
     try:
-        value = int(value) if isinstance(value, int) and abs(value) < 2**53 else float(value)
+        value = float(value)
     except OverflowError as error:
         raise EffectError(f"{place}: a whole number of hundreds of digits is outside any physical range.") from error
     if not parameter.low <= value <= parameter.high:
@@ -239,4 +239,4 @@ def _number(value: Any, parameter: Parameter, place: str) -> float:
         if value != int(value):
             raise EffectError(f"{place}: a pad is a whole number, got {value!r}.")
         return int(value)
-    return float(value)
+    return value

@@ -7,6 +7,9 @@ from model.effects.kind import PAD, Parameter, effect_on
 from model.pivots import ScaledPivot
 from model.setup import Setup
 
+#: How many times as stiff as its law says a pivot is.
+_FACTOR = Parameter("stiffness_factor", "1", "ratio", 1.0, 0.05, 5.0, 0.5, "inverse")
+
 
 def _only_on(*kinds: str, otherwise: str) -> Callable[[Bearing], str]:
     """Which pivots have what an effect acts on: rockers roll, spheres slide, knife edges only tilt."""
@@ -21,7 +24,7 @@ def _only_on(*kinds: str, otherwise: str) -> Callable[[Bearing], str]:
 
 @effect_on(
     "bearing",
-    Parameter("stiffness_factor", "1", "ratio", 1.0, 0.05, 5.0, 0.5, "inverse"),
+    _FACTOR,
     source="Measured pivots are 2-3 times softer than the formula (Lubricants 2019, 7, 61, Fig. 12)",
     finding="all pivots have {stiffness_factor} of the formula's stiffness",
     physics=(
@@ -41,7 +44,7 @@ def pivot_flexibility(setup: Setup, stiffness_factor: float) -> Setup:
 @effect_on(
     "bearing",
     PAD,
-    Parameter("stiffness_factor", "1", "ratio", 1.0, 0.05, 5.0, 0.5, "inverse"),
+    _FACTOR,
     source="Pad #5 of the paper is the softest of five (Lubricants 2019, 7, 61, Fig. 12)",
     finding="the pivot of {pad} has {stiffness_factor} of the formula's stiffness",
     physics="One pivot gives more, or less, than the others. It stands in series with that pad's film.",

@@ -37,11 +37,12 @@ class PadDeformation:
     """
 
     compliance: FloatArray  #: (n, n): Deformation by pressure [m/Pa].
-    gather: FloatArray  #: (a, nt + 1): Loads of the solid's lines by the film's pressure along the arc.
+    gather: FloatArray  #: (a, nt - 1): Loads of the solid's lines by the film's unknown pressures along the arc.
     corners: FloatArray  #: (b, nt + 1): Temperatures of the lines between its elements by the film's.
     spread: FloatArray  #: (nt + 1, a): Deformation of the film's nodes by that of the lines.
-    by_load: FloatArray  #: ((nz + 1) a, (nz + 1) a): Deformation of the lines by their loads [m/Pa].
-    by_heat: FloatArray  #: ((nz + 1) a, (nz + 1) b): And by their temperatures [m/K].
+    #: ((nz + 1) a, nz a + (nz + 1) b): Deformation of the lines by their loads with an unknown pressure [m/Pa], and
+    #: by their temperatures [m/K].
+    answer: FloatArray
     to_coarse: FloatArray  #: (c, n): Temperatures of the pad's coarser nodes by those of the film.
     flux: FloatArray  #: (n, c): Heat flux density into the pad by them [W/m^2/K].
     shapes: FloatArray  #: (nt + 1, nz + 1, m): In which the pad gives way most.
@@ -61,13 +62,12 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
     from model.pad.operators import pad_operators
 
     angle, z, area = (np.frombuffer(raw, dtype=float) for raw in (angles, zs, areas))
-    inner = np.zeros((len(angle), len(z)), dtype=bool)
-    inner[1:-1, 0 if z[0] == 0.0 else 1 : -1] = True
     ahead = 0
     if angle[0] - geometry.leading > 1e-9:  # a starved film: the dry arc ahead of it carries nothing
         ahead = _DRY_STATIONS
         angle = np.concatenate([np.linspace(geometry.leading, angle[0], ahead + 1)[:-1], angle])
     half = z[0] == 0.0
+    first = 0 if half else 1
     compliance, by_load, by_heat, coarser, flux = np.zeros(()), np.zeros(()), np.zeros(()), [], []
     for even in (True,) if half else (True, False):
         solid = pad_operators(geometry, even=even, cooled=cooled)
@@ -80,20 +80,24 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
         by_heat = by_heat + _between_lines(across[1], solid.expansion, across[2])
         coarser.append(np.kron(corners, across[2]))
         flux.append(project @ solid.flux)
-    shapes = _softest_shapes(compliance, area)
+    # the leading eigenshapes of the compliance, orthonormal by area, by subspace iteration
+    root = np.sqrt(area)[:, None]
+    basis = np.linalg.qr(np.random.default_rng(0).standard_normal((len(area), SHAPES + 4)))[0]
+    for _ in range(4):
+        basis = np.linalg.qr(root * (compliance @ (basis / root)))[0]
+    shapes = basis[:, :SHAPES] / root
     amplitudes = np.ascontiguousarray((shapes * area[:, None]).T)  # a search is compiled for one order of it
     return PadDeformation(
         compliance=compliance,
-        gather=gather,
+        gather=gather[:, 1:-1],
         corners=corners,
         spread=spread,
-        by_load=by_load,
-        by_heat=by_heat,
+        answer=np.hstack([by_load[:, first * len(gather) : -len(gather)], by_heat]),
         to_coarse=np.vstack(coarser),
         flux=np.hstack(flux),
         shapes=shapes.reshape(-1, len(z), SHAPES),
         amplitudes=amplitudes,
-        response=np.ascontiguousarray((amplitudes @ compliance)[:, inner.ravel()]),
+        response=(amplitudes @ compliance).reshape(SHAPES, -1, len(z))[:, 1:-1, first:-1].reshape(SHAPES, -1),
     )
 
 
@@ -128,16 +132,6 @@ def axis_maps(face: Line, film: Line, even: bool | None) -> tuple[Any, Any, Any]
     gather = face.tabulate(points).T @ weighted
     project = np.linalg.solve(film.matrix(0, 0), halves * gather.T)
     return gather, project, np.linalg.solve(corners.matrix(0, 0), corners.tabulate(points).T @ weighted)
-
-
-def _softest_shapes(compliance: FloatArray, area: FloatArray) -> FloatArray:
-    """Leading eigenshapes of the compliance, orthonormal by area, (n, SHAPES); by subspace iteration."""
-    root = np.sqrt(area)
-    start = np.random.default_rng(0).standard_normal((len(area), SHAPES + 4))
-    basis = np.linalg.qr(start)[0]
-    for _ in range(4):
-        basis = np.linalg.qr(root[:, None] * (compliance @ (basis / root[:, None])))[0]
-    return np.asarray(basis[:, :SHAPES] / root[:, None])
 
 
 def force_weights(grid: FilmGrid) -> FloatArray:

@@ -18,23 +18,23 @@ class Line:
     degree: int = 2
 
     def __post_init__(self) -> None:
-        breaks = np.array(self.breaks, dtype=float)
-        if breaks.ndim != 1 or breaks.size < 2 or not np.all(np.diff(breaks) > 0):
-            raise ModelError(
-                f"breaks must be 1-D, strictly increasing, of at least two values; got shape {breaks.shape}."
-            )
-        breaks.setflags(write=False)
-        object.__setattr__(self, "breaks", breaks)
+        if not np.all(np.diff(self.breaks) > 0.0):  # of a bearing that was made in code
+            raise ModelError(f"a pad has no elements that end at {self.breaks}. Check its arc and its thicknesses.")
 
     @property
     def n_nodes(self) -> int:
         """Number of nodes."""
         return (self.breaks.size - 1) * self.degree + 1
 
+    @property
+    def _places(self) -> FloatArray:
+        """Nodes of an element from 0 to 1; a degree above 2 would ask for others."""
+        return np.linspace(0.0, 1.0, self.degree + 1)
+
     @cached_property
     def nodes(self) -> FloatArray:
         """Node coordinates, shape (n_nodes,), increasing."""
-        inside = self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * _reference_nodes(self.degree)[None, :-1]
+        inside = self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * self._places[:-1]
         return np.append(inside.ravel(), self.breaks[-1])
 
     def tabulate(self, x: ArrayLike, derivative: int = 0) -> FloatArray:
@@ -48,7 +48,7 @@ class Line:
             monomials = local[:, None] ** powers
         else:
             monomials = powers * local[:, None] ** np.maximum(powers - 1, 0) / size[:, None]
-        shape = monomials @ np.linalg.inv(_reference_nodes(self.degree)[:, None] ** powers)
+        shape = monomials @ np.linalg.inv(self._places[:, None] ** powers)
         out = np.zeros((points.size, self.n_nodes))
         columns = element[:, None] * self.degree + powers
         np.put_along_axis(out, columns, shape, axis=1)
@@ -95,9 +95,3 @@ def gauss_rule(breaks: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
     size = np.diff(breaks)
     x = breaks[:-1, None] + 0.5 * size[:, None] * (points + 1.0)
     return x.ravel(), (0.5 * size[:, None] * weights).ravel()
-
-
-def _reference_nodes(degree: int) -> FloatArray:
-    """Gauss-Lobatto points on [0, 1]: well conditioned, and equally spaced up to degree 2."""
-    inner = np.polynomial.legendre.Legendre.basis(degree).deriv().roots()
-    return 0.5 * (1.0 + np.concatenate(([-1.0], np.sort(inner.real), [1.0])))

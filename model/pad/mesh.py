@@ -80,7 +80,7 @@ class PadGeometry:
             )
 
     @classmethod
-    def of(cls, pad: Pad, bearing: Bearing, face: PivotFace | None = None) -> PadGeometry:
+    def of(cls, pad: Pad, bearing: Bearing) -> PadGeometry:
         """Geometry of one pad of a bearing.
 
         The inner radius, journal radius + Cp, is rounded to 0.1 mm: a fit that moves Cp by microns would
@@ -93,7 +93,7 @@ class PadGeometry:
             leading=pad.leading_edge,
             trailing=pad.leading_edge + pad.arc,
             length=bearing.length,
-            face=pivot_face(pad, bearing) if face is None else face,
+            face=pivot_face(pad, bearing),
             back_convection=pad.back_convection,
             backing=pad.backing,
             babbitt=pad.babbitt,
@@ -152,7 +152,6 @@ class MeshDensity:
     babbitt: int = 1
     rim: float = 0.035
     edge: float = 0.16
-    degree: int = 2
 
 
 def sector_mesh(geometry: PadGeometry, density: MeshDensity) -> SectorMesh:
@@ -182,8 +181,7 @@ def sector_mesh(geometry: PadGeometry, density: MeshDensity) -> SectorMesh:
     if geometry.babbitt_thickness > 0:
         r = _join(np.linspace(geometry.inner_radius, geometry.interface_radius, density.babbitt + 1), r)
         layers = (geometry.babbitt,) * density.babbitt + layers
-    lines = [Line(breaks, density.degree) for breaks in (r, theta, z)]
-    return SectorMesh(lines[0], lines[1], lines[2], layers)
+    return SectorMesh(Line(r), Line(theta), Line(z), layers)
 
 
 def _share(count: int, first: float, second: float) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from model.interpolation import row_below
 from rigdata.arrays import FloatArray
 
 #: Which formula; of a law known to Python only, `OTHER`, the row holds deflection and compliance as last asked for.
-RIGID, CONSTANT, ROCKER, SPHERICAL, MEASURED, OTHER = range(6)
+CONSTANT, ROCKER, SPHERICAL, MEASURED, OTHER = range(5)
 
 
 @inner
@@ -19,7 +19,7 @@ def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
     """Give of a pivot, delta(W) [m]: `law` (4,), `curve` (5, m)."""
     if law[0] == OTHER:
         return law[1]
-    if not load > 0.0 or law[0] == RIGID:
+    if not load > 0.0:
         return 0.0
     if law[0] == CONSTANT:
         give = load / law[1]
@@ -41,8 +41,6 @@ def compliance(law: FloatArray, curve: FloatArray, load: float) -> float:
     """Tangent d delta / dW [m/N]; zero for a rigid pivot."""
     if law[0] == OTHER:
         return law[2]
-    if law[0] == RIGID:
-        return 0.0
     if law[0] == CONSTANT:
         value = 1.0 / law[1]
     elif law[0] == ROCKER:

@@ -62,18 +62,13 @@ class PadFilm:
         middle = 0 if self.grid.first == 0 else len(self.grid.z) // 2
         return float(np.interp(angle, self.grid.angle, self.face_temperature[:, middle]))
 
-    def rigid_approach(self, position: FloatArray) -> float:
-        """Approach a of the film if the pivot were rigid [m]: `position` (2,) [m]."""
-        return self.preload_distance + float(self.normal @ position)
-
 
 def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFilm | None]:
     """Lay out every pad's film; all of them side by side besides."""
     bearing = setup.bearing
-    symmetric = setup.misalignment[0] == 0.0
-    across = setup.thermal == "thd"
-    solid = setup.flexible_pads or setup.options.conduction or across
     angle, toward = setup.misalignment
+    across, symmetric = setup.thermal == "thd", angle == 0.0
+    solid = setup.flexible_pads or setup.options.conduction or across
     films = []
     spans = tuple((p.leading_edge + setup.starvation * p.arc, p.leading_edge + p.arc) for p in bearing.pads)
     shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))

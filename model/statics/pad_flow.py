@@ -11,7 +11,7 @@ from model.film.mesh import FilmWork
 from model.film.oil_state import edge_flows
 from model.film.turbulence import shear_factor
 from model.statics.pad_film import PadFilm
-from rigdata.arrays import BoolArray, FloatArray
+from rigdata.arrays import FloatArray
 
 #: Share by which a film may ask for more than there is: what a mesh does not tell.
 _PLENTY = 1e-3
@@ -79,21 +79,14 @@ def outlet_temperature(film: PadFilm) -> float:
     return film.outlet if film.cross is not None else _mixed(film.work.temperature[-1], film.work.flow_x[-1], math.nan)
 
 
-def _ruptured(work: FilmWork) -> BoolArray:
-    """Where the film is ruptured, its edges as the nodes beside them: there p = 0 says nothing."""
-    ruptured = work.ruptured.copy()
-    ruptured[-1] = ruptured[-2]
+def striation(work: FilmWork) -> FloatArray:
+    """Share of the gap that oil fills: 1, or h_rupture / h downstream of where a line's film ruptured."""
+    share, h, ruptured = np.ones_like(work.thickness), work.thickness, work.ruptured.copy()
+    ruptured[-1] = ruptured[-2]  # at the edges p = 0 says nothing: they are as the nodes beside them
     ruptured[:, -1] = ruptured[:, -2]
     lines = len(work.unknown) // (len(ruptured) - 2)
     if lines < ruptured.shape[1] - 1:  # z = -L/2 is an edge, not a line of symmetry
         ruptured[:, 0] = ruptured[:, 1]
-    return ruptured
-
-
-def striation(work: FilmWork) -> FloatArray:
-    """Share of the gap that oil fills: 1, or h_rupture / h downstream of where a line's film ruptured."""
-    share = np.ones_like(work.thickness)
-    ruptured, h = _ruptured(work), work.thickness
     for i in np.flatnonzero(ruptured.any(axis=1)):
         if i > 0:
             behind = share[i - 1] * np.minimum(1.0, h[i - 1] / h[i])

@@ -21,7 +21,7 @@ from rigdata.arrays import FloatArray
 def couples_heat(setup: Setup) -> bool:
     """Whether the films' temperatures depend on more than their own inlets."""
     return setup.thermal != "isothermal" and bool(
-        setup.thermal == "thd" or setup.mixing or setup.options.conduction or setup.options.isothermal_journal
+        setup.mixing or setup.options.conduction or setup.options.isothermal_journal
     )
 
 
@@ -44,7 +44,7 @@ def case_of(setup: Setup, load: FloatArray, running: Running, heat: float) -> Ca
         thermal = ACROSS if setup.thermal == "thd" else COUPLED
         running = running._replace(heat=(oil.specific_heat, oil.conductivity))
     model, bends = FILM_MODELS[rupture_of(setup)], setup.flexible_pads or setup.pads_follow
-    plain = model == SWIFT_STIEBER and not (couples_heat(setup) or bends)
+    plain = model == SWIFT_STIEBER and thermal in (ISOTHERMAL, ALONE) and not bends
     return Case(
         load=np.array(load, dtype=float),
         running=running,
@@ -71,4 +71,4 @@ def bodies_of(setup: Setup, case: Case, films: Sequence[PadFilm]) -> BodyStack |
     bodies = tuple(f.deformation for f in films if f.deformation is not None)
     factor = setup.bending_factor if setup.flexible_pads else 0.0
     conducting = case.thermal == ACROSS or (case.thermal == COUPLED and setup.options.conduction)
-    return stacked_bodies(bodies, films[0].grid.first, factor, conducting)
+    return stacked_bodies(bodies, factor, conducting)

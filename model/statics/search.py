@@ -92,7 +92,7 @@ class Search:
         }
         for name, values in numbers.items():
             each[name] = values
-        angles = [f.pad.pivot_angle % (2.0 * math.pi) for f in films]
+        angles = [f.pad.pivot_angle % math.tau for f in films]
         return PadStack(each, np.argsort(angles, kind="stable"), curves)
 
     def _state(self) -> SearchState:
@@ -161,7 +161,7 @@ class Search:
 
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
-        pads, reach = self.pads, self._reach
+        pads, reach = self.pads, self.reach
         place_pads(pads, self.works, loaded, self.state.position)
         if self.case.thermal == ISOTHERMAL:
             return
@@ -180,14 +180,14 @@ class Search:
                 film.cross.face[:] = temperature
 
     @property
-    def _reach(self) -> FloatArray:
+    def reach(self) -> FloatArray:
         """Approach of every film if its pivot were rigid, (n,) [m]."""
         return np.asarray(self.pads["preload"] + self.pads["frame"][:, 0] @ self.state.position)
 
     def margins(self) -> FloatArray:
         """How far pads are above the folds of their curves, as shares of their clearances, (n,)."""
         folds = np.where(self.pads["rows"] >= 2, self.pads["attitudes"][:, 0, 0], math.inf)
-        return np.asarray((self._reach - folds) / self.pads["clearance"])
+        return np.asarray((self.reach - folds) / self.pads["clearance"])
 
     def let_idle(self, numbers: list[int]) -> None:
         """Let pads (from 0) carry nothing."""
@@ -208,17 +208,16 @@ class Search:
                 and pads["attitudes"][m, 3, 0] == 0.0
             ):
                 film.work.ruptured[:] = False
-                wedge = (float(pads["clearance"][m]), float(pads["attitudes"][m, 1, 0]), 0.0)
+                film.wedge = (float(pads["clearance"][m]), float(pads["attitudes"][m, 1, 0]), 0.0)
                 set_viscosity(film.work, self.case.running.oil)
-                film.forces = solve_film(film.grid, film.work, wedge, self.running.speed, False)
+                film.forces = solve_film(film.grid, film.work, film.wedge, self.running.speed, False)
                 even.append(film.number)
         return even
 
     def start_from(self, start: Equilibrium) -> bool:
         """Take over a neighbour's state, moved as the curves are; False if it has none or its mesh does not fit."""
         coupled, pads, state = self.case.thermal in (COUPLED, ACROSS), self.pads, self.state
-        mesh = self.works.pressure.shape
-        if not start.converged or mesh != (len(start.films), *start.films[0].work.pressure.shape):
+        if not start.converged or self.works.pressure.shape != (len(start.films), *start.films[0].work.pressure.shape):
             return False
         self.stand()
         # where a pad has no curve, here or there, nothing is moved; pads that friction holds stay where they are held
@@ -257,14 +256,10 @@ class Search:
             pads["clearance"] -= self.case.closing * hotter
         return True
 
-    @property
-    def problem(self) -> Problem:
-        """What the compiled search works on."""
-        return Problem(self.grids, self.bodies, self.stack, self.works, self.state, self.case)
-
     def run(self) -> Equilibrium:
         """Iterate from where the search stands."""
-        problem, across, code = self.problem, self.across, iteration.ASKS_OIL
+        problem = Problem(self.grids, self.bodies, self.stack, self.works, self.state, self.case)
+        across, code = self.across, iteration.ASKS_OIL
         memory = iteration.fresh_memory(problem)
         while code >= iteration.ASKS_OIL:
             code = iteration.iterate(problem, memory)

@@ -123,7 +123,7 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
     even = search.even_films()
     off, restless = [], []
     for m, film in enumerate(films):
-        opens = film.rigid_approach(result.position) <= 0.0
+        opens = search.reach[m] <= 0.0
         if film.idle and (m in held or (above[m] > near and opens)):
             off.append(film.number)
         elif film.idle and above[m] > near:

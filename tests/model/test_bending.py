@@ -50,7 +50,7 @@ def test_pads_of_one_shape_share_their_matrices(bearing):
 def test_the_matrices_of_a_search_stand_in_one_order(bearing):
     """Another one of any of them is another signature, for which a process compiles the search for half a minute."""
     setup = Setup(bearing, pivot_laws("kirk", bearing), "tehd")
-    bodies = Search(setup, np.array([0.0, -5000.0]), SPEED).problem.bodies
+    bodies = Search(setup, np.array([0.0, -5000.0]), SPEED).bodies
     assert bodies is not None
     assert [name for name, values in bodies._asdict().items() if not values.flags.c_contiguous] == []
 

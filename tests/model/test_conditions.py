@@ -17,7 +17,7 @@ from model.predict import predict
 from model.prediction import Prediction
 from model.setup import Setup
 from model.statics.compiled import iteration
-from model.statics.compiled.iteration import RESIDUAL, SINGULAR
+from model.statics.compiled.iteration import SINGULAR
 from model.statics.conditions import overloaded_pads, unsupported
 
 SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
@@ -118,7 +118,6 @@ def test_limits_of_a_pad_are_told_apart(rocker):
 def test_singular_steps_are_named(rocker, monkeypatch):
     # no bearing is known that gets there: the guard is held by a search that says so
     def singular(*arrays: object) -> int:
-        arrays[-1].trail[RESIDUAL] = math.inf
         return SINGULAR
 
     monkeypatch.setattr(iteration, "iterate", singular)

@@ -107,7 +107,8 @@ def test_idle_pads_of_isothermal_films_shear_oil_as_cold_as_it_enters(rocker, pr
     surface, supply = turning * bearing.journal_radius, bearing.oil.supply_temperature
     viscosity, density = float(bearing.oil.viscosity(supply)), float(bearing.oil.density(supply))
     for film in idle:
-        gap = film.pad.pad_clearance - film.rigid_approach(p.equilibrium.position) * np.cos(film.grid.angle)
+        approach = film.preload_distance + film.normal @ p.equilibrium.position
+        gap = film.pad.pad_clearance - approach * np.cos(film.grid.angle)
         shear = viscosity * surface**2 * gap[0] / gap**2
         power = np.trapezoid(np.where(gap > gap[0], shear, viscosity * surface**2 / gap), dx=film.grid.dx)
         assert film.resting.power == pytest.approx(power * bearing.length, rel=1e-9)

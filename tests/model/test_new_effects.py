@@ -279,7 +279,7 @@ def test_pads_that_friction_holds_off_their_loaded_attitude_idle():
     set_viscosity(film.work, oil_constants(p.setup.bearing.oil))
     for film.tilt in np.linspace(-1e-3, 2.5e-3, 200):
         beside = float(film.tangent @ p.bearing_position) + film.pivot_radius * film.tilt
-        wedge = (film.pad.pad_clearance, film.rigid_approach(p.bearing_position), beside)
+        wedge = (film.pad.pad_clearance, film.preload_distance + film.normal @ p.bearing_position, beside)
         forces = solve_film(film.grid, film.work, wedge, p.equilibrium.running.speed, False)
         load, moment = forces.force * (1.0, -film.pivot_radius)
         if forces.steps > 0 and load > 1.0:

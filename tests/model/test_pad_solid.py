@@ -162,7 +162,7 @@ class TestGeometry:
 
     def test_face_must_fit(self) -> None:
         with pytest.raises(ValueError, match="does not fit"):
-            PadGeometry.of(PAD, bearing(), PivotFace(0.2, 0.01))
+            dataclasses.replace(PadGeometry.of(PAD, bearing()), face=PivotFace(0.2, 0.01))
         with pytest.raises(ValueError, match="does not fit"):
             PadGeometry.of(dataclasses.replace(PAD, pivot_offset=0.0), bearing())
 

@@ -152,7 +152,8 @@ def attitudes_without_moment(p, pad: int) -> int:
     film = p.equilibrium.films[pad - 1]
     oil = p.setup.bearing.oil
     set_viscosity(film.work, oil_constants(oil))
-    surface, approach = p.speed * p.setup.bearing.journal_radius, film.rigid_approach(p.equilibrium.position)
+    surface = p.speed * p.setup.bearing.journal_radius
+    approach = film.preload_distance + film.normal @ p.equilibrium.position
     moments = []
     for wedge in np.linspace(-4e-5, 1.2e-4, 161).tolist():
         film.work.ruptured[:] = False

@@ -1,6 +1,5 @@
 """Pads that give way, on the arrays of a compiled search: what `model.pad.bending` does, pad by pad in one call."""
 
-from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -39,30 +38,20 @@ def axial_levers(grid: FilmGrid, arm: float) -> FloatArray:
 
 
 @lru_cache(maxsize=8)
-def stacked_bodies(bodies: tuple[PadDeformation, ...], first: int, factor: float, conducting: bool) -> BodyStack:
+def stacked_bodies(bodies: tuple[PadDeformation, ...], factor: float, conducting: bool) -> BodyStack:
     """Matrices of the pads side by side: of their deformation times a factor, of what they conduct."""
     kinds = list(dict.fromkeys(bodies))
-    bending, conductors = (kinds if factor else []), (kinds if conducting else [])
-    answer = [factor * np.hstack([b.by_load[:, first * len(b.gather) : -len(b.gather)], b.by_heat]) for b in bending]
-    return BodyStack(
-        np.array([kinds.index(b) for b in bodies], dtype=np.int64),
-        _stack(answer, 3),
-        _stack([b.gather[:, 1:-1] for b in bending], 3),
-        _stack([b.corners for b in bending], 3),
-        _stack([b.spread for b in bending], 3),
-        _stack([b.shapes for b in bending], 4),
-        _stack([b.amplitudes for b in bending], 3),
-        _stack([factor * b.response for b in bending], 3),
-        _stack([b.flux for b in conductors], 3),
-        _stack([b.to_coarse for b in conductors], 3),
-    )
-
-
-def _stack(matrices: Sequence[FloatArray], dimensions: int) -> FloatArray:
-    """Matrices with an axis before them; one alone is not copied where it need not be."""
-    if len(matrices) == 1:
-        return np.ascontiguousarray(matrices[0])[None]
-    return np.array(matrices) if matrices else np.zeros((0,) * dimensions)
+    stacks = []
+    for name in BodyStack._fields[1:]:
+        needed = conducting if name in ("flux", "to_coarse") else factor != 0.0
+        matrices = [getattr(body, name) for body in kinds if needed]
+        if name in ("answer", "response"):
+            matrices = [factor * matrix for matrix in matrices]
+        if len(matrices) == 1:  # it is not copied
+            stacks.append(np.ascontiguousarray(matrices[0])[None])
+        else:
+            stacks.append(np.array(matrices) if matrices else np.zeros((0,) * (4 if name == "shapes" else 3)))
+    return BodyStack(np.array([kinds.index(b) for b in bodies], dtype=np.int64), *stacks)
 
 
 @inner
@@ -152,16 +141,11 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
     felt = force_of(grid, grid.area, slopes)
     solve(matrix, right)
     for r in range(count):
-        for axis in range(2):
-            pad.felt[axis] += felt[axis, r] * right[r, 0]
-            pad.felt_stiffness[axis, 0] += felt[axis, r] * right[r, 1]
-            pad.felt_stiffness[axis, 1] += felt[axis, r] * right[r, 2]
-    for r in range(bending):
-        pad.amplitude[r] = right[r]
-    mismatch = state.mismatch[m].reshape(-1)
-    flat = shapes.reshape((len(change), count))
-    for q in range(len(change)):
-        mismatch[q] = change[q] - product(flat[q, :bending], asked)
+        pad.felt[:] += felt[:, r] * right[r, 0]
+        pad.felt_stiffness[:] += np.outer(felt[:, r], right[r, 1:])
+    pad.amplitude[:bending] = right[:bending]
+    flat = shapes.reshape((len(change), count))[:, :bending]
+    state.mismatch[m].reshape(-1)[:] = change - times(flat, asked)
     if not case.axial:
         return 0.0
     pad.axial_step[:] = right[bending]
@@ -171,10 +155,8 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
 @inner
 def _answer(response: FloatArray, slopes: FloatArray, matrix: FloatArray, factor: float, first: int) -> None:
     """Add what shapes answer to pressures (unknowns, m), by a factor, to a matrix from one of its columns on."""
-    column = np.empty(len(slopes))  # side by side for the products
     for s in range(slopes.shape[1]):
-        for q in range(len(column)):
-            column[q] = slopes[q, s]
+        column = slopes[:, s].copy()  # side by side for the products
         for r in range(len(response)):
             matrix[r, first + s] += factor * product(response[r], column)
 

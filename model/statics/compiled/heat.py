@@ -21,7 +21,7 @@ import numpy as np
 from model.compilation import compiled, inner
 from model.film.dense import product, residual, solve, times
 from model.film.energy import between, heat_sources, heat_step, march, warm
-from model.film.mesh import FilmGrid, FilmWork
+from model.film.mesh import FilmGrid
 from model.film.oil_state import edge_flows
 from model.film.resting import resting_film
 from model.interpolation import largest
@@ -83,14 +83,12 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
     flows = np.empty((n, 2))
     outlets = np.zeros((n, 3))
     taken = np.zeros((n, 3))
-    for m in range(n):
-        note_flows(problem, m, pads.each[m].supplied, flows[m], outlets[m])
-        if pads.each[m].solved:
-            _answer(bodies, problem, m, answers[m])
-            _pass_on(work_of(works, m), answers[m], outlets[m], taken[m])
     change = 0.0
     for m in range(n):
         pad = pads.each[m]
+        note_flows(problem, m, pad.supplied, flows[m], outlets[m])
+        if pad.solved:
+            _answer(bodies, problem, m, answers[m], outlets[m], taken[m])
         if case.fresh < math.inf and case.mixing > 0.0:  # who gets less oil has another film
             more = case.mixing * abs(flows[m, 1] - pad.passed) / (case.fresh * case.length)
             change = max(change, HEAT_PER_FORCE * more)
@@ -125,8 +123,12 @@ def note_flows(problem: Problem, m: int, supplied: float, flows: FloatArray, out
 
 
 @inner
-def _answer(bodies: BodyStack, problem: Problem, m: int, fields: FloatArray) -> None:
-    """Temperature of a film with all else at zero, per kelvin of its inlet, and per kelvin of the journal.
+def _answer(
+    bodies: BodyStack, problem: Problem, m: int, fields: FloatArray, outlet: FloatArray, taken: FloatArray
+) -> None:
+    """Temperature of a film, of what leaves it, and what the journal takes up [W].
+
+    With all else at zero, per kelvin of its inlet, and per kelvin of the journal.
 
     A hotter film makes less heat: that counts as a loss, beside what the journal takes.
     """
@@ -134,9 +136,7 @@ def _answer(bodies: BodyStack, problem: Problem, m: int, fields: FloatArray) -> 
     work = work_of(problem.works, m)
     case = problem.case
     figures = problem.state.figures
-    count, rows, columns = fields.shape
-    sources = np.zeros((count, rows, columns))
-    loss = np.empty((rows, columns))
+    sources, loss = np.zeros(fields.shape), np.empty(work.temperature.shape)
     if case.journal:
         work.exchange[:] = _NUSSELT * case.running.heat[1] / work.thickness * (grid.dx * grid.height)
         sources[2] = work.exchange
@@ -150,6 +150,15 @@ def _answer(bodies: BodyStack, problem: Problem, m: int, fields: FloatArray) -> 
     figures[BACKFLOW] = max(figures[BACKFLOW], backflow)
     if conducts and largest(fields.reshape(-1)) < BOUNDLESS:
         _conduct(bodies, problem, m, loss, fields)
+    flow = work.flow[0].reshape(loss.shape)[-2]
+    weight = work.exchange.copy()  # all of it is the journal's
+    weight[0] *= 0.5
+    weight[-1] *= 0.5
+    for k in range(len(fields)):
+        outlet[k] = product(fields[k, -1], flow) / flow.sum()
+        if case.journal:
+            taken[k] = product(weight.reshape(-1), fields[k].reshape(-1))
+    taken[2] -= weight.sum()
 
 
 @inner
@@ -206,21 +215,6 @@ def _krylov(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, right
     for k in range(_KRYLOV_STEPS):
         answer += weights[k, 0] * steps[k]
     return answer
-
-
-@inner
-def _pass_on(work: FilmWork, fields: FloatArray, outlet: FloatArray, taken: FloatArray) -> None:
-    """Set what leaves and what the journal takes up: with all else at zero, per kelvin of inlet and journal."""
-    count, rows, columns = fields.shape
-    flow = work.flow[0, (rows - 2) * columns : (rows - 1) * columns]
-    weight = work.exchange.copy()  # all of it is the journal's
-    weight[0] *= 0.5
-    weight[-1] *= 0.5
-    for k in range(count):
-        outlet[k] = product(fields[k, -1], flow) / flow.sum()
-        if count == 3:
-            taken[k] = product(weight.reshape(-1), fields[k].reshape(-1))
-    taken[2] -= weight.sum()
 
 
 @compiled

@@ -12,11 +12,11 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.dense import DEPTH, mixed
-from model.statics.compiled.case import ACROSS, ALONE, BOUNDLESS, COUPLED, HEAT_PER_FORCE, ISOTHERMAL, Case, Problem
+from model.statics.compiled.case import ACROSS, ALONE, BOUNDLESS, COUPLED, HEAT_PER_FORCE, ISOTHERMAL, Problem
 from model.statics.compiled.elimination import newton
 from model.statics.compiled.heat import exchange_heat, heat_films
 from model.statics.compiled.place import is_doubtful
-from model.statics.compiled.stack import BACKFLOW, GROWING, GROWN, BodyStack, PadStack
+from model.statics.compiled.stack import BACKFLOW, GROWING, GROWN, BodyStack
 from model.statics.compiled.step import change_state, grow_and_bend, move, solve_pressures
 from rigdata.arrays import FloatArray
 
@@ -45,7 +45,7 @@ _ACROSS_ACCURACY = 30.0
 SETTLED, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, NOT_CONVERGED, ASKS_OIL, ASKS_HEAT, ASKS_LAWS, ASKS_STABLE = range(9)
 
 #: Places in `Memory.trail`.
-_STAGE, ITERATION, RESIDUAL, HEAT, _BEST, _STALLED, _LEFT, _BEST_LEFT, RELAXED, _COUNT, _KEPT, STABLE, TRAIL = range(13)
+_STAGE, ITERATION, HEAT, _BEST, _STALLED, _LEFT, _BEST_LEFT, RELAXED, _COUNT, STABLE, TRAIL = range(11)
 #: `_STAGE`
 _BEGIN, _PRESSURE, _HEATING, _STEPPING = range(4)
 
@@ -53,7 +53,7 @@ _BEGIN, _PRESSURE, _HEATING, _STEPPING = range(4)
 class Memory(NamedTuple):
     """What an iteration remembers from step to step."""
 
-    trail: FloatArray  #: (`TRAIL`,): Stage, count, residual, heat [K], and the course so far.
+    trail: FloatArray  #: (`TRAIL`,): Stage, count, heat [K], and the course so far.
     images: FloatArray  #: (`DEPTH` + 1, q): Last states, where they led to, the one that a step starts from.
     residuals: FloatArray
     before: FloatArray
@@ -65,7 +65,7 @@ def fresh_memory(problem: Problem) -> Memory:
     faces = state.faces.size if problem.case.thermal == ACROSS else 0
     size = 3 + 3 * len(problem.pads.each) + state.warmth.size + faces + state.bent.size
     trail = np.zeros(TRAIL)
-    trail[[RESIDUAL, HEAT, _BEST, _LEFT, _BEST_LEFT]] = math.inf
+    trail[[HEAT, _BEST, _LEFT, _BEST_LEFT]] = math.inf
     trail[RELAXED] = 1.0
     images = np.empty((2 * DEPTH + 3, size))
     return Memory(trail, images[: DEPTH + 1], images[DEPTH + 1 : -1], images[-1])
@@ -75,7 +75,7 @@ def fresh_memory(problem: Problem) -> Memory:
 def iterate(problem: Problem, memory: Memory) -> int:
     """Iterate from where the arrays stand until the end, or until Python is asked for a step."""
     pads, state, case, trail = problem.pads, problem.state, problem.case, memory.trail
-    across, sharp = case.thermal == ACROSS, False
+    across = case.thermal == ACROSS
     accuracy = case.accuracy * (_ACROSS_ACCURACY if across else 1.0)
     while True:
         if trail[_STAGE] == _BEGIN:
@@ -86,13 +86,10 @@ def iterate(problem: Problem, memory: Memory) -> int:
             if across:
                 return ASKS_OIL
         if trail[_STAGE] == _PRESSURE:
-            if not sharp:
-                _begin(problem, memory)
-            found = solve_pressures(problem, sharp)
-            if sharp:  # derivatives once more, with the rupture line between the nodes; the pressure stays
-                return SETTLED
-            if not found:
-                trail[RESIDUAL], trail[HEAT] = math.inf, math.inf
+            state.figures[BACKFLOW] = trail[HEAT] = 0.0
+            _write_vector(problem, memory.before)
+            trail[_STAGE] = _HEATING
+            if not solve_pressures(problem, False):
                 return FILM_LOST  # what has no pressure has no flow that could carry heat
             if across:
                 return ASKS_HEAT
@@ -100,23 +97,23 @@ def iterate(problem: Problem, memory: Memory) -> int:
             heat = _heat(problem.bodies, problem, trail)
             trail[HEAT] = grow_and_bend(problem, trail[RELAXED], heat)
             if not trail[HEAT] < BOUNDLESS:
-                trail[RESIDUAL] = math.inf
                 return BOUNDLESS_HEAT
             trail[_STAGE] = _STEPPING
             if case.asks_laws:
                 return ASKS_LAWS
         residual, shift = newton(case, pads, state.figures[GROWING])
-        trail[RESIDUAL], trail[_STAGE] = residual, _BEGIN
+        trail[_STAGE] = _BEGIN
         if not math.isfinite(residual):
-            trail[RESIDUAL] = math.inf
             return SINGULAR
         if residual < accuracy and trail[HEAT] < HEAT_PER_FORCE * accuracy:
             trail[_COUNT] = 0
-            if trail[STABLE] == 0.0 and _doubts(case, pads):
-                return ASKS_STABLE
-            sharp, trail[_STAGE] = True, _PRESSURE
-            continue
-        _go_on(problem, memory, shift)
+            if trail[STABLE] == 0.0:
+                for m in range(len(pads.each)):
+                    if pads.each[m].solved and is_doubtful(case, pads.each[m], pads.curves[m]):
+                        return ASKS_STABLE
+            solve_pressures(problem, True)  # derivatives once more, with the rupture line between the nodes
+            return SETTLED
+        _go_on(problem, memory, residual, shift)
 
 
 @inner
@@ -130,23 +127,12 @@ def _heat(bodies: BodyStack | None, problem: Problem, trail: FloatArray) -> floa
 
 
 @inner
-def _begin(problem: Problem, memory: Memory) -> None:
-    """Remember where a step starts from, if the last ones were slow."""
-    state, case, trail = problem.state, problem.case, memory.trail
-    state.figures[BACKFLOW] = 0.0
-    trail[_STAGE], trail[HEAT] = _HEATING, 0.0
-    slow = _SLOW_ACROSS if case.thermal == ACROSS else _SLOW
-    mixes = case.thermal != ISOTHERMAL or state.bent.size > 0
-    trail[_KEPT] = 1.0 if trail[_LEFT] > slow * trail[_BEST_LEFT] and mixes else 0.0
-    if trail[_KEPT] > 0.0:
-        _write_vector(problem, memory.before)
-
-
-@inner
-def _go_on(problem: Problem, memory: Memory, shift: FloatArray) -> None:
+def _go_on(problem: Problem, memory: Memory, residual: float, shift: FloatArray) -> None:
     """Move by a step, and where slow modes are left, to where the last few steps head."""
     trail, across = memory.trail, problem.case.thermal == ACROSS
-    residual, heat = trail[RESIDUAL], trail[HEAT]
+    heat = trail[HEAT]
+    slow = _SLOW_ACROSS if across else _SLOW
+    was_slow = trail[_LEFT] > slow * trail[_BEST_LEFT]
     trail[_BEST_LEFT] = min(trail[_BEST_LEFT], trail[_LEFT])
     trail[_LEFT] = max(residual, heat / HEAT_PER_FORCE)
     near = residual < _NEAR and heat < _NEAR_HEAT
@@ -157,8 +143,8 @@ def _go_on(problem: Problem, memory: Memory, shift: FloatArray) -> None:
     damping = 0.5 if trail[_STALLED] > _PATIENCE else 1.0
     whole = move(problem, shift, damping)
     # steps that were cut short, or still far off, say nothing of the iteration's slow modes
-    slow = _SLOW_ACROSS if across else _SLOW
-    if trail[_KEPT] > 0.0 and whole and near and trail[_LEFT] > slow * trail[_BEST_LEFT]:
+    mixes = problem.case.thermal != ISOTHERMAL or problem.state.bent.size > 0
+    if mixes and was_slow and whole and near and trail[_LEFT] > slow * trail[_BEST_LEFT]:
         count = _remember(memory)
         _write_vector(problem, memory.images[count - 1])
         memory.residuals[count - 1] = memory.images[count - 1] - memory.before
@@ -172,34 +158,23 @@ def _remember(memory: Memory) -> int:
     """Make room for one more; returns how many there are with it."""
     count = int(memory.trail[_COUNT])
     if count == DEPTH + 1:
-        for k in range(DEPTH):
-            memory.images[k] = memory.images[k + 1]
-            memory.residuals[k] = memory.residuals[k + 1]
+        memory.images[:DEPTH] = memory.images[1:].copy()
+        memory.residuals[:DEPTH] = memory.residuals[1:].copy()
         return count
     memory.trail[_COUNT] = count + 1
     return count + 1
 
 
 @inner
-def _doubts(case: Case, pads: PadStack) -> bool:
-    found = False
-    for m in range(len(pads.each)):
-        pad = pads.each[m]
-        found = found or (pad.solved and is_doubtful(case, pad, pads.curves[m]))
-    return found
-
-
-@inner
 def _write_vector(problem: Problem, out: FloatArray) -> None:
     """Journal, pads, temperatures and deformations as one vector, in micrometres and kelvins."""
-    _, _, pads, _, state, case = problem
-    out[0] = state.position[0] / _MICROMETRE
-    out[1] = state.position[1] / _MICROMETRE
+    pads, state = problem.pads, problem.state
+    out[:2] = state.position / _MICROMETRE
     out[2] = state.figures[GROWN]
-    warm = 3 + state.warmth.shape[1]
-    bent = warm + (state.faces[0].size if case.thermal == ACROSS else 0)
+    parts = out[3:].reshape((len(pads.each), -1))
+    warm, bent = 3 + state.warmth.shape[1], parts.shape[1] - state.bent[0].size
     for m in range(len(pads.each)):
-        pad, part = pads.each[m], _part(out, m, len(pads.each))
+        pad, part = pads.each[m], parts[m]
         unit = pad.pivot_radius / _MICROMETRE
         part[0] = pad.tilt * unit
         part[1] = pad.deflection / _MICROMETRE
@@ -212,21 +187,15 @@ def _write_vector(problem: Problem, out: FloatArray) -> None:
 
 
 @inner
-def _part(vector: FloatArray, m: int, count: int) -> FloatArray:
-    """One pad's part of a vector of so many pads."""
-    return vector[3:].reshape((count, (len(vector) - 3) // count))[m]
-
-
-@inner
 def _read_vector(problem: Problem, vector: FloatArray) -> None:
     """Undo `_write_vector`."""
-    _, _, pads, _, state, case = problem
+    pads, state = problem.pads, problem.state
     shift, moves = vector[:2] * _MICROMETRE - state.position, np.empty((len(pads.each), 3))
     state.figures[GROWING] = vector[2] - state.figures[GROWN]
-    warm = 3 + state.warmth.shape[1]
-    bent = warm + (state.faces[0].size if case.thermal == ACROSS else 0)
+    parts = vector[3:].reshape((len(pads.each), -1))
+    warm, bent = 3 + state.warmth.shape[1], parts.shape[1] - state.bent[0].size
     for m in range(len(pads.each)):
-        pad, part = pads.each[m], _part(vector, m, len(pads.each))
+        pad, part = pads.each[m], parts[m]
         unit = _MICROMETRE / pad.pivot_radius
         moves[m, 0] = part[0] * unit - pad.tilt
         moves[m, 1] = part[1] * _MICROMETRE - pad.deflection

@@ -61,38 +61,25 @@ def solve_pressures(problem: Problem, sharp: bool) -> bool:
 @inner
 def grow_and_bend(problem: Problem, relaxation: float, change: float) -> float:
     """What a journal grows, what pads bend; returns the largest change asked for, from `change` on [K]."""
+    figures, pads = problem.state.figures, problem.pads.each
     if problem.case.closing > 0.0 and change < BOUNDLESS:
-        change = max(change, _warm_journal(problem, relaxation))
-    for m in range(len(problem.pads.each)):
-        pad = problem.pads.each[m]
+        warmth = figures[JOURNAL]
+        if not math.isfinite(warmth):  # as the films that carry, by area; as the oil where it enters if none does
+            area, warmth = 0.0, 0.0
+            for m in range(len(pads)):
+                if not pads[m].idle:
+                    area += problem.grids.area[m].sum()
+                    warmth += (problem.grids.area[m] * problem.works.temperature[m]).sum()
+            warmth = warmth / area if area > 0.0 else pads[0].inlet
+        asked = warmth - figures[GROWN]
+        figures[GROWING] = relaxation * min(max(asked, -HEATING_STEP), HEATING_STEP)
+        change = max(change, abs(asked))
+    for m in range(len(pads)):
+        pad = pads[m]
         pad.felt[:], pad.felt_stiffness[:] = pad.corrected, pad.stiffness
     # a deformation counts like a temperature change of the same weight in the film's resistance
     share = bend_pads(problem.bodies, problem) if change < BOUNDLESS else 0.0
     return max(change, HEAT_PER_FORCE * share)
-
-
-@inner
-def _warm_journal(problem: Problem, relaxation: float) -> float:
-    """Say what the journal's temperature will take from the clearances; returns the change asked for [K]."""
-    figures = problem.state.figures
-    felt = figures[JOURNAL]
-    if not math.isfinite(felt):
-        felt = _mean_temperature(problem)
-    asked = felt - figures[GROWN]
-    figures[GROWING] = relaxation * min(max(asked, -HEATING_STEP), HEATING_STEP)
-    return abs(asked)
-
-
-@inner
-def _mean_temperature(problem: Problem) -> float:
-    """Mean of the films that carry, by area; of the oil where it enters if none does [degC]."""
-    weight, temperature, pads = problem.grids.area, problem.works.temperature, problem.pads.each
-    area, total = 0.0, 0.0
-    for m in range(len(pads)):
-        if not pads[m].idle:
-            area += weight[m].sum()
-            total += (weight[m] * temperature[m]).sum()
-    return total / area if area > 0.0 else pads[0].inlet
 
 
 @inner
