@@ -28,7 +28,7 @@ def axial_shape(grid: FilmGrid) -> FloatArray:
     film's moment about the pivot, the integral of p z cos(alpha) dA, is what flexure, rolling or friction of the
     pivot hold.
     """
-    return np.outer(grid.cos, grid.z)
+    return grid.cos.reshape((-1, 1)) * grid.z
 
 
 @inner
@@ -142,7 +142,7 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
     solve(matrix, right)
     for r in range(count):
         pad.felt[:] += felt[:, r] * right[r, 0]
-        pad.felt_stiffness[:] += np.outer(felt[:, r], right[r, 1:])
+        pad.felt_stiffness[:] += felt[:, r : r + 1] * right[r, 1:]
     pad.amplitude[:bending] = right[:bending]
     flat = shapes.reshape((len(change), count))[:, :bending]
     state.mismatch[m].reshape(-1)[:] = change - times(flat, asked)

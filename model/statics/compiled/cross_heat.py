@@ -172,7 +172,9 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
     back = cross_operator(grid, work, cross, case.running.speed, heat, operator)
     state.figures[BACKFLOW] = max(state.figures[BACKFLOW], back)
     body = (bodies.flux[bodies.which[m]], bodies.to_coarse[bodies.which[m]], across.guesses[m])
-    around = problem.pads.each["inlet"].mean()  # what the grooves hold
+    around = 0.0  # what the grooves hold
+    for other in problem.pads.each:
+        around += other.inlet / len(problem.pads.each)
     into_pad = times(body[0], times(body[1], (cross.face - around).reshape(-1))).reshape(cross.face.shape)
     operator.dissipation[:, :: len(cross.edges) - 1] -= station_heat(grid, into_pad)
     taken[:] = march_cross(operator, fields, operator.dissipation)
@@ -187,4 +189,4 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
         taken[0] += more if math.isfinite(more) else 0.0
     carried = operator.carried.reshape(-1)
     for q in range(3):
-        outlet[q] = product(carried, fields[-1, :, q]) / carried.sum()
+        outlet[q] = product(carried, fields[-1, :, q]) / product(carried, np.ones(len(carried)))

@@ -150,15 +150,15 @@ def _answer(
     figures[BACKFLOW] = max(figures[BACKFLOW], backflow)
     if conducts and largest(fields.reshape(-1)) < BOUNDLESS:
         _conduct(bodies, problem, m, loss, fields)
-    flow = work.flow[0].reshape(loss.shape)[-2]
+    flow = work.flow[0].reshape(loss.shape)[-2]  # numpy's sums, means and outer products would load scipy, 15 MB
     weight = work.exchange.copy()  # all of it is the journal's
     weight[0] *= 0.5
     weight[-1] *= 0.5
     for k in range(len(fields)):
-        outlet[k] = product(fields[k, -1], flow) / flow.sum()
+        outlet[k] = product(fields[k, -1], flow) / product(np.ones(len(flow)), flow)
         if case.journal:
             taken[k] = product(weight.reshape(-1), fields[k].reshape(-1))
-    taken[2] -= weight.sum()
+    taken[2] -= product(np.ones(weight.size), weight.reshape(-1))
 
 
 @inner

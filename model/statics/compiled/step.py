@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from model.compilation import inner
+from model.film.dense import product
 from model.film.models import solve_by
 from model.film.oil_state import least_share, set_viscosity
 from model.statics.compiled.bending import axial_shape, bend_pads, change_shape
@@ -68,8 +69,9 @@ def grow_and_bend(problem: Problem, relaxation: float, change: float) -> float:
             area, warmth = 0.0, 0.0
             for m in range(len(pads)):
                 if not pads[m].idle:
-                    area += problem.grids.area[m].sum()
-                    warmth += (problem.grids.area[m] * problem.works.temperature[m]).sum()
+                    weight = problem.grids.area[m].reshape(-1)
+                    area += product(weight, np.ones(len(weight)))
+                    warmth += product(weight, problem.works.temperature[m].reshape(-1))
             warmth = warmth / area if area > 0.0 else pads[0].inlet
         asked = warmth - figures[GROWN]
         figures[GROWING] = relaxation * min(max(asked, -HEATING_STEP), HEATING_STEP)
