@@ -18,6 +18,8 @@ hypothesis.settings.register_profile(
 hypothesis.settings.load_profile("shared machine")
 ROOT = Path(__file__).resolve().parent.parent
 STRUCTURE = "tests/structure/"
+#: One worker has these: what needs the wheel would wait for the other one, which makes it.
+TOGETHER = (STRUCTURE, "tests/browser/test_report")
 # every worker, and every command that tests start, imports the same thousand modules, and pytest rewrites the
 # assertions of each test file: who wants no bytecode beside the sources gets it kept in .venv
 if sys.dont_write_bytecode and sys.pycache_prefix is None and (ROOT / ".venv").is_dir():
@@ -54,7 +56,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 
     class ByFile(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return STRUCTURE if nodeid.startswith(STRUCTURE) else super()._split_scope(nodeid)
+            return STRUCTURE if nodeid.startswith(TOGETHER) else super()._split_scope(nodeid)
 
     config.option.loadscopereorder = False  # the order is that of the collection, see below
     return ByFile(config, log)
@@ -65,7 +67,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if "PYTEST_XDIST_WORKER" not in os.environ:
         return
     slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
-    items.sort(key=lambda item: (not item.nodeid.startswith(STRUCTURE), -slow[item.path]))
+    items.sort(key=lambda item: (not item.nodeid.startswith(TOGETHER), -slow[item.path]))
 
 
 @pytest.fixture(scope="session")
@@ -111,6 +113,25 @@ def small_campaign(campaign_of) -> Path:
     )
     text = '=HYPERLINK("http://example.invalid")<script>alert(1)</script>'
     return campaign_of(rocker_rig(3, plan=plan, campaign="small <b>&", description=text), name="small")
+
+
+@pytest.fixture(scope="session")
+def identified(small_campaign, session_folder) -> Path:
+    """What `tpjb identify` finds of the small campaign, in peace and with one worker; for tests that only read."""
+    from tests.command_line import ended
+    from tests.good_campaigns import once
+
+    words = ("identify", small_campaign, "--workers", 1)
+    return once(session_folder / "identified", lambda path: ended(0, *words, "--out", path))
+
+
+@pytest.fixture(scope="session")
+def located(small_campaign, session_folder) -> Path:
+    """What `tpjb locus` finds of it; for tests that only read."""
+    from tests.command_line import ended
+    from tests.good_campaigns import once
+
+    return once(session_folder / "located", lambda path: ended(0, "locus", small_campaign, "--out", path))
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 import tpjb_ident as ti
-from tests.command_line import tpjb
 from tpjb_ident.rounding import with_interval
 
 pytest.importorskip("bokeh", reason="the extra view is not installed")
@@ -182,10 +181,8 @@ def test_the_browser_is_led_by_a_file_that_only_this_user_reads():
     assert not path.exists()
 
 
-def test_a_folder_of_results_shows_its_tables(chromium, small_campaign, tmp_path):
-    out = tmp_path / "found"
-    assert tpjb("locus", small_campaign, "--out", out, "-q").exit_code == 0
-    with viewing(out) as (address, _), chromium() as tab:
+def test_a_folder_of_results_shows_its_tables(chromium, located):
+    with viewing(located) as (address, _), chromium() as tab:
         tab.open(address)
         tab.until(IDLE, 60)
         assert tab.js(model("table", "options")) == ["locus", "clearance"]

@@ -20,11 +20,6 @@ from tpjb_ident.estimators.estimate import METHODS, NORMS
 from tpjb_ident.exports.formats import FORMATS
 
 
-@pytest.fixture(scope="module")
-def locus_as_json(small_campaign, tmp_path_factory):
-    return tpjb("locus", small_campaign, "--out", tmp_path_factory.mktemp("json") / "o", "--json")
-
-
 @functools.cache
 def help_of(command):
     result = ended(0, command, "--help")
@@ -39,12 +34,12 @@ def examples(command):
     return next(info.callback.examples for info in app.registered_commands if info.name == command)
 
 
-def test_json_is_one_document_with_the_results_in_it(locus_as_json):
+def test_json_is_one_document_with_the_results_in_it(small_campaign, tmp_path):
     def refuse(constant):  # NaN is no JSON
         raise AssertionError(constant)
 
-    assert locus_as_json.exit_code == 0
-    document = json.loads(locus_as_json.stdout, parse_constant=refuse)
+    result = ended(0, "locus", small_campaign, "--out", tmp_path / "o", "--json")
+    document = json.loads(result.stdout, parse_constant=refuse)
     assert document["schema"] == "tpjb-command/1"
     assert (document["command"], document["exit_code"]) == ("locus", 0)
     assert "locus.csv" in document["outputs"]

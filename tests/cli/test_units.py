@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.command_line import ended, tpjb
+from tests.good_campaigns import rocker_rig
 from tpjb_ident.columns import SYSTEMS, amount, degrees, place_of, use_units
 from tpjb_ident.compare.effect_words import shown_unit
 from tpjb_ident.presentation import us_table
@@ -93,8 +94,8 @@ def test_channels_are_shown_in_us_units_and_written_in_si(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_report_in_us_units_holds_no_other(tmp_path):
-    ended(0, "compare", "rigdata/samples/demo.h5", "--pivots", "measured", "--units", "us", "--out", tmp_path / "o")
+def test_a_report_in_us_units_holds_no_other(campaign_of, tmp_path):
+    ended(0, "compare", campaign_of(rocker_rig(3)), "--pivots", "measured", "--units", "us", "--out", tmp_path / "o")
     page = (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
     words = " ".join(re.sub(r"<style.*?</style>|<script.*?</script>|<[^>]*>", " ", page, flags=re.S).split())
     assert not re.search(r"MN/m|\bkN\b|kN s/m|µm|[0-9] mm\b|MPa|°C", words)

@@ -74,14 +74,14 @@ def is_alive(group: int) -> bool:
 @pytest.mark.slow
 @pytest.mark.usefixtures("heard_interrupts")
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 @pytest.mark.parametrize(
-    ("words", "seconds"),  # after its folder is made: at once, or while workers are busy
+    ("words", "seconds", "number", "code"),  # after its folder is made: at once, or while workers are busy
     [
-        (("diagnose", "--workers", "2"), 1.0),
-        (("identify", "--workers", "1"), 0.0),
-        (("identify", "--workers", "2"), 0.2),
-        (("compare",), 1.0),
+        (("diagnose", "--workers", "2"), 1.0, signal.SIGINT, 130),
+        (("identify", "--workers", "1"), 0.0, signal.SIGTERM, 143),
+        (("identify", "--workers", "2"), 0.2, signal.SIGINT, 130),
+        (("identify", "--workers", "2"), 0.2, signal.SIGTERM, 143),
+        (("compare",), 1.0, signal.SIGTERM, 143),
     ],
 )
 def test_a_command_that_is_told_to_end_does_so_at_once_and_leaves_no_results(tmp_path, words, seconds, number, code):

@@ -110,9 +110,8 @@ def check_limits(folder) -> dict[str, int]:
 
 
 @pytest.mark.slow
-def test_limits_of_points_and_pivots(small_campaign, tmp_path):
-    assert tpjb("identify", small_campaign, "--out", tmp_path / "o", "-q").exit_code == 0
-    counts = check_limits(tmp_path / "o")
+def test_limits_of_points(identified):
+    counts = check_limits(identified)
     assert counts["coefficients"] == 8 * 2
     assert counts["estimators"] >= 8 * 2
 

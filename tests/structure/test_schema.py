@@ -6,7 +6,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.command_line import ended
 from tpjb_ident import schema
 
 ROOT = Path(__file__).parents[2]
@@ -67,10 +66,9 @@ def test_a_name_that_is_none_is_found(column):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["identify", "locus"])
-def test_tables_on_disk_hold_columns_of_the_schema_only(command, small_campaign, tmp_path):
-    ended(0, command, small_campaign, "--out", tmp_path / "o")
-    tables = sorted((tmp_path / "o").glob("*.csv"))
+@pytest.mark.parametrize("results", ["identified", "located"])
+def test_tables_on_disk_hold_columns_of_the_schema_only(results, request):
+    tables = sorted(request.getfixturevalue(results).glob("*.csv"))
     assert tables
     for path in tables:
         assert unknown_columns(path.stem, list(pd.read_csv(path, nrows=1))) == [], path.name
