@@ -4,20 +4,20 @@
     python -m tests.studies.golden compare BEFORE AFTER
 
 `run` writes the results folder and the printed text of each command below OUT. `compare` prints each file that is not
-the same to the bit, with the largest difference of its numbers (of the value, or of its standard deviation where the
-table has one); above 1e-9 it ends with exit code 1. An older checkout runs a copy of this file in its own folder.
+the same to the bit, with the largest difference of its numbers and where it is; above 1e-9 of the value, or of its
+interval's half width, it ends with exit code 1. An older checkout runs a copy of this file in its own folder.
 """
 
 import argparse
-import csv
 import math
 import os
 import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
+
+from tpjb_ident.runtime.differences import compared
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 SAMPLES = (CHECKOUT.parent / "shared" / "samples").resolve()
@@ -26,7 +26,7 @@ CAMPAIGNS = (
     "effect-c.h5", "mixture-a.h5", "mixture-b.h5", "mixture-c.h5",
 )  # fmt: skip
 DEMO, ROCKER = "rigdata/samples/demo.h5", "model/bearings/rocker.toml"
-#: Files that say when and where a command ran, or that a picture library writes.
+#: Files that say when and where a command ran, or that a library writes.
 PASSING = re.compile(r"(run\.json|\.png|\.svg|\.parquet|\.h5|\.xlsx|\.mat|\.html)$")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 LIMIT = 1e-9
@@ -79,79 +79,35 @@ def run(out: Path, only: list[str], campaigns: list[str]) -> None:
             print(ended.stderr[-2000:])
 
 
-def deviations(cells: dict[str, str]) -> dict[str, float]:
-    """Give the standard deviation of each column that has one next to it (`kxx` and `kxx_se`)."""
-    spread = {}
-    for column in cells:
-        text = cells.get(f"{column}_se", "")
-        if text and text not in ("nan", "inf"):
-            spread[column] = float(text)
-    return spread
-
-
-def differences(before: Path, after: Path) -> Iterator[float]:
-    """Give the difference of each number of two texts, or of common columns; infinity where words differ."""
-    if before.suffix != ".csv":
-        yield from text_differences(before.read_text(encoding="utf-8"), after.read_text(encoding="utf-8"))
-        return
-    old, new = table(before), table(after)
-    if len(old) != len(new):
-        yield math.inf
-        return
-    for first, second in zip(old, new, strict=True):
-        spread = deviations(first)
-        for column in first.keys() & second.keys():
-            a, b = first[column], second[column]
-            if a == b:
-                continue
-            if NUMBER.fullmatch(a) and NUMBER.fullmatch(b):
-                size = max(abs(float(a)), abs(float(b)), spread.get(column, 0.0))
-                yield abs(float(a) - float(b)) / size
-            else:
-                yield from text_differences(a, b)
-
-
-def table(path: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
-
-
-def columns_of_one(before: Path, after: Path) -> list[str]:
-    """List the columns that only one of two tables has, `-` where it went and `+` where it came."""
-    headers = [next(csv.reader(path.read_text(encoding="utf-8").splitlines()[:1]), []) for path in (before, after)]
-    gone = [f"-{column}" for column in headers[0] if column not in headers[1]]
-    return gone + [f"+{column}" for column in headers[1] if column not in headers[0]]
-
-
-def text_differences(before: str, after: str) -> Iterator[float]:
-    """Give relative differences of the numbers in a text, infinity where the words between them differ."""
+def text_difference(before: str, after: str) -> float:
+    """Largest relative difference of the numbers in a text; infinity where the words between them differ."""
     if NUMBER.sub("#", before) != NUMBER.sub("#", after):
-        yield math.inf
-        return
-    for a, b in zip(NUMBER.findall(before), NUMBER.findall(after), strict=True):
-        if a != b:
-            x, y = float(a), float(b)
-            yield abs(x - y) / max(abs(x), abs(y))
+        return math.inf
+    pairs = zip(map(float, NUMBER.findall(before)), map(float, NUMBER.findall(after)), strict=True)
+    return max(abs(a - b) / max(abs(a), abs(b)) for a, b in pairs if a != b)
+
+
+def difference(before: Path, after: Path, name: str) -> tuple[float, str]:
+    """How far a file differs, and where: tables as `tpjb rerun` judges them."""
+    found = compared(before, after, name, LIMIT)
+    if found.state == "not judged":
+        old, new = ((folder / name).read_text(encoding="utf-8") for folder in (before, after))
+        return text_difference(old, new), "text"
+    return (math.inf, found.state) if found.state in ("missing", "new") else (found.size, found.where)
 
 
 def compare(before: Path, after: Path) -> int:
     """Print each file that differs; 1 if one does by more than the limit."""
-    names = sorted({p.relative_to(root) for root in (before, after) for p in root.rglob("*") if p.is_file()})
+    names = {p.relative_to(root).as_posix() for root in (before, after) for p in root.rglob("*") if p.is_file()}
     same = worst = 0
-    for name in names:
-        if PASSING.search(name.name):
+    for name in sorted(names):
+        if PASSING.search(name):
             continue
-        old, new = before / name, after / name
-        if not (old.exists() and new.exists()):
-            print(f"{name}: only in {'BEFORE' if old.exists() else 'AFTER'}")
-            worst = 1
-        elif old.read_bytes() == new.read_bytes():
-            same += 1
-        else:
-            largest = max(differences(old, new), default=0.0)
-            word = "words or shape" if math.isinf(largest) else f"{largest:.1e}"
-            columns = columns_of_one(old, new) if name.suffix == ".csv" else []
-            print(f"{name}: {word}", *columns)
-            worst = max(worst, int(largest > LIMIT))
+        size, where = difference(before, after, name)
+        if where:
+            print(f"{name}: {size:.1e}, {where}")
+        same += not where
+        worst = max(worst, int(size > LIMIT))
     print(f"{same} files the same to the bit")
     return worst
 
