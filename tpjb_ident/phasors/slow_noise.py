@@ -24,7 +24,7 @@ from tpjb_ident.errors import BadInputError
 
 DRIFT_OVER_FLICKER = 0.7  # [1/sqrt(s)], drift rate to be expected over the square root of the 1/f power density
 _BEND = 0.5  # of a drift: half of what its rate at either end differs by from that in the middle, standard deviation
-_WAVES = 8  # half cosines over a record that stand for a walk: its slowest part, 97 % of its variance
+_WAVES = 8  # half cosines over a record that stand for the slowest part of a walk, which no stationary noise resembles
 _WALK_OVER_FLICKER = 0.2  # [1/sqrt(s)], walk to be expected over the square root of the 1/f power density
 _PINNED = 0.01  # of ln(drift rate): as good as given
 # time constants [s] of the exponentially correlated processes whose sum has a 1/f spectrum from some 5 mHz
@@ -51,13 +51,27 @@ class NoiseModel:
         """All but the white noise, (m, m); `time` (m,) [s]; of averages where `duration` (m,) [s] is given."""
         centred = time - np.mean(time)
         bent = 2.0 * _BEND * (centred**2 - np.mean(centred**2)) / max(float(np.ptp(time)), 1e-300)
-        columns = np.column_stack([self.drift * centred, self.drift * bent, self.walk * _walk_columns(time)])
-        return self.flicker * flicker_kernel(time, duration) + columns @ columns.T
+        drift = self.drift * np.column_stack([centred, bent])
+        slow = self.flicker * flicker_kernel(time, duration) + drift @ drift.T
+        return np.asarray(slow + self.walk**2 * walk_kernel(time, duration))
 
     def mean_variance(self, duration: float) -> float:
         """Variance of one average over `duration` seconds about the run's own level [m^2]."""
         time = (np.arange(40) + 0.5) * duration / 40
         return self.white / duration + self.flicker * float(np.mean(flicker_kernel(time)))
+
+
+def walk_kernel(time: FloatArray, duration: FloatArray | None = None) -> FloatArray:
+    """Covariance (m, m) about its mean of a walk of one metre per square root of a second; of averages if `duration`.
+
+    `time` (m,) [s], `duration` (m,) [s].
+    """
+    span = max(float(np.ptp(time)), 1e-300)
+    share = (time - np.min(time)) / span
+    square = 0.5 * share**2
+    kernel = span * (1.0 / 3.0 + square[:, None] + square - np.maximum(share[:, None], share))
+    # the later of two moments within an average comes a sixth of it after its middle
+    return np.asarray(kernel if duration is None else kernel - np.diag(duration / 6.0))
 
 
 def _walk_columns(time: FloatArray) -> FloatArray:
@@ -97,20 +111,24 @@ class NoiseSeries:
 def _rotated(series: Sequence[NoiseSeries], unit: float) -> list[tuple[FloatArray, FloatArray]]:
     """Series of one shape together, k of them, each in the basis in which white and 1/f noise are both diagonal.
 
-    Every level that the search tries costs a few products of small matrices for all of them together. Gives the
-    spectra (k, m) of the 1/f noise over the white, and signal, drift and values (k, m, p + 2).
+    Every level that the search tries costs a few products of small matrices for all of them together. Gives the spectra
+    (k, m, 2) over the white of the 1/f noise and, all but diagonal there, of a walk's quick part; and signal, drift, the
+    walk's slow part and values (k, m, p + 10).
     """
     groups: dict[tuple[int, ...], list[tuple[FloatArray, FloatArray]]] = {}
     for samples in series:
         root = np.sqrt(samples.duration)
         kernel = flicker_kernel(samples.time, samples.duration) * np.outer(root, root)
         spectrum, basis = np.linalg.eigh(kernel)
+        waves = _walk_columns(samples.time)
+        quick = (walk_kernel(samples.time, samples.duration) - waves @ waves.T) * np.outer(root, root)
+        spectra = np.column_stack([spectrum, np.sum(basis * (quick @ basis), axis=0)])
         scale = np.maximum(np.max(np.abs(samples.mean), axis=0), 1e-300)
         mean, _ = np.linalg.qr((samples.mean / scale) * root[:, None])
         drift = samples.time - np.mean(samples.time)
-        slow = np.column_stack([drift, _walk_columns(samples.time)]) * root[:, None]
+        slow = np.column_stack([drift, waves]) * root[:, None]
         columns = np.column_stack([mean, slow, samples.values / unit * root])
-        groups.setdefault(samples.mean.shape, []).append((np.maximum(spectrum, 0.0), basis.T @ columns))
+        groups.setdefault(samples.mean.shape, []).append((np.maximum(spectra, 0.0), basis.T @ columns))
     stacks = (zip(*alike) for alike in groups.values())
     return [(np.stack(spectra), np.stack(columns)) for spectra, columns in stacks]
 
@@ -118,7 +136,7 @@ def _rotated(series: Sequence[NoiseSeries], unit: float) -> list[tuple[FloatArra
 def _minus_log_likelihood(spectra: FloatArray, columns: FloatArray, levels: FloatArray) -> float:
     """Sum over series of one shape; white, 1/f, drift and walk `levels` (4,) in the unit of `_rotated`."""
     white, flicker, drift, walk = levels
-    variance = white + flicker * spectra
+    variance = white + spectra @ [flicker, walk**2]
     p = columns.shape[2] - _WAVES - 2
     scale = np.r_[np.ones(p), drift, np.full(_WAVES, walk), 1.0]
     gram = np.swapaxes(columns, 1, 2) @ (columns / variance[..., None]) * np.outer(scale, scale)
