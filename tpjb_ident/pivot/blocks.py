@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +30,7 @@ _ALIKE = 6.0  # noise standard deviations between two runs of one hold
 _FEWEST = 4  # bins of a hold: 0.16 s, longer in long records
 _FEWEST_SAMPLES = 3  # of a piece
 _MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
-_STICKS_WITHIN = 0.08  # of the load at a reversal: twice the friction of a poor pivot
+_UNDECIDED = 4.0  # noise standard deviations by which a load seems to come back and does not
 _TURN = 0.02  # of the load range: a smaller way back is noise
 
 
@@ -47,6 +47,15 @@ class Hold(NamedTuple):
         return self.stop - self.start
 
 
+class LoadCourse(NamedTuple):
+    """Load along the pad over time, in short medians."""
+
+    time: FloatArray  #: (n,) [s]
+    load: FloatArray  #: (n,) [N]
+    width: float  #: [s]
+    noise: float  #: by which the load seems to come back and does not [N]
+
+
 @dataclass(frozen=True)
 class Blocks:
     """Averages over m pieces of record, (m,) each, in order of time, along and across the pad's direction."""
@@ -60,7 +69,7 @@ class Blocks:
     load_spread: FloatArray  #: standard error of the load [N]
     rate: FloatArray  #: of the load [N/s], zero within holds
     hold: IntArray  #: number of the hold, -1 on ramps
-    branch: IntArray  #: +1 loading, -1 unloading
+    branch: FloatArray  #: +1 loading, -1 unloading, their mean within a block
 
     def __len__(self) -> int:
         return len(self.time)
@@ -74,16 +83,22 @@ class Blocks:
         return noise.covariance(self.time, self.duration) + quantisation**2 * np.eye(len(self))
 
 
-def find_holds(time: FloatArray, load: FloatArray) -> tuple[Hold, ...]:
-    """Find the holds of a load programme: time (n,) [s], load along the pad (n,) [N]."""
-    # medians over two mains periods, longer in long records
-    width = _MAINS_PERIOD * max(2.0, np.ceil((time[-1] - time[0]) / _MAINS_PERIOD / 2000.0))
+def load_course(time: FloatArray, load: FloatArray, width: float, most: int) -> LoadCourse:
+    """Course of a load programme, `most` medians over `width` [s]: time (n,) [s], load along the pad (n,) [N]."""
+    width *= max(1.0, np.ceil((time[-1] - time[0]) / width / most))
     label = np.floor((time - time[0]) / width + 1e-9).astype(int)
     count = np.bincount(label)
     whole = np.flatnonzero(count >= 0.5 * np.median(count[count > 0]))
-    if len(whole) < 8:
-        return ()
     moment, level = ndimage.mean(time, label, whole), ndimage.median(load, label, whole)
+    noise = _UNDECIDED * white_noise(load) / math.sqrt(float(np.median(count[whole])))
+    return LoadCourse(moment, level, width, noise)
+
+
+def find_holds(time: FloatArray, load: FloatArray) -> tuple[Hold, ...]:
+    """Find the holds of a load programme: time (n,) [s], load along the pad (n,) [N]."""
+    moment, level, width, _ = load_course(time, load, 2.0 * _MAINS_PERIOD, 1000)
+    if len(level) < 8:
+        return ()
     noise = white_noise(level)
     # noise adds to the way, but at most a tenth of what the second limit is above it
     mean_rate = np.sum(np.abs(np.diff(level))) / (moment[-1] - moment[0])
@@ -163,13 +178,13 @@ def _edges(time: FloatArray, holds: tuple[Hold, ...], length: float) -> tuple[Fl
     return table[:, :2], table[:, 2].astype(int)
 
 
-def _directions(load: FloatArray) -> IntArray:
+def _directions(load: FloatArray) -> FloatArray:
     """Sense of the load's way (m,): it turns only when the load has come back by `_TURN` of its range."""
     if not len(load):  # a logger too slow for a single piece
-        return np.zeros(0, dtype=int)
+        return np.zeros(0)
     turn = _TURN * float(np.ptp(load))
     travel = load - load[0]
-    direction = 1 if travel[int(np.argmax(np.abs(travel) > turn))] >= 0.0 else -1
+    direction = 1.0 if travel[int(np.argmax(np.abs(travel) > turn))] >= 0.0 else -1.0
     sense = np.full(len(load), direction)
     farthest = 0
     for k, way in enumerate(travel):
@@ -182,13 +197,29 @@ def _directions(load: FloatArray) -> IntArray:
     return sense
 
 
-def sticking(load: FloatArray, branch: IntArray) -> BoolArray:
-    """Blocks (m,) just after a reversal of the load, where friction holds the pivot and no law applies.
+def slid(blocks: Blocks, course: LoadCourse, friction: float) -> Blocks:
+    """The blocks at the loads at which the pivot last slid, and the sense in which it did.
 
-    A record that begins with unloading begins at a reversal: the load had come up before.
+    Friction holds back a share of the load: until the load has come back by twice that, the pivot stays where it was.
     """
-    stuck = np.zeros(len(load), dtype=bool)
-    for start in np.flatnonzero(np.diff(branch, prepend=1)).tolist():
-        turn = load[max(start - 1, 0)]
-        stuck[start:] |= np.logical_and.accumulate(np.abs(load[start:] - turn) < _STICKS_WITHIN * abs(turn))
-    return stuck
+    last, sense = course.load.copy(), np.empty(len(course.load))
+    turn, way = last[0], float(blocks.branch[0])
+    for k, value in enumerate(course.load.tolist()):
+        if way * (value - turn) > 0.0:
+            turn = value
+        elif way * value * (1.0 + way * friction) < way * turn * (1.0 - way * friction) - course.noise:
+            turn, way = value, -way
+        last[k], sense[k] = value if abs(value - turn) < course.noise else turn, way
+    first, stop = np.searchsorted(course.time, blocks.time + np.multiply.outer([-0.5, 0.5], blocks.duration))
+    first = np.minimum(first, len(last) - 1)
+    came_back = np.abs(last - course.load) > course.noise
+    columns = np.column_stack([last, last * sense, came_back, course.load, course.load**2])
+    load, held_back, stuck, mean, square = piece_means(columns, first, np.maximum(stop, first + 1)).T
+    # in an average within which the pivot stops or starts, when it did is not known exactly
+    unsure = np.sqrt(np.maximum(square - mean**2, 0.0)) * ((stuck > 0.0) & (stuck < 1.0))
+    return replace(
+        blocks,
+        load=np.where(stuck > 0.0, load, blocks.load),
+        branch=held_back / np.where(load, load, 1.0),
+        load_spread=np.hypot(blocks.load_spread, unsure),
+    )

@@ -13,23 +13,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, FloatArray
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import RigDataError, refuse
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
-from tpjb_ident.phasors.slow_samples import level_error, live_run, slow_samples, spare_slopes
-from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, cut_blocks, find_holds, sticking
+from tpjb_ident.phasors.slow_samples import good_samples, level_error, live_run, slow_samples, spare_slopes
+from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, LoadCourse, cut_blocks, find_holds, load_course
 from tpjb_ident.pivot.pickup import PickupSignature, measure_pickup
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel
     from rigdata.campaign import Run
 
+#: Share of the load that friction holds back, where the load never comes back to show it.
+FRICTION_SHARE, FRICTION_SE = 0.003, 0.003
 _FEWEST_SAMPLES = 50
 _MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
 _FEWEST_BLOCKS = 8
 _DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
+_COURSE = 0.01, 3000  # [s], averages of the load's course: turns are sharp
 _FREE = 10.0  # times the compliance of the upper loads: no contact gives so much at a hundredth of the load
 _NOTABLE_WAY = 0.1  # of the deflection at the largest load: a shorter free way is left to the contact loss of the laws
+_STICKS_WITHIN = 0.08  # of the load at a reversal: twice the friction of a poor pivot
 _NEAR = 0.05  # of the largest load, within which a free way ends
 
 
@@ -53,6 +57,7 @@ class DryRecord:
     angle: float
     holds: tuple[Hold, ...]
     blocks: Blocks
+    course: LoadCourse
     good: BoolArray  #: (m,) blocks that belong to the curve
     lost: float  #: share of samples lost
     quantisation: float  #: [m]
@@ -60,6 +65,7 @@ class DryRecord:
     load_direction: PadDirection = field(default_factory=PadDirection)
     displacement_direction: PadDirection = field(default_factory=PadDirection)
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)  #: of readings, where more than two tell a vector
+    friction: tuple[float, float] = (FRICTION_SHARE, FRICTION_SE)  #: share that it holds back, standard deviation: prior
     creep: float = 0.0  #: share of the deflection that crept and was taken off
     free_load: float = 0.0  #: N: load up to which the shaft had not reached its pad
 
@@ -80,9 +86,10 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         cure = "Export every sample, not one a step; state the sample_rate of a slower device; else repeat the test"
         raise _refusal(run, "record", what, cure)
     pickup = _pickup(run, {"force": load, "displacement": place}, good, rate)
-    # a logger may repeat or shuffle time stamps: order is what averages need
-    order = np.flatnonzero(good)
-    order = order[np.argsort(time[order], kind="stable")]
+    # an overshoot of the load, which friction remembers, is no glitch for being short
+    turns = _in_order(time, good_samples(load, max(round(_COURSE[0] * rate), 3)) & np.isfinite(time))
+    course = time[turns], load[turns]
+    order = _in_order(time, good)
     time, load, place = time[order], load[order], place[order]
     push = _push(load)
     if angle is None:
@@ -95,7 +102,7 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
     blocks = cut_blocks(time, vectors, holds)
     loose = before_contact(blocks)
     free_load = float(np.max(blocks.load[loose], initial=0.0))
-    blocks = blocks.take(~loose & ~sticking(blocks.load, blocks.branch))
+    blocks = blocks.take(~loose & ~_just_unloaded(blocks))
     if len(blocks) < _FEWEST_BLOCKS:
         what = f"gives only {len(blocks)} usable averages of {BLOCK:g} s"
         raise _refusal(run, "record", what, "Record for longer")
@@ -105,6 +112,7 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         angle,
         holds=holds if (blocks.hold >= 0).any() else (),
         blocks=blocks,
+        course=load_course(course[0], course[1] @ axes[0], *_COURSE),
         good=np.ones(len(blocks), dtype=bool),
         lost=lost,
         quantisation=level_error(place),
@@ -113,6 +121,12 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         slopes=spare_slopes(run, axes[:1]),
         free_load=free_load,
     )
+
+
+def _in_order(time: FloatArray, good: BoolArray) -> IntArray:
+    """Places of good samples (n,) in order of time: a logger may repeat or shuffle time stamps."""
+    order = np.flatnonzero(good)
+    return np.asarray(order[np.argsort(time[order], kind="stable")])
 
 
 def pad_axes(angle: float) -> FloatArray:
@@ -137,6 +151,12 @@ def before_contact(blocks: Blocks) -> BoolArray:
     loose = (near & (way > compliance * (_FREE * more + _NOTABLE_WAY * largest))).any(axis=1)
     beside = np.convolve(loose, np.ones(3), "same") > 0  # the average in which the way ends holds some of it
     return np.asarray(beside & (load < _NEAR * largest))
+
+
+def _just_unloaded(blocks: Blocks) -> BoolArray:
+    """Blocks (m,) in which a record begins with unloading: whether its pivot slides yet nobody knows."""
+    near = blocks.load > (1.0 - _STICKS_WITHIN) * blocks.load[0]
+    return np.logical_and.accumulate((blocks.branch < 0) & near)
 
 
 def _push(load: FloatArray) -> FloatArray:

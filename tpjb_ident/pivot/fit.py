@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
@@ -21,9 +22,18 @@ from rigdata.problem import Problem, RigDataError, refuse
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import refused_runs
+from tpjb_ident.pivot.blocks import slid
 from tpjb_ident.pivot.creep import without_creep
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop
-from tpjb_ident.pivot.dry_record import DryRecord, axial_channels, pooled_noise, read_dry_run, relative_calibration
+from tpjb_ident.pivot.dry_record import (
+    FRICTION_SE,
+    FRICTION_SHARE,
+    DryRecord,
+    axial_channels,
+    pooled_noise,
+    read_dry_run,
+    relative_calibration,
+)
 from tpjb_ident.pivot.law_fit import (
     FRICTION,
     OFFSET,
@@ -49,7 +59,8 @@ REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest l
 MODEL_ERROR = 3e-4  # of the deflection: what averaging over a curved law leaves; matters in computed records only
 UNKNOWN_ZERO = 2.0e-5  # [m], spread of the reading at zero load from run to run of one pad
 LAG = 0.002  # [s], by which displacement may lag behind load
-FRICTION_SHARE, FRICTION_SE = 0.003, 0.003  # of the load, where one branch cannot show it
+_SHARES = (0.0, 0.002, 0.005, 0.01, 0.02, 0.04, 0.08)  # of friction that are tried, where the load comes back
+_SHOWN = (0.0, 0.05)  # prior of friction that the load shows
 GROUPS_ON_RAMP = 15
 CONTACT_TOLERANCE = 0.05  # of the compliance: what incomplete contact may add where contact counts as complete
 _BAD_LIMIT = 5.0  # standard errors
@@ -71,7 +82,7 @@ def fit_data(records: Sequence[DryRecord], noise: NoiseModel) -> FitData:
     parts = [record.used for record in records]
     load = np.concatenate([part.load for part in parts])
     deflection = np.concatenate([part.deflection for part in parts])
-    branch = np.concatenate([part.branch for part in parts]).astype(float)
+    branch = np.concatenate([part.branch for part in parts])
     compliance = float(np.ptp(deflection)) / max(float(np.ptp(load)), 1e-300)
     covariances = []
     for record, part in zip(records, parts, strict=True):
@@ -80,7 +91,7 @@ def fit_data(records: Sequence[DryRecord], noise: NoiseModel) -> FitData:
         one_level = (part.hold[:, None] == part.hold) & (part.hold >= 0) | np.eye(len(part), dtype=bool)
         zero = UNKNOWN_ZERO**2 if len(records) > 1 else 0.0
         covariances.append(part.covariance(noise) + record.quantisation**2 * one_level + own + zero)
-    both, creep = len(np.unique(branch)) > 1, max(record.creep for record in records)
+    friction, spread = max((record.friction for record in records), key=operator.itemgetter(1))
     return FitData(
         load=load,
         deflection=deflection - deflection[int(np.argmin(load))],
@@ -88,8 +99,24 @@ def fit_data(records: Sequence[DryRecord], noise: NoiseModel) -> FitData:
         whitener=np.linalg.inv(np.linalg.cholesky(linalg.block_diag(*covariances))),
         reference_load=REFERENCE_SHARE * float(np.max(load)),
         # on one branch a share of the load and a share of the deflection that creeps are one error
-        friction=(0.0, 0.05) if both else (FRICTION_SHARE, max(FRICTION_SE, creep)),
+        friction=(friction, max(spread, *(record.creep for record in records))),
     )
+
+
+def with_friction(record: DryRecord, noise: NoiseModel) -> DryRecord:
+    """The record at the loads at which its pivot last slid, by the friction that explains best how it moved.
+
+    A load that overshoots, wanders or turns shows how far it must come back before the pivot follows.
+    """
+    if np.ptp(slid(record.blocks, record.course, FRICTION_SHARE + 2.0 * FRICTION_SE).branch) == 0.0:
+        return replace(record, blocks=slid(record.blocks, record.course, FRICTION_SHARE))
+    likeliest, evidence = record, -math.inf
+    for share in _SHARES:
+        trial = replace(record, blocks=slid(record.blocks, record.course, share), friction=_SHOWN)
+        fit = fit_law(LAWS["spline"], True, fit_data([trial], noise))
+        if fit.log_evidence > evidence:
+            likeliest, evidence = trial, fit.log_evidence
+    return likeliest
 
 
 def bad_blocks(record: DryRecord, noise: NoiseModel) -> BoolArray:
@@ -216,6 +243,7 @@ def fit_pivots(
     if problems and (on_refusal == "raise" or not used or (on_refusal == "few" and many)):
         raise RigDataError(problems)
     used, noise, creeps = without_creep(used, noise)
+    used = [with_friction(record, noise) for record in used]
     pads: dict[int, list[DryRecord]] = {}
     for record in sorted(used, key=lambda record: record.pad):
         pads.setdefault(record.pad, []).append(replace(record, good=~bad_blocks(record, noise)))
@@ -308,7 +336,7 @@ def _steps(records: Sequence[DryRecord], law: LawFit, noise: NoiseModel) -> Pivo
         members = np.unique(groups[groups >= 0])[:, None] == groups
         duration = members @ blocks.duration
         share = members * blocks.duration / duration[:, None]
-        branch = blocks.branch[np.argmax(members, axis=1)]
+        branch = np.sign(share @ blocks.branch).astype(int)
         load = share @ blocks.load * (1.0 - law.theta[FRICTION] * branch)
         deflection = share @ blocks.deflection - zero - law.theta[OFFSET]
         error = np.sqrt([noise.mean_variance(float(length)) for length in duration])
