@@ -30,7 +30,7 @@ _ALIKE = 6.0  # noise standard deviations between two runs of one hold
 _FEWEST = 4  # bins of a hold: 0.16 s, longer in long records
 _FEWEST_SAMPLES = 3  # of a piece
 _MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
-_UNDECIDED = 4.0  # noise standard deviations by which a load seems to come back and does not
+_UNDECIDED = 6.0  # noise standard deviations by which a load seems to come back and does not
 _TURN = 0.02  # of the load range: a smaller way back is noise
 
 
@@ -53,7 +53,6 @@ class LoadCourse(NamedTuple):
     time: FloatArray  #: (n,) [s]
     load: FloatArray  #: (n,) [N]
     width: float  #: [s]
-    noise: float  #: by which the load seems to come back and does not [N]
 
 
 @dataclass(frozen=True)
@@ -90,13 +89,12 @@ def load_course(time: FloatArray, load: FloatArray, width: float, most: int) -> 
     count = np.bincount(label)
     whole = np.flatnonzero(count >= 0.5 * np.median(count[count > 0]))
     moment, level = ndimage.mean(time, label, whole), ndimage.median(load, label, whole)
-    noise = _UNDECIDED * white_noise(load) / math.sqrt(float(np.median(count[whole])))
-    return LoadCourse(moment, level, width, noise)
+    return LoadCourse(moment, level, width)
 
 
 def find_holds(time: FloatArray, load: FloatArray) -> tuple[Hold, ...]:
     """Find the holds of a load programme: time (n,) [s], load along the pad (n,) [N]."""
-    moment, level, width, _ = load_course(time, load, 2.0 * _MAINS_PERIOD, 1000)
+    moment, level, width = load_course(time, load, 2.0 * _MAINS_PERIOD, 1000)
     if len(level) < 8:
         return ()
     noise = white_noise(level)
@@ -203,16 +201,16 @@ def slid(blocks: Blocks, course: LoadCourse, friction: float) -> Blocks:
     Friction holds back a share of the load: until the load has come back by twice that, the pivot stays where it was.
     """
     last, sense = course.load.copy(), np.empty(len(course.load))
-    turn, way = last[0], float(blocks.branch[0])
+    turn, way, noise = last[0], float(blocks.branch[0]), _UNDECIDED * white_noise(course.load)
     for k, value in enumerate(course.load.tolist()):
         if way * (value - turn) > 0.0:
             turn = value
-        elif way * value * (1.0 + way * friction) < way * turn * (1.0 - way * friction) - course.noise:
+        elif way * value * (1.0 + way * friction) < way * turn * (1.0 - way * friction) - noise:
             turn, way = value, -way
-        last[k], sense[k] = value if abs(value - turn) < course.noise else turn, way
+        last[k], sense[k] = value if abs(value - turn) < noise else turn, way
     first, stop = np.searchsorted(course.time, blocks.time + np.multiply.outer([-0.5, 0.5], blocks.duration))
     first = np.minimum(first, len(last) - 1)
-    came_back = np.abs(last - course.load) > course.noise
+    came_back = np.abs(last - course.load) > noise
     columns = np.column_stack([last, last * sense, came_back, course.load, course.load**2])
     load, held_back, stuck, mean, square = piece_means(columns, first, np.maximum(stop, first + 1)).T
     # in an average within which the pivot stops or starts, when it did is not known exactly

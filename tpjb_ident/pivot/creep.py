@@ -19,7 +19,7 @@ from scipy import special
 from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.slow_noise import NoiseModel
-from tpjb_ident.pivot.dry_record import DryRecord, pooled_noise
+from tpjb_ident.pivot.dry_record import DryRecord, pooled_noise, smooth_columns
 
 _PLAUSIBLE = 0.03  # share of the deflection that liners and joints creep: what holds hardly show is not made large
 _TIMES = (0.3, 1.0, 3.0, 10.0)  # time constants over the usual length of a hold
@@ -64,7 +64,9 @@ def without_creep(
 def _courses(record: DryRecord, times: FloatArray) -> FloatArray:
     """Creep of unit size at the blocks (m, 2 k): of every time constant (k,), lost at the next step, and carried on."""
     blocks = record.blocks
-    moved = blocks.deflection - blocks.deflection[int(np.argmin(blocks.load))]
+    smooth = smooth_columns(blocks)  # the readings themselves would find their own noise in their courses
+    moved = smooth @ np.linalg.lstsq(smooth, blocks.deflection, rcond=None)[0]
+    moved -= moved[int(np.argmin(blocks.load))]
     starts = np.array([hold.start for hold in record.holds] + [0.0])
     since = np.where(blocks.hold >= 0, blocks.time - starts[blocks.hold], 0.0)[:, None]
     anew = moved[:, None] * -np.expm1(-np.maximum(since, 0.0) / times)

@@ -238,12 +238,12 @@ def pooled_noise(records: Sequence[DryRecord], about_curve: bool = False) -> Noi
         if (about_curve and len(blocks) <= 20) or not record.holds:
             blocks = used
         levels = (blocks.hold[:, None] == np.unique(blocks.hold)).astype(float)
-        mean = _smooth_columns(blocks) if about_curve or not record.holds else levels
+        mean = smooth_columns(blocks) if about_curve or not record.holds else levels
         series += [NoiseSeries(blocks.time, blocks.duration, x, mean) for x in (blocks.deflection, blocks.across)]
     return estimate_noise(series, _DRIFT_RATE, learn_drift=bool(with_holds))
 
 
-def _smooth_columns(blocks: Blocks) -> FloatArray:
+def smooth_columns(blocks: Blocks) -> FloatArray:
     """Columns (m, p) that span every law of `laws.py` well within the noise, and a soft toe."""
     u = np.maximum(blocks.load / np.max(blocks.load), 1e-3)
     columns = [np.ones_like(u), u, u * np.log(u), np.exp(-u / 0.06), np.exp(-u / 0.15)]

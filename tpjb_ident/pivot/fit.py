@@ -59,8 +59,7 @@ REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest l
 MODEL_ERROR = 3e-4  # of the deflection: what averaging over a curved law leaves; matters in computed records only
 UNKNOWN_ZERO = 2.0e-5  # [m], spread of the reading at zero load from run to run of one pad
 LAG = 0.002  # [s], by which displacement may lag behind load
-_SHARES = (0.0, 0.002, 0.005, 0.01, 0.02, 0.04, 0.08)  # of friction that are tried, where the load comes back
-_SHOWN = (0.0, 0.05)  # prior of friction that the load shows
+_TIMES = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # the usual share of friction, where the load comes back
 GROUPS_ON_RAMP = 15
 CONTACT_TOLERANCE = 0.05  # of the compliance: what incomplete contact may add where contact counts as complete
 _BAD_LIMIT = 5.0  # standard errors
@@ -108,14 +107,18 @@ def with_friction(record: DryRecord, noise: NoiseModel) -> DryRecord:
 
     A load that overshoots, wanders or turns shows how far it must come back before the pivot follows.
     """
-    if np.ptp(slid(record.blocks, record.course, FRICTION_SHARE + 2.0 * FRICTION_SE).branch) == 0.0:
-        return replace(record, blocks=slid(record.blocks, record.course, FRICTION_SHARE))
-    likeliest, evidence = record, -math.inf
-    for share in _SHARES:
-        trial = replace(record, blocks=slid(record.blocks, record.course, share), friction=_SHOWN)
+    if np.ptp(slid(record.blocks, record.course, 0.0).branch) == 0.0:
+        return record
+    likeliest, evidence, fitted = record, -math.inf, 0.0
+    for times in (*_TIMES, None, None):
+        share = fitted if times is None else times * FRICTION_SHARE
+        friction = share, max(share, FRICTION_SE)
+        trial = replace(record, blocks=slid(record.blocks, record.course, share), friction=friction)
         fit = fit_law(LAWS["spline"], True, fit_data([trial], noise))
-        if fit.log_evidence > evidence:
-            likeliest, evidence = trial, fit.log_evidence
+        # nothing else tells much friction from more
+        likely = fit.log_evidence - math.log1p((share / FRICTION_SHARE - 1.0) ** 2)
+        if likely > evidence:
+            likeliest, evidence, fitted = trial, likely, abs(float(fit.theta[FRICTION]))
     return likeliest
 
 
