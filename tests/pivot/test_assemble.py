@@ -23,6 +23,7 @@ from tpjb_ident.pivot.dry_record import (
     load_direction,
     pad_axes,
     read_dry_run,
+    with_load_zero,
 )
 from tpjb_ident.pivot.fit import (
     LAG,
@@ -33,7 +34,7 @@ from tpjb_ident.pivot.fit import (
     bad_blocks,
     fit_data,
     with_friction,
-    with_repeats,
+    with_shared_errors,
 )
 from tpjb_ident.pivot.law_fit import FRICTION, LawFit, fit_law
 from tpjb_ident.pivot.law_fit import SCALE as LN_SCALE
@@ -48,8 +49,8 @@ NOISE = NoiseModel(white=1e-18, flicker=1e-18, drift=1e-9)
 REACH = 8e-5
 
 
-def channel(quantity, axis, uncertainty=None):
-    return SimpleNamespace(quantity=quantity, axis=axis, uncertainty=uncertainty)
+def channel(quantity, axis, uncertainty=None, zero_uncertainty=0.0):
+    return SimpleNamespace(quantity=quantity, axis=axis, uncertainty=uncertainty, zero_uncertainty=zero_uncertainty)
 
 
 CHANNELS = {
@@ -582,10 +583,72 @@ def test_tests_of_one_pad_tell_how_far_they_are_to_be_believed(apart):
     softer = replace(second.blocks, deflection=REACH + (1 + apart) * (second.blocks.deflection - REACH))
     pads = [[first, replace(second, blocks=softer)], [single]]
     data = [fit_data(records, NOISE) for records in pads]
-    wider, scatter = with_repeats(pads, data)
+    wider, scatter = with_shared_errors(pads, data)
     assert scatter == pytest.approx(apart / math.sqrt(2), rel=0.3, abs=1e-6)
     for plain, wide, tests in zip(data, wider, (2, 1), strict=True):
         before, after = (fit_law(LAWS["spline"], False, pad) for pad in (plain, wide))
         assert after.theta[LN_SCALE] == pytest.approx(before.theta[LN_SCALE], abs=0.02)
         grown = after.covariance[LN_SCALE, LN_SCALE] - before.covariance[LN_SCALE, LN_SCALE]
         assert math.sqrt(max(grown, 0.0)) == pytest.approx(scatter / math.sqrt(tests), rel=0.3, abs=1e-6)
+
+
+ZERO = np.array([180.0, -90.0])
+
+
+def untared(pads, stated, zero=ZERO):
+    """Records toward some pads, each load a degree or two aside, of cells that read `zero` at no load."""
+    channels = {name: replace_zero(one, stated) for name, one in CHANNELS.items()}
+    records = []
+    for pad, turn in zip(pads, np.radians([1.0, -2.0, 0.5, 1.5, -1.0]), strict=False):
+        one = record(pad, turn=(turn, 0.0))
+        along, across = pad_axes(one.angle) @ zero
+        load, across_load = one.blocks.load + along, one.blocks.across_load + across
+        blocks = replace(one.blocks, load=load, across_load=across_load)
+        run = SimpleNamespace(**{**vars(one.run), "channels": channels})
+        course = one.course._replace(load=one.course.load + along)
+        records.append(replace(one, run=run, blocks=blocks, course=course, load_direction=load_direction(blocks)))
+    return records
+
+
+def replace_zero(one, stated):
+    return SimpleNamespace(**{**vars(one), "zero_uncertainty": stated if one.quantity == "force" else 0.0})
+
+
+@pytest.mark.parametrize("stated", [0.0, 200.0])
+def test_lines_of_load_toward_three_pads_meet_in_what_the_cells_read_at_none(stated):
+    for given, mended in zip(
+        [record(pad) for pad in (1, 3, 4)], with_load_zero(untared((1, 3, 4), stated)), strict=True
+    ):
+        np.testing.assert_allclose(mended.blocks.load, given.blocks.load, atol=5.0)
+        np.testing.assert_allclose(mended.course.load, given.course.load, atol=5.0)
+        assert mended.load_error < 10.0
+        assert "201 N" in mended.untared
+
+
+@pytest.mark.parametrize(
+    ("pads", "zero", "stated"), [((1, 2), ZERO, 0.0), ((1,), ZERO, 60.0), ((1, 2, 4), 0.02 * ZERO, 0.0)]
+)
+def test_a_zero_that_nothing_tells_is_known_as_stated(pads, zero, stated):
+    records = untared(pads, stated, zero)
+    for given, kept in zip(records, with_load_zero(records), strict=True):
+        np.testing.assert_array_equal(kept.blocks.load, given.blocks.load)
+        assert kept.load_error == pytest.approx(stated)
+        assert not kept.untared
+
+
+def test_an_unknown_zero_widens_a_curve_that_bends_and_no_straight_one():
+    """A straight curve is as stiff everywhere; that of a sphere is a third of the share off."""
+    error, widths = 50.0, []
+    for exponent in (1.0, 2 / 3):
+        bent = replace(
+            record().blocks, deflection=SCALE * record().blocks.load ** exponent * 3000.0 ** (1.0 - exponent)
+        )
+        one = replace(record(), blocks=bent, load_error=error)
+        (wider,), _ = with_shared_errors([[one]], [fit_data([one], NOISE)])
+        fit = fit_law(LAWS["power"], False, wider)
+        at = np.array([1000.0])
+        gradient = fit.log_softness(at, False)[1]
+        plain = fit_law(LAWS["power"], False, fit_data([one], NOISE))
+        widths.append(math.sqrt(float((gradient @ (fit.covariance - plain.covariance) @ gradient.T)[0, 0])))
+    assert widths[0] < 2e-3
+    assert 0.3 < widths[1] / (error / 3.0 / 1000.0) < 1.5

@@ -111,9 +111,9 @@ class NoiseSeries:
 def _rotated(series: Sequence[NoiseSeries], unit: float) -> list[tuple[FloatArray, FloatArray]]:
     """Series of one shape together, k of them, each in the basis in which white and 1/f noise are both diagonal.
 
-    Every level that the search tries costs a few products of small matrices for all of them together. Gives the spectra
-    (k, m, 2) over the white of the 1/f noise and, all but diagonal there, of a walk's quick part; and signal, drift, the
-    walk's slow part and values (k, m, p + 10).
+    Every level that the search tries costs a few products of small matrices for all of them together. Gives spectra
+    (k, m, 2) over the white noise, of the 1/f noise and (all but diagonal there) of a walk's quick part; and signal,
+    drift, the walk's slow part and values (k, m, p + 10).
     """
     groups: dict[tuple[int, ...], list[tuple[FloatArray, FloatArray]]] = {}
     for samples in series:

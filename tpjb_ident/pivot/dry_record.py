@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import RigDataError, refuse
+from rigdata.vector import directions, zero_uncertainty
+from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import good_samples, level_error, live_run, slow_samples, spare_slopes
 from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, LoadCourse, cut_blocks, find_holds, load_course
@@ -26,6 +28,9 @@ if TYPE_CHECKING:
 
 #: Share of the load that friction holds back, where the load never comes back to show it.
 FRICTION_SHARE, FRICTION_SE = 0.003, 0.003
+LOAD_LIMIT = math.radians(8.0)  # off the pad
+_STRAIGHT = 1e-4  # [rad] that a line along which a load grows is straight at best
+_CLEAR, _NOTABLE = 5.0, 0.004  # standard errors of a zero that nobody stated, and share of the load
 _FEWEST_SAMPLES = 50
 _MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
 _FEWEST_BLOCKS = 8
@@ -65,9 +70,14 @@ class DryRecord:
     load_direction: PadDirection = field(default_factory=PadDirection)
     displacement_direction: PadDirection = field(default_factory=PadDirection)
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)  #: of readings, where more than two tell a vector
-    friction: tuple[float, float] = (FRICTION_SHARE, FRICTION_SE)  #: share that it holds back, standard deviation: prior
+    friction: tuple[float, float] = (
+        FRICTION_SHARE,
+        FRICTION_SE,
+    )  #: share that it holds back, standard deviation: prior
     creep: float = 0.0  #: share of the deflection that crept and was taken off
     free_load: float = 0.0  #: N: load up to which the shaft had not reached its pad
+    load_error: float = 0.0  #: N: standard error of the zero of the load along the pad
+    untared: str = ""  #: what the cells read at no load, where it was taken off
 
     @property
     def used(self) -> Blocks:
@@ -140,7 +150,7 @@ def before_contact(blocks: Blocks) -> BoolArray:
 
     A way that closes over some tenths of the load is left to the law's contact loss.
     """
-    load, deflection = blocks.load, blocks.deflection
+    load, deflection = blocks.load - np.min(blocks.load, initial=np.inf), blocks.deflection
     largest = float(np.max(load, initial=0.0))
     upper = load >= 0.3 * largest
     if np.unique(load[upper]).size < 3 or not largest > 0.0:
@@ -169,6 +179,66 @@ def _push(load: FloatArray) -> FloatArray:
 def _refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
     """Error that names the run, the place, the trouble and the cure."""
     return refuse(run.file, place, f"run {run.id} {what}", cure, run.id)
+
+
+def with_load_zero(records: Sequence[DryRecord]) -> list[DryRecord]:
+    """Records whose loads count from the zero of their cells."""
+    groups: dict[frozenset[str], list[DryRecord]] = {}
+    for record in records:
+        groups.setdefault(names_of(record.run, "force"), []).append(record)
+    zeros = {cells: _cell_zero(group) for cells, group in groups.items()}
+    return [_less_zero(record, *zeros[names_of(record.run, "force")]) for record in records]
+
+
+def _cell_zero(records: Sequence[DryRecord]) -> tuple[FloatArray, FloatArray, str]:
+    """What the cells of some records read at no load (2,) [N], its covariance (2, 2), and that in words if it is clear.
+
+    The load grows along a line toward each pad, and all lines meet in what is read at no load, wherever each of them
+    points and begins. Where the manifest states no uncertainty of the zero it counts if it is clear alone.
+    """
+    stated = zero_uncertainty(axial_channels(records[0].run).values(), "force")
+    prior = np.diag(1.0 / stated**2) if stated.all() else np.zeros((2, 2))
+    lines = [record for record in records if abs(record.load_direction.angle) < LOAD_LIMIT]
+    turn = np.array([record.load_direction.angle for record in lines])
+    mean = np.array([[record.blocks.load.mean(), record.blocks.across_load.mean()] for record in lines]).reshape(-1, 2)
+    aside = mean[:, 1] * np.cos(turn) - mean[:, 0] * np.sin(turn)
+    error = np.maximum([record.load_direction.se for record in lines], _STRAIGHT) * mean[:, 0]
+    design = directions(turn + [record.angle + 0.5 * math.pi for record in lines])
+    normal = design.T / error**2
+    freedom = np.linalg.matrix_rank(design, 0.1) - 2 + len(lines) - 2
+    if freedom < 1:
+        return np.zeros(2), np.diag(stated**2), ""
+    zero = np.linalg.solve(normal @ design, normal @ aside)
+    scatter = float(np.sum(((aside - design @ zero) / error) ** 2)) / freedom
+    told = normal @ design / (max(scatter, 1.0) * student_widening(freedom) ** 2)
+    covariance = np.linalg.inv(told + prior)
+    size, spread = float(np.hypot(*zero)), math.sqrt(float(np.trace(covariance)))
+    is_clear = size > max(_CLEAR * spread, _NOTABLE * float(np.max(mean)))
+    if not (is_clear or prior.any()):
+        return np.zeros(2), prior, ""
+    text = (
+        f"the lines along which the loads of all pads grow meet at {size:.0f} N (se {spread:.0f} N); it was taken off"
+    )
+    return covariance @ told @ zero, covariance, text if is_clear else ""
+
+
+def _less_zero(record: DryRecord, zero: FloatArray, covariance: FloatArray, untared: str) -> DryRecord:
+    """A record whose loads count from a zero (2,) [N] that is known with a covariance (2, 2)."""
+    axes, blocks, course = pad_axes(record.angle), record.blocks, record.course
+    along, across = axes @ zero
+    return replace(
+        record,
+        blocks=replace(blocks, load=blocks.load - along, across_load=blocks.across_load - across),
+        course=course._replace(load=course.load - along),
+        free_load=max(record.free_load - along, 0.0) if record.free_load else 0.0,
+        load_error=math.sqrt(float(axes[0] @ covariance @ axes[0])),
+        untared=untared,
+    )
+
+
+def names_of(run: Run, quantity: str) -> frozenset[str]:
+    """Names of a run's probes or cells."""
+    return frozenset(name for name, channel in axial_channels(run).items() if channel.quantity == quantity)
 
 
 def axial_channels(run: Run) -> dict[str, Channel]:

@@ -164,36 +164,44 @@ def _score_of(fit: LawFit, data: FitData, columns: FloatArray | BoolArray) -> tu
     return shift, remainder, residual @ remainder
 
 
-def with_repeats(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitData]) -> tuple[list[FitData], float]:
-    """Data whose compliance is another one in every test of a pad, by a scatter that all pads' tests tell together."""
-    if all(len(records) < 2 for records in pads):
+def with_shared_errors(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitData]) -> tuple[list[FitData], float]:
+    """Data of pads with what is off alike in all readings of a test or of a pad.
+
+    Compliance is another one in every test of a pad, by a scatter that all pads' tests tell together; and the load has
+    a zero that is known so well.
+    """
+    if all(len(records) < 2 and not records[0].load_error for records in pads):
         return list(data), 0.0
-    runs, changes, sizes, squares = [], [], [], []
-    for records, pad in zip(pads, data, strict=True):
-        fit = fit_law(LAWS["spline"], True, pad)
-        runs.append(np.repeat(np.arange(len(records)), [len(record.used) for record in records]))
-        # of the curve, not of the readings: these would favour the softer test
-        changes.append(fit.reading_gradient(pad.load, pad.branch)[0] - fit.theta[OFFSET])
-        if len(records) < 2:
-            continue
-        columns = (runs[-1][:, None] == np.arange(len(records))) * changes[-1][:, None]
+    fits = [fit_law(LAWS["spline"], True, pad) for pad in data]
+    runs = [np.repeat(np.arange(len(records)), [len(record.used) for record in records]) for records in pads]
+    # of the curve, not of the readings: these would favour the softer test
+    changes = [fit.reading_gradient(pad.load, pad.branch)[0] - fit.theta[OFFSET] for fit, pad in zip(fits, data)]
+    scatter = _scatter(fits, data, runs, changes)
+    wider = []
+    for records, pad, fit, run, change in zip(pads, data, fits, runs, changes, strict=True):
+        root, error = np.linalg.inv(pad.whitener), max(record.load_error for record in records)
+        more, less = (fit.reading_gradient(pad.load + shift, pad.branch)[0] for shift in (error, -error))
+        zero = 0.5 * (more - less)
+        covariance = root @ root.T + scatter**2 * np.outer(change, change) * (run[:, None] == run)
+        whitener = np.linalg.inv(np.linalg.cholesky(covariance + np.outer(zero, zero)))
+        wider.append(replace(pad, whitener=whitener) if scatter or error else pad)
+    return wider, scatter
+
+
+def _scatter(
+    fits: Sequence[LawFit], data: Sequence[FitData], runs: Sequence[IntArray], changes: Sequence[FloatArray]
+) -> float:
+    """Scatter of the compliance from test to test of a pad; zero where it may be chance."""
+    sizes, squares = [np.zeros(0)], [np.zeros(0)]
+    for fit, pad, run, change in zip(fits, data, runs, changes, strict=True):
+        columns = (run[:, None] == np.unique(run)) * change[:, None]
         # what all tests have in common is the curve's
-        shift, remainder, score = _score_of(fit, pad, columns @ linalg.null_space(np.ones((1, len(records)))))
+        shift, remainder, score = _score_of(fit, pad, columns @ linalg.null_space(np.ones((1, columns.shape[1]))))
         information, basis = np.linalg.eigh(shift.T @ remainder)
         informative = information > _LEAST_SHARE * np.sum(shift**2)
         sizes.append(information[informative])
         squares.append((basis.T @ score)[informative] ** 2 / information[informative])
-    scatter = _scatter(np.concatenate(sizes), np.concatenate(squares))
-    wider = []
-    for pad, run, change in zip(data, runs, changes, strict=True):
-        root = np.linalg.inv(pad.whitener)
-        covariance = root @ root.T + scatter**2 * np.outer(change, change) * (run[:, None] == run)
-        wider.append(replace(pad, whitener=np.linalg.inv(np.linalg.cholesky(covariance))))
-    return (wider if scatter else list(data)), scatter
-
-
-def _scatter(size: FloatArray, square: FloatArray) -> float:
-    """Scatter of numbers (n,) of information `size` about zero by their squares in standard errors; zero by chance."""
+    size, square = np.concatenate(sizes), np.concatenate(squares)
 
     def deviance(logarithm: float) -> float:
         variance = 1.0 + math.exp(2.0 * logarithm) * size
@@ -275,7 +283,7 @@ def _fit_pads(pads: Sequence[Sequence[DryRecord]], structure: str) -> list[Pivot
     """Learn the noise about the curves, fit every law to the records of each pad, weigh the laws over the pads."""
     noise = pooled_noise(list(itertools.chain(*pads)), about_curve=True)
     data = [fit_data(records, noise) for records in pads]
-    data, scatter = with_repeats(pads, data)
+    data, scatter = with_shared_errors(pads, data)
     variants = list(itertools.product(LAWS.values(), (False, True)))
     fits = [[fit_law(law, contact, pad_data) for law, contact in variants] for pad_data in data]
     fits = with_shared_shape(fits, posterior_weights(fits), data)
@@ -375,6 +383,7 @@ def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> 
         (onset > 0.0, "contact-incomplete", f"the shaft is not fully in contact below {onset:.0f} N"),
         (onset >= np.max(curve.steps.load), "contact-never-complete", ""),
         (shares[law.name] < _CLEAR_CHOICE, "law-undecided", listed),
+        (records[0].untared, "cells-not-tared", records[0].untared),
         (law.name == "spline", "no-physical-law", ""),
         (_misfits(law), "misfit", "the scatter exceeds the noise"),
         (not any(record.holds for record in records), "no-holds", "drift cannot be told from deflection"),

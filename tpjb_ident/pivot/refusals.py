@@ -14,14 +14,21 @@ from rigdata.problem import Problem, RigDataError, Severity
 from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import REMEDY, contradictions
-from tpjb_ident.pivot.dry_record import DryRecord, axial_channels, displacement_direction, pooled_noise
+from tpjb_ident.pivot.dry_record import (
+    LOAD_LIMIT,
+    DryRecord,
+    displacement_direction,
+    names_of,
+    pooled_noise,
+    with_load_zero,
+)
 from tpjb_ident.pivot.pickup import mistake
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run
 
 T = TypeVar("T")
-LOAD_LIMIT, DISPLACEMENT_LIMIT = math.radians(8.0), math.radians(30.0)  # off the pad
+DISPLACEMENT_LIMIT = math.radians(30.0)  # off the pad
 _FAR_OFF = math.radians(30.0)  # from where a pad leaves no doubt that it is another one's record
 _ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
 _ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that
@@ -56,10 +63,10 @@ def usable_runs(
 def refused_records(
     records: Sequence[DryRecord], pad_angles: FloatArray
 ) -> tuple[list[DryRecord], list[Problem], NoiseModel]:
-    """Records with the directions of their displacements, why some are not what they claim to be, their noise."""
+    """Records from their cells' zero, with displacement directions; why some are not what they claim; their noise."""
     if not records:
         return [], [], NoiseModel(1.0, 1.0, 1.0)
-    noise = pooled_noise(records)
+    records, noise = with_load_zero(records), pooled_noise(records)
     moved = [displacement_direction(record.blocks, noise, record.quantisation) for record in records]
     records = [replace(record, displacement_direction=way) for record, way in zip(records, moved, strict=True)]
     problems = check_directions(records, pad_angles) + check_pickup(records)
@@ -148,17 +155,12 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     """
     alike: dict[frozenset[str], list[DryRecord]] = {}
     for record in records:  # other probes have another zero
-        alike.setdefault(_probes(record), []).append(record)
+        alike.setdefault(names_of(record.run, "displacement"), []).append(record)
     problems = []
     for group in alike.values():
         if len({record.pad for record in group}) >= 3:
             problems += _misplaced(group)
     return problems
-
-
-def _probes(record: DryRecord) -> frozenset[str]:
-    """Names of a run's probes."""
-    return frozenset(name for name, c in axial_channels(record.run).items() if c.quantity == "displacement")
 
 
 def _misplaced(records: Sequence[DryRecord]) -> list[Problem]:
@@ -221,7 +223,9 @@ def _slope_error(record: DryRecord, noise: NoiseModel) -> float:
     moved = record.blocks.deflection - record.blocks.deflection.mean()
     variance = moved @ record.blocks.covariance(noise) @ moved
     # a component of more than two probes has less noise than each
-    return math.sqrt(variance * max(len(_probes(record)) / 2.0, 1.0)) / max(float(moved @ moved), 1e-300)
+    return math.sqrt(variance * max(len(names_of(record.run, "displacement")) / 2.0, 1.0)) / max(
+        float(moved @ moved), 1e-300
+    )
 
 
 def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:
