@@ -1,5 +1,6 @@
 """Clearance sweeps of the virtual rig, and polygons by hand: clearance per pad, centre, side angles, refusals."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,6 +18,7 @@ from tests.clearance.cases import ANGLES, CLEARANCE, OtherRun, bearing_centre, r
 from tpjb_ident.clearance.measure import _inseparable, coldest_first, measure_clearance, measure_run, pairs_frame
 from tpjb_ident.clearance.polygon import corners, find_centre
 from tpjb_ident.clearance.sweep import _settled
+from tpjb_ident.compare.static_tests import bearing_problems
 from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot import fit_pivots
 
@@ -59,6 +61,17 @@ def test_clearance_and_centre_with_one_pad_off(whole):
     needed = {"pad", "clearance_m", "clearance_m_se", "clearance_pushed_m", "clearance_pushed_m_se"}
     assert needed <= set(frame.columns)
     assert "µm (se)" in str(found)
+
+
+def test_pads_that_stand_further_out_than_they_are_bored_have_negative_preload(whole):
+    """Pad #3 stands 6 um further out than the others."""
+    source, curves = whole
+    bored = [SimpleNamespace(pivot_angle=angle, pad_clearance=83e-6, assembled_clearance=80e-6) for angle in ANGLES]
+    named = [p for p in bearing_problems(source, SimpleNamespace(pads=bored)) if p.place == "preload"]
+    assert [p.severity for p in named] == ["warning", "warning"]
+    assert all(re.search(r"negative preload: #3 -0\.03\d$", p.what) for p in named)
+    polygon = measure_clearance(source, ANGLES, curves)
+    assert polygon.negative_preloads([80e-6, 80e-6, 86e-6, 80e-6, 80e-6]) == ""
 
 
 def test_two_push_loads_give_the_radial_stiffness_and_a_hot_sweep_what_the_bearing_grew(whole, measured, opened):

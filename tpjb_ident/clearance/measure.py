@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _FEWEST_BLOCKS = 4  # per pad
 _SAME_TEMPERATURE = 4.0  # [K]
 _IRREGULAR = 3.0  # standard errors
+_LEAST_ERROR = 1e-3  # of a preload, drawn or measured
 _UNEQUAL = 0.02  # gains of two probes: twice what a usual certificate leaves open
 _GAIN_ERRORS = 4.0  # standard errors, of few sides
 _RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
@@ -118,6 +119,13 @@ class ClearancePolygon(Presented):
                 "run": self.run,
             }
         )
+
+    def negative_preloads(self, pad_clearance: Sequence[float]) -> str:
+        """Pads that stand further out than their own clearances (n,) [m] allow, in words; empty where none does."""
+        preload = 1.0 - self.clearance / pad_clearance
+        error = self.relative_calibration + self.clearance_se / self.clearance + _LEAST_ERROR
+        listed = ", ".join(f"#{pad + 1} {preload[pad]:+.3f}" for pad in np.flatnonzero(preload < -_IRREGULAR * error))
+        return f"the sweep shows pads of negative preload: {listed}" if listed else ""
 
     def plot(self, **options: Any) -> Any:
         """Draw the polygon; `tpjb_ident.report.plots.clearance_and_locus` takes the same options."""

@@ -83,6 +83,10 @@ def _of_sweep(run: Run, bearing: Bearing) -> list[Problem]:
         if condition == "probe-gains-differ":
             cure = "Check the sensitivities of both probes"
             problems.append(Problem("warning", run.file, f"channels {names}", condition.detail, cure, run.id))
+    negative = polygon.negative_preloads([pad.pad_clearance for pad in bearing.pads])
+    if negative:
+        cure = "Check pad_clearance, and how these pads are seated: unloaded, they flutter"
+        problems.append(Problem("warning", run.file, "preload", negative, cure, run.id))
     if not _SCALE[0] * drawn < measured < _SCALE[1] * drawn:
         what = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
         cure = "Check the sensitivities of the probes, and whether it is this bearing's file"
