@@ -631,7 +631,7 @@ def test_lines_of_load_toward_three_pads_meet_in_what_the_cells_read_at_none(sta
 def test_a_zero_that_nothing_tells_is_known_as_stated(pads, zero, stated):
     records = untared(pads, stated, zero)
     for given, kept in zip(records, with_load_zero(records), strict=True):
-        np.testing.assert_array_equal(kept.blocks.load, given.blocks.load)
+        np.testing.assert_array_equal(kept.blocks.load, given.blocks.load[given.blocks.load > 2 * stated])
         assert kept.load_error == pytest.approx(stated)
         assert not kept.untared
 

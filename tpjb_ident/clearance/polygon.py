@@ -28,6 +28,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.vector import directions
@@ -46,6 +47,8 @@ _SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better
 _SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
 _CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the deflection, where no curve says it
 _AS_DEVIATION = 1 / 1.4  # of an explanation's distance: a standard deviation that holds it in any arrangement
+_LAG_SPREAD = 0.1  # [rad], prior of the angle by which a shaft follows its load: friction of a tenth
+_LAGS = _LAG_SPREAD * np.linspace(-3.0, 3.0, 31)
 _CLIP = 5.0  # robust standard deviations
 _SLIDING = 0.03  # of the deflection: while the shaft slides, its next pad may already carry a little
 
@@ -187,14 +190,20 @@ def fit_sides(
     usable = np.isin(contact.pad, pads) & _consistent(contact, place)
     used, place = contact.take(usable), place[usable]
     noise = _noise(used, place)
-    carried = _pivot_deflection(curves or (), used.pad, used.load)
-    whitener = _whitener(used, angles, noise, np.hypot(_SLIDING * carried * used.alone, used.level_error))
     r, of_pad = len(pads), (used.pad[:, None] == pads).astype(float)
     full = _pivot_deflection(curves or (), pads, np.full(r, used.push))
-    columns, precision, mean = _pivot_terms(used, of_pad, carried, None if curves is None else full)
-    design = np.hstack([of_pad, -of_pad * place[:, None], columns])
-    prior = np.r_[np.zeros(r), np.full(r, _TILT_SPREAD**-2), precision]
-    beta, covariance, misfit = _least_squares(whitener, used.along, design, prior, np.r_[np.zeros(2 * r), mean])
+    carried = _pivot_deflection(curves or (), used.pad, used.load)
+    alone = used.touched.sum(axis=1) == 1
+    whitener = _whitener(used, angles, noise, np.hypot(_SLIDING * carried * alone, used.level_error))
+    fits = []
+    for lag in _LAGS:
+        late = used.lagging(angles, lag)
+        late_carried = _pivot_deflection(curves or (), late.pad, late.load)
+        columns, precision, mean = _pivot_terms(late, of_pad, late_carried, None if curves is None else full)
+        design = np.hstack([of_pad, -of_pad * place[:, None], columns])
+        prior = np.r_[np.zeros(r), np.full(r, _TILT_SPREAD**-2), precision]
+        fits.append(_least_squares(whitener, used.along, design, prior, np.r_[np.zeros(2 * r), mean]))
+    beta, covariance, misfit = _mixed(fits)
     distance, tilt, pivots = np.split(beta, [r, 2 * r])
     _, tilt_se, errors = np.split(np.sqrt(np.diag(covariance)), [r, 2 * r])
     distances, deflection, deflection_se = covariance[:r, :r], pivots[:r], errors[:r]
@@ -292,14 +301,25 @@ def _whitener(contact: ContactIntervals, angles: FloatArray, noise: NoiseModel, 
 
 def _least_squares(
     whitener: FloatArray, along: FloatArray, design: FloatArray, prior: FloatArray, mean: FloatArray
-) -> tuple[FloatArray, FloatArray, float]:
-    """Generalised least squares with a Gaussian prior: values, covariance, whitened misfit."""
+) -> tuple[FloatArray, FloatArray, float, float]:
+    """Generalised least squares with a Gaussian prior: values, covariance, sum of squares with the prior's, misfit."""
     unit = np.max(np.abs(design), axis=0)
     x, y = whitener @ (design / unit), whitener @ along
-    scaled = np.diag(prior / unit**2)
-    covariance = np.linalg.inv(x.T @ x + scaled)
-    beta = covariance @ (x.T @ y + scaled @ (mean * unit))
-    misfit = float(np.sum((y - x @ beta) ** 2)) / max(len(y) - design.shape[1], 1)
+    scaled = prior / unit**2
+    covariance = np.linalg.inv(x.T @ x + np.diag(scaled))
+    beta = covariance @ (x.T @ y + scaled * mean * unit)
+    square = float(np.sum((y - x @ beta) ** 2))
+    total = square + float(np.sum(scaled * (beta - mean * unit) ** 2))
+    return beta / unit, covariance / np.outer(unit, unit), total, square / max(len(y) - design.shape[1], 1)
+
+
+def _mixed(fits: Sequence[tuple[FloatArray, FloatArray, float, float]]) -> tuple[FloatArray, FloatArray, float]:
+    """Values, covariance and misfit of the fits of all lags together, each with its posterior share."""
+    betas, covariances, totals, misfits = (np.array(column) for column in zip(*fits, strict=True))
+    misfit = float(np.min(misfits))
     # what the noise model does not explain widens the intervals; a lucky sweep does not narrow them
-    covariance = covariance * max(misfit, 1.0)
-    return beta / unit, covariance / np.outer(unit, unit), misfit
+    wider = max(misfit, 1.0)
+    shares = special.softmax(-0.5 * (totals / wider + (_LAGS / _LAG_SPREAD) ** 2))
+    beta = shares @ betas
+    apart = betas - beta
+    return beta, wider * np.tensordot(shares, covariances, 1) + (apart.T * shares) @ apart, misfit

@@ -49,7 +49,8 @@ class ContactIntervals:
     along: FloatArray  #: place of the shaft in the pad's direction [m]
     across: FloatArray  #: [m]
     load: FloatArray  #: that the pad carries [N]
-    alone: BoolArray  #: no other pad was touched
+    force: FloatArray  #: (m, 2) on the shaft [N]
+    touched: BoolArray  #: (m, n) pads that the shaft touched
     push: float  #: of the sweep [N]
     level_error: float  #: of a place where the shaft lies still between two steps of a converter [m]
 
@@ -57,6 +58,16 @@ class ContactIntervals:
         """The averages where `chosen` (m,) is true."""
         columns = {f.name: getattr(self, f.name)[chosen] for f in fields(self)[:-2]}
         return replace(self, **columns)
+
+    def lagging(self, angles: FloatArray, lag: float) -> ContactIntervals:
+        """The averages of a shaft that follows its load by an angle `lag` [rad]: angles (n,) [rad] of the pads.
+
+        Where it rubs on all pads that it touches, their forces are those of a load turned back by the angle of
+        friction; where oil is squeezed out, those of a load some time ago.
+        """
+        turn = np.array([[np.cos(lag), np.sin(lag)], [-np.sin(lag), np.cos(lag)]])
+        carried = _carried(self.force @ turn.T, angles, self.touched)
+        return replace(self, load=carried[np.arange(len(self.pad)), self.pad])
 
 
 def sweep_samples(run: Run) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -133,19 +144,16 @@ def _average(
     noisy = (max(map(white_noise, position.T)) / (0.5 * _CONTACT_DEPTH)) ** 2
     outward = uniform_filter1d(position, int(np.clip(noisy, 1, samples)), axis=0) @ directions(angles).T
     touched = np.asarray(outward > np.quantile(outward, 0.995, axis=0) - depth)
-    carried = _carried(load, angles, touched)
     state = touched @ (1 << np.arange(len(angles)))
     piece = np.floor((time - time[0]) / length).astype(int)
     cuts = np.flatnonzero((np.diff(state) != 0) | (np.diff(piece) != 0)) + 1
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(time)]
     long = (stops - starts) >= min(_SHORTEST, samples)
     starts, stops = starts[long], stops[long]
-    columns = np.column_stack([time, position, np.nan_to_num(carried), np.isnan(carried)])
-    means = piece_means(columns, starts, stops)
-    moment, place, (pad_load, lost) = means[:, 0], means[:, 1:3], np.split(means[:, 3:], 2, axis=1)
-    pads_touched = touched[starts]
-    settled = _settled(moment, place, pads_touched)[:, None]
-    row, pad = np.nonzero(pads_touched & ~(lost > 0.0) & settled)
+    moment, x, y, *force = piece_means(np.column_stack([time, position, load]), starts, stops).T
+    place, pads_touched = np.column_stack([x, y]), touched[starts]
+    carried = _carried(np.column_stack(force), angles, pads_touched)
+    row, pad = np.nonzero(np.isfinite(carried) & _settled(moment, place, pads_touched)[:, None])
     tangent = directions(angles + 0.5 * np.pi)
     return ContactIntervals(
         time=moment[row],
@@ -153,8 +161,9 @@ def _average(
         pad=pad,
         along=np.sum(place[row] * directions(angles)[pad], axis=1),
         across=np.sum(place[row] * tangent[pad], axis=1),
-        load=pad_load[row, pad],
-        alone=pads_touched[row].sum(axis=1) == 1,
+        load=carried[row, pad],
+        force=np.column_stack(force)[row],
+        touched=pads_touched[row],
         push=float(np.median(np.hypot(*load.T))),
         level_error=level_error(position),
     )

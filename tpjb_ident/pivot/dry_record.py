@@ -31,6 +31,7 @@ FRICTION_SHARE, FRICTION_SE = 0.003, 0.003
 LOAD_LIMIT = math.radians(8.0)  # off the pad
 _STRAIGHT = 1e-4  # [rad] that a line along which a load grows is straight at best
 _CLEAR, _NOTABLE = 5.0, 0.004  # standard errors of a zero that nobody stated, and share of the load
+_UNSURE = 2.0  # standard errors of the zero
 _FEWEST_SAMPLES = 50
 _MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
 _FEWEST_BLOCKS = 8
@@ -226,12 +227,17 @@ def _less_zero(record: DryRecord, zero: FloatArray, covariance: FloatArray, unta
     """A record whose loads count from a zero (2,) [N] that is known with a covariance (2, 2)."""
     axes, blocks, course = pad_axes(record.angle), record.blocks, record.course
     along, across = axes @ zero
+    error = math.sqrt(float(axes[0] @ covariance @ axes[0]))
+    blocks = replace(blocks, load=blocks.load - along, across_load=blocks.across_load - across)
+    # whether the pad carries anything at all is not known there
+    unsure = (blocks.load < _UNSURE * error) & (error > _NOTABLE * np.max(blocks.load))
     return replace(
         record,
-        blocks=replace(blocks, load=blocks.load - along, across_load=blocks.across_load - across),
+        blocks=blocks.take(~unsure),
+        good=record.good[~unsure],
         course=course._replace(load=course.load - along),
         free_load=max(record.free_load - along, 0.0) if record.free_load else 0.0,
-        load_error=math.sqrt(float(axes[0] @ covariance @ axes[0])),
+        load_error=error,
         untared=untared,
     )
 
