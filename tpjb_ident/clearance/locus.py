@@ -18,7 +18,7 @@ from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, holding, sentences
 from tpjb_ident.estimate.statistics import student_widening
-from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
+from tpjb_ident.phasors.slow_noise import DRIFT_RATE, NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples
 from tpjb_ident.phasors.windows import line_design
 from tpjb_ident.pivot.refusals import usable_runs
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign, Run
 
 
-_DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
 _BLOCK = 0.1  # [s], for learning the noise
 _NOISE_RUNS = 8  # that noise is learnt from, spread over the test
 _SAME_DIRECTION = math.radians(1.0)
@@ -255,8 +254,8 @@ def _noise(records: Sequence[_Record]) -> NoiseModel:
     if max(len(s.time) for s in series) <= 3:
         # records of a few tenths of a second show no noise over seconds: take the scatter within each run
         scatter = float(np.mean([np.var(s.values) for s in series])) + 1e-18
-        return NoiseModel(scatter * _BLOCK, scatter, _DRIFT_RATE)
-    return estimate_noise(series, _DRIFT_RATE)
+        return NoiseModel(scatter * _BLOCK, scatter, DRIFT_RATE)
+    return estimate_noise(series)
 
 
 def _moved(record: _Record, noise: NoiseModel) -> float:

@@ -33,6 +33,7 @@ _FEWEST_BLOCKS = 4  # per pad
 _SAME_TEMPERATURE = 4.0  # [K]
 _IRREGULAR = 3.0  # standard errors
 _LEAST_ERROR = 1e-3  # of a preload, drawn or measured
+_LARGEST_WALK = 1.5e-6  # [m], of a zero over a sweep: no probe's
 _UNEQUAL = 0.02  # gains of two probes: twice what a usual certificate leaves open
 _GAIN_ERRORS = 4.0  # standard errors, of few sides
 _RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
@@ -197,8 +198,9 @@ def measure_run(
     contact, fit = _read_sides(run, angles, curves, LARGEST_DEFLECTION)
     if fit.deflection.max() > LARGEST_DEFLECTION:  # pads that seemed not to be touched were
         contact, fit = _read_sides(run, angles, curves, float(fit.deflection.max()))
-    if fit.deflection.min() < -LARGEST_DEFLECTION:
-        what = f"sees the shaft {-1e6 * fit.deflection.min():.0f} µm further out where it is pushed less"
+    walk = fit.noise.walk * np.sqrt(np.ptp(contact.time))
+    if walk > _LARGEST_WALK:
+        what = f"has a shaft that was turned, or probes that moved: their zero walks by {1e6 * walk:.1f} µm"
         raise refuse(run.file, "record", f"clearance run {run.id} {what}", "Keep shaft and probes still", run.id)
     polygon = _polygon(run, contact, angles, fit)
     probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]

@@ -41,14 +41,12 @@ from tpjb_ident.pivot.curve import PivotCurve
 
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
 _DEVIATES = 2.0  # such widths from which a pad stands off clearly
-_DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
 _TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
 _SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
 _SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
 _CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the deflection, where no curve says it
 _AS_DEVIATION = 1 / 1.4  # of an explanation's distance: a standard deviation that holds it in any arrangement
-_LAG_SPREAD = 0.1  # [rad], prior of the angle by which a shaft follows its load: friction of a tenth
-_LAGS = _LAG_SPREAD * np.linspace(-3.0, 3.0, 31)
+_LAG_ERRORS = 0.02 * np.linspace(-2.5, 2.5, 11)  # [rad] by which the lag may be another than when corners are left
 _CLIP = 5.0  # robust standard deviations
 _SLIDING = 0.03  # of the deflection: while the shaft slides, its next pad may already carry a little
 
@@ -195,9 +193,9 @@ def fit_sides(
     carried = _pivot_deflection(curves or (), used.pad, used.load)
     alone = used.touched.sum(axis=1) == 1
     whitener = _whitener(used, angles, noise, np.hypot(_SLIDING * carried * alone, used.level_error))
-    fits = []
-    for lag in _LAGS:
-        late = used.lagging(angles, lag)
+    fits, lag = [], used.lag(angles)
+    for error in _LAG_ERRORS:
+        late = used.lagging(angles, lag + error)
         late_carried = _pivot_deflection(curves or (), late.pad, late.load)
         columns, precision, mean = _pivot_terms(late, of_pad, late_carried, None if curves is None else full)
         design = np.hstack([of_pad, -of_pad * place[:, None], columns])
@@ -284,7 +282,7 @@ def _noise(contact: ContactIntervals, place: FloatArray) -> NoiseModel:
     """Noise of the probes as the sweep itself shows it, about smooth sides."""
     columns = contact.time, contact.duration, contact.along, _smooth_side(contact, place)
     series = [NoiseSeries(*(c[contact.pad == k] for c in columns)) for k in np.unique(contact.pad)]
-    return estimate_noise(series, _DRIFT_RATE)
+    return estimate_noise(series)
 
 
 def _whitener(contact: ContactIntervals, angles: FloatArray, noise: NoiseModel, unsure: FloatArray) -> FloatArray:
@@ -319,7 +317,7 @@ def _mixed(fits: Sequence[tuple[FloatArray, FloatArray, float, float]]) -> tuple
     misfit = float(np.min(misfits))
     # what the noise model does not explain widens the intervals; a lucky sweep does not narrow them
     wider = max(misfit, 1.0)
-    shares = special.softmax(-0.5 * (totals / wider + (_LAGS / _LAG_SPREAD) ** 2))
+    shares = special.softmax(-0.5 * (totals / wider + (_LAG_ERRORS / _LAG_ERRORS[-1] * 2.5) ** 2))
     beta = shares @ betas
     apart = betas - beta
     return beta, wider * np.tensordot(shares, covariances, 1) + (apart.T * shares) @ apart, misfit

@@ -35,6 +35,7 @@ _CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farth
 _SHORTEST = 5  # samples in a piece, where a whole one has as many
 _MOVING = 2.0  # robust standard deviations of the speed in corners above which the shaft is still on its way
 LARGEST_DEFLECTION = 6.0e-6  # [m], of a pivot under the push load where no curve says it
+_LARGEST_LAG = np.radians(25.0)  # of the shaft: friction of a quarter, or oil that lets it slide hardly in time
 _RELEASED = 0.1  # of the push: below it the load has no direction
 _LARGEST_GAP = np.radians(60.0)  # between directions of the load: half of it from a pad's own, both corners are beyond
 
@@ -58,6 +59,16 @@ class ContactIntervals:
         """The averages where `chosen` (m,) is true."""
         columns = {f.name: getattr(self, f.name)[chosen] for f in fields(self)[:-2]}
         return replace(self, **columns)
+
+    def lag(self, angles: FloatArray) -> float:
+        """Usual angle [rad] by which the load is past a corner's last pad when the shaft leaves it."""
+        load = np.angle(self.force @ [1.0, 1j])
+        past = np.where(self.touched, np.angle(np.exp(1j * (load[:, None] - angles))), np.nan)
+        first, last = np.nanmin(past, axis=1), np.nanmax(past, axis=1)
+        outside = np.where(first > 0.0, first, np.minimum(last, 0.0))
+        corner = self.touched @ (1 << np.arange(len(angles))) * (self.touched.sum(axis=1) == 2)
+        ends = [outside[corner == k][np.argmax(np.abs(outside[corner == k]))] for k in np.unique(corner[corner > 0])]
+        return float(np.median(ends)) if ends else 0.0
 
     def lagging(self, angles: FloatArray, lag: float) -> ContactIntervals:
         """The averages of a shaft that follows its load by an angle `lag` [rad]: angles (n,) [rad] of the pads.
@@ -111,9 +122,9 @@ def _check_turn(run: Run, load: FloatArray, position: FloatArray) -> None:
     place = place - 0.5 * (place.real.max() + place.real.min() + 1j * (place.imag.max() + place.imag.min()))
     in_load_frame = np.mean(place * np.exp(-1j * angle))
     lag, coherence = np.angle(in_load_frame), abs(in_load_frame) / max(np.abs(place).mean(), 1e-300)
-    if abs(lag) > np.radians(30.0) or coherence < 0.7:
+    if abs(lag) > _LARGEST_LAG or coherence < 0.7:
         what = f"has a shaft that does not follow its load ({np.degrees(lag):+.0f} deg away, coherence {coherence:.2f})"
-        cure = "Check order, axes and polarity of the displacement and force channels"
+        cure = "Check order, axes and polarity of the displacement and force channels; sweep without oil"
         raise _refused(run, what, cure)
 
 

@@ -22,6 +22,7 @@ from scipy import optimize
 from rigdata.arrays import FloatArray
 from tpjb_ident.errors import BadInputError
 
+DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
 DRIFT_OVER_FLICKER = 0.7  # [1/sqrt(s)], drift rate to be expected over the square root of the 1/f power density
 _BEND = 0.5  # of a drift: half of what its rate at either end differs by from that in the middle, standard deviation
 _WAVES = 8  # half cosines over a record that stand for the slowest part of a walk, which no stationary noise resembles
@@ -150,7 +151,9 @@ def _minus_log_likelihood(spectra: FloatArray, columns: FloatArray, levels: Floa
     return 0.5 * float(log_det + yy.sum() - explained)
 
 
-def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift: bool = True) -> NoiseModel:
+def estimate_noise(
+    series: Sequence[NoiseSeries], drift_rate: float = DRIFT_RATE, learn_drift: bool = True
+) -> NoiseModel:
     """Estimate the noise levels common to several series."""
     usable = [s for s in series if len(s.time) > s.mean.shape[1] + 2]
     if not usable:

@@ -210,14 +210,6 @@ def slid(blocks: Blocks, course: LoadCourse, friction: float) -> Blocks:
         last[k], sense[k] = value if abs(value - turn) < noise else turn, way
     first, stop = np.searchsorted(course.time, blocks.time + np.multiply.outer([-0.5, 0.5], blocks.duration))
     first = np.minimum(first, len(last) - 1)
-    came_back = np.abs(last - course.load) > noise
-    columns = np.column_stack([last, last * sense, came_back, course.load, course.load**2])
-    load, held_back, stuck, mean, square = piece_means(columns, first, np.maximum(stop, first + 1)).T
-    # in an average within which the pivot stops or starts, when it did is not known exactly
-    unsure = np.sqrt(np.maximum(square - mean**2, 0.0)) * ((stuck > 0.0) & (stuck < 1.0))
-    return replace(
-        blocks,
-        load=np.where(stuck > 0.0, load, blocks.load),
-        branch=held_back / np.where(load, load, 1.0),
-        load_spread=np.hypot(blocks.load_spread, unsure),
-    )
+    columns = np.column_stack([last, last * sense, last != course.load])
+    load, held_back, stuck = piece_means(columns, first, np.maximum(stop, first + 1)).T
+    return replace(blocks, load=np.where(stuck > 0.0, load, blocks.load), branch=held_back / np.where(load, load, 1.0))

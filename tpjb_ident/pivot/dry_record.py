@@ -35,7 +35,6 @@ _UNSURE = 2.0  # standard errors of the zero
 _FEWEST_SAMPLES = 50
 _MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
 _FEWEST_BLOCKS = 8
-_DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
 _COURSE = 0.01, 3000  # [s], averages of the load's course: turns are sharp
 _FREE = 10.0  # times the compliance of the upper loads: no contact gives so much at a hundredth of the load
 _NOTABLE_WAY = 0.1  # of the deflection at the largest load: a shorter free way is left to the contact loss of the laws
@@ -183,44 +182,34 @@ def _refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
 
 
 def with_load_zero(records: Sequence[DryRecord]) -> list[DryRecord]:
-    """Records whose loads count from the zero of their cells."""
-    groups: dict[frozenset[str], list[DryRecord]] = {}
-    for record in records:
-        groups.setdefault(names_of(record.run, "force"), []).append(record)
-    zeros = {cells: _cell_zero(group) for cells, group in groups.items()}
-    return [_less_zero(record, *zeros[names_of(record.run, "force")]) for record in records]
+    """Records whose loads count from the zero of their cells.
 
-
-def _cell_zero(records: Sequence[DryRecord]) -> tuple[FloatArray, FloatArray, str]:
-    """What the cells of some records read at no load (2,) [N], its covariance (2, 2), and that in words if it is clear.
-
-    The load grows along a line toward each pad, and all lines meet in what is read at no load, wherever each of them
-    points and begins. Where the manifest states no uncertainty of the zero it counts if it is clear alone.
+    The load grows along a line toward each pad, and all lines meet in what the cells read at no load, wherever each of
+    them points and begins. Where the manifest states no uncertainty of the zero it counts if it is clear alone.
     """
     stated = zero_uncertainty(axial_channels(records[0].run).values(), "force")
-    prior = np.diag(1.0 / stated**2) if stated.all() else np.zeros((2, 2))
     lines = [record for record in records if abs(record.load_direction.angle) < LOAD_LIMIT]
     turn = np.array([record.load_direction.angle for record in lines])
-    mean = np.array([[record.blocks.load.mean(), record.blocks.across_load.mean()] for record in lines]).reshape(-1, 2)
-    aside = mean[:, 1] * np.cos(turn) - mean[:, 0] * np.sin(turn)
-    error = np.maximum([record.load_direction.se for record in lines], _STRAIGHT) * mean[:, 0]
+    load = np.array([record.blocks.load.mean() for record in lines])
+    across = np.array([record.blocks.across_load.mean() for record in lines])
+    error = np.maximum([record.load_direction.se for record in lines], _STRAIGHT) * load
     design = directions(turn + [record.angle + 0.5 * math.pi for record in lines])
-    normal = design.T / error**2
-    freedom = np.linalg.matrix_rank(design, 0.1) - 2 + len(lines) - 2
-    if freedom < 1:
-        return np.zeros(2), np.diag(stated**2), ""
-    zero = np.linalg.solve(normal @ design, normal @ aside)
-    scatter = float(np.sum(((aside - design @ zero) / error) ** 2)) / freedom
-    told = normal @ design / (max(scatter, 1.0) * student_widening(freedom) ** 2)
-    covariance = np.linalg.inv(told + prior)
+    freedom = len(lines) - 2
+    if freedom < 1 or np.linalg.matrix_rank(design, 0.1) < 2:
+        return [_less_zero(record, np.zeros(2), np.diag(stated**2), "") for record in records]
+    x, y = design / error[:, None], (across * np.cos(turn) - load * np.sin(turn)) / error
+    scatter = float(np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2)) / freedom
+    told = max(scatter, 1.0) * student_widening(freedom) ** 2
+    covariance = np.linalg.inv(x.T @ x / told + np.diag(1.0 / stated**2 if stated.all() else np.zeros(2)))
+    zero = covariance @ (x.T @ y) / told
     size, spread = float(np.hypot(*zero)), math.sqrt(float(np.trace(covariance)))
-    is_clear = size > max(_CLEAR * spread, _NOTABLE * float(np.max(mean)))
-    if not (is_clear or prior.any()):
-        return np.zeros(2), prior, ""
+    is_clear = size > max(_CLEAR * spread, _NOTABLE * float(np.max(load)))
+    if not (is_clear or stated.all()):
+        return list(records)
     text = (
         f"the lines along which the loads of all pads grow meet at {size:.0f} N (se {spread:.0f} N); it was taken off"
     )
-    return covariance @ told @ zero, covariance, text if is_clear else ""
+    return [_less_zero(record, zero, covariance, text if is_clear else "") for record in records]
 
 
 def _less_zero(record: DryRecord, zero: FloatArray, covariance: FloatArray, untared: str) -> DryRecord:
@@ -316,7 +305,7 @@ def pooled_noise(records: Sequence[DryRecord], about_curve: bool = False) -> Noi
         levels = (blocks.hold[:, None] == np.unique(blocks.hold)).astype(float)
         mean = smooth_columns(blocks) if about_curve or not record.holds else levels
         series += [NoiseSeries(blocks.time, blocks.duration, x, mean) for x in (blocks.deflection, blocks.across)]
-    return estimate_noise(series, _DRIFT_RATE, learn_drift=bool(with_holds))
+    return estimate_noise(series, learn_drift=bool(with_holds))
 
 
 def smooth_columns(blocks: Blocks) -> FloatArray:

@@ -37,6 +37,7 @@ from tpjb_ident.pivot.dry_record import (
 from tpjb_ident.pivot.law_fit import (
     FRICTION,
     OFFSET,
+    SCALE,
     FitData,
     LawFit,
     fit_law,
@@ -402,12 +403,10 @@ def contact_onset(fit: LawFit) -> tuple[float, float]:
     if not fit.contact:
         return 0.0, 0.0
     onset, gradient = _onset(fit), np.zeros(len(fit.theta))
-    steps = 0.1 * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    for k in np.flatnonzero(steps):
-        theta = fit.theta.copy()
-        theta[k] += steps[k]
-        gradient[k] = (_onset(replace(fit, theta=theta)) - onset) / steps[k]
-    return onset, float(np.sqrt(gradient @ fit.covariance @ gradient))
+    if onset > 0.0:  # the compliance changes slowly: it is taken as that at the onset
+        gap, decay = float(fit.theta[-2]), math.exp(fit.theta[-1])
+        gradient[[SCALE, -2, -1]] = -decay, decay / gap, onset - decay
+    return onset, math.sqrt(float(gradient @ fit.covariance @ gradient))
 
 
 def _onset(fit: LawFit) -> float:
