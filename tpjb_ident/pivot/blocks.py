@@ -30,7 +30,7 @@ _ALIKE = 6.0  # noise standard deviations between two runs of one hold
 _FEWEST = 4  # bins of a hold: 0.16 s, longer in long records
 _FEWEST_SAMPLES = 3  # of a piece
 _MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
-_UNDECIDED = 6.0  # noise standard deviations by which a load seems to come back and does not
+_UNDECIDED = 8.0  # noise standard deviations by which a load seems to come back and does not
 _TURN = 0.02  # of the load range: a smaller way back is noise
 
 

@@ -108,7 +108,7 @@ def with_friction(record: DryRecord, noise: NoiseModel) -> DryRecord:
 
     A load that overshoots, wanders or turns shows how far it must come back before the pivot follows.
     """
-    if np.ptp(slid(record.blocks, record.course, 0.0).branch) == 0.0:
+    if np.ptp(slid(record.blocks, record.course, FRICTION_SHARE).branch) == 0.0:
         return record
     likeliest, evidence, fitted = record, -math.inf, 0.0
     for times in (*_TIMES, None, None):
