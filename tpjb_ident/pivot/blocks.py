@@ -30,6 +30,7 @@ _ALIKE = 6.0  # noise standard deviations between two runs of one hold
 _FEWEST = 4  # bins of a hold: 0.16 s, longer in long records
 _FEWEST_SAMPLES = 3  # of a piece
 _MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
+_LEVEL = 0.3  # of that, within which a load stands where it was
 _UNDECIDED = 8.0  # noise standard deviations by which a load seems to come back and does not
 _TURN = 0.02  # of the load range: a smaller way back is noise
 
@@ -207,7 +208,7 @@ def slid(blocks: Blocks, course: LoadCourse, friction: float) -> Blocks:
             turn = value
         elif way * value * (1.0 + way * friction) < way * turn * (1.0 - way * friction) - noise:
             turn, way = value, -way
-        last[k], sense[k] = value if abs(value - turn) < noise else turn, way
+        last[k], sense[k] = value if abs(value - turn) < _LEVEL * noise else turn, way
     first, stop = np.searchsorted(course.time, blocks.time + np.multiply.outer([-0.5, 0.5], blocks.duration))
     first = np.minimum(first, len(last) - 1)
     columns = np.column_stack([last, last * sense, last != course.load])
