@@ -219,7 +219,7 @@ def _less_zero(record: DryRecord, zero: FloatArray, covariance: FloatArray, unta
     error = math.sqrt(float(axes[0] @ covariance @ axes[0]))
     blocks = replace(blocks, load=blocks.load - along, across_load=blocks.across_load - across)
     # whether the pad carries anything at all is not known there
-    unsure = (blocks.load < _UNSURE * error) & (error > _NOTABLE * np.max(blocks.load))
+    unsure = (blocks.load < _UNSURE * error) & (error > _NOTABLE * np.max(np.abs(blocks.load)))
     return replace(
         record,
         blocks=blocks.take(~unsure),
