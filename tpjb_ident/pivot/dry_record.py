@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
-from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import good_samples, level_error, live_run, slow_samples, spare_slopes
 from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, LoadCourse, cut_blocks, find_holds, load_course
@@ -199,7 +199,7 @@ def with_load_zero(records: Sequence[DryRecord]) -> list[DryRecord]:
         return [_less_zero(record, np.zeros(2), np.diag(stated**2), "") for record in records]
     x, y = design / error[:, None], (across * np.cos(turn) - load * np.sin(turn)) / error
     scatter = float(np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2)) / freedom
-    told = max(scatter, 1.0) * student_widening(freedom) ** 2
+    told = max(scatter, 1.0) * float(special.stdtrit(freedom, 0.975) / special.ndtri(0.975)) ** 2  # of few
     covariance = np.linalg.inv(x.T @ x / told + np.diag(1.0 / stated**2 if stated.all() else np.zeros(2)))
     zero = covariance @ (x.T @ y) / told
     size, spread = float(np.hypot(*zero)), math.sqrt(float(np.trace(covariance)))
