@@ -46,7 +46,7 @@ _SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better
 _SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
 _CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the deflection, where no curve says it
 _AS_DEVIATION = 1 / 1.4  # of an explanation's distance: a standard deviation that holds it in any arrangement
-_LAG_ERRORS = 0.02 * np.linspace(-2.5, 2.5, 11)  # [rad] by which the lag may be another than when corners are left
+_LAG_ERRORS = 0.03 * np.linspace(-2.5, 2.5, 11)  # [rad] by which the lag may be another than when corners are left
 _CLIP = 5.0  # robust standard deviations
 _SLIDING = 0.03  # of the deflection: while the shaft slides, its next pad may already carry a little
 
