@@ -16,22 +16,25 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (126.60, 14_854),  # what undriven lines tell (+2.9); cells that set points contradict
-    "model": (78.96, 10_519),  # pads that bend by their lines (a sixth quicker, 3 MB less), pivots beyond their test
-    "rigdata": (
-        62.00,
-        8_270,
-    ),  # directions of data set 58 by their numbers in a table again, not by places from the end
-    "diagnosis": (38.46, 4_727),  # look-alikes, tolerances that say an effect together
-    "cli": (22.76, 3_131),
-    "report": (23.69, 3_100),
-    "pivot": (18.19, 2_384),  # a random walk of the probes (cycles of loads held 72 % inside), repeats that differ
-    "clearance": (9.91, 1_209),  # slow loggers, soft pivots, coarse converters (+0.34): refused or off before
-    "compare": (12.05, 1_607),
+    "measurement": (
+        127.31,
+        14_914,
+    ),  # a line beside the drive told with it, a turn of all loads, whole random walks (+0.7)
+    "model": (76.77, 10_266),
+    "rigdata": (60.67, 8_087),
+    "diagnosis": (37.74, 4_631),
+    "cli": (22.57, 3_095),
+    "report": (23.63, 3_088),
+    "pivot": (
+        19.70,
+        2_536,
+    ),  # cells not tared, friction with overshoot, wandering probes: 21 to 85 % inside before (+1.5)
+    "clearance": (10.51, 1_256),  # how far the film lets pads lag: 18 % inside before (+0.6)
+    "compare": (12.02, 1_610),
     "watch": (5.64, 680),
     "top level": (4.57, 864),  # a condition more; a column finds its unit by its name: fewer tokens, ten lines more
-    "runtime": (7.23, 1_131),  # Ctrl-C and SIGTERM, which were in the command line: folders and processes hold them too
-    "exports": (4.77, 738),
+    "runtime": (7.10, 1_122),
+    "exports": (4.69, 717),
     "view": (3.72, 485),
 }
 MEASUREMENT = ("check", "phasors", "bands", "estimate", "terms", "estimators", "runs", "identification", "results")
