@@ -16,19 +16,13 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (
-        127.31,
-        14_914,
-    ),  # a line beside the drive told with it, a turn of all loads, whole random walks (+0.7)
+    "measurement": (127.31, 14_914),  # a line told with the drive beside it, whole random walks (+0.7)
     "model": (76.77, 10_266),
     "rigdata": (60.67, 8_087),
     "diagnosis": (37.74, 4_631),
     "cli": (22.57, 3_095),
     "report": (23.63, 3_088),
-    "pivot": (
-        19.70,
-        2_536,
-    ),  # cells not tared, friction with overshoot, wandering probes: 21 to 85 % inside before (+1.5)
+    "pivot": (19.70, 2_536),  # cells not tared, friction with overshoot: 21 to 85 % inside before (+1.5)
     "clearance": (10.51, 1_256),  # how far the film lets pads lag: 18 % inside before (+0.6)
     "compare": (12.02, 1_610),
     "watch": (5.64, 680),
