@@ -57,9 +57,11 @@ def compile_plain() -> None:
 
 def compile_all_kinds() -> None:
     """Search from anywhere: where the pads carry is being compiled by the other process."""
+    from model.statics.compiled.case import Problem
     from model.statics.compiled.iteration import fresh_memory, iterate
 
-    problem = search({"conduction": True}).problem
+    start = search({"conduction": True})
+    problem = Problem(start.grids, start.bodies, start.stack, start.works, start.state, start.case)
     iterate(problem, fresh_memory(problem))
     predict_all(ALL_KINDS)
 

@@ -218,26 +218,23 @@ def test_a_fit_gets_derivatives_of_its_own_where_it_leads_or_is_off_its_score(mo
 
 
 @pytest.mark.parametrize(
-    ("total", "scale", "rise", "times"),
+    ("total", "rise", "times"),
     [
-        (-20.0, 0.1, -5.0, 1),
-        (-20.0, 0.1, -0.5, 2),
-        (-20.0, 0.1, 5.0, 2),
-        (-200.0, 0.4, 5.0, 2),  # far behind, by derivatives from before the jump
-        (-200.0, 7.0, 5.0, 0),  # before it still
+        (-20.0, -5.0, 1),
+        (-20.0, -0.5, 2),
+        (-20.0, 5.0, 2),
+        (-200.0, 5.0, 1),  # far behind, for all that is known on derivatives from before the jump
     ],
 )
-def test_after_a_coarse_start_derivatives_are_asked_again_unless_refused(monkeypatch, total, scale, rise, times):
+def test_after_a_coarse_start_derivatives_are_asked_again_unless_they_were_refused(monkeypatch, total, rise, times):
     asked = []
 
     def refined(run, fit, whole):
         asked.append(fit)
         return stub_fit(fit.posterior.total + rise)
 
-    begun = stub_fit(total)
-    begun.posterior.scale = scale
     tried = stub_search(total=0.0, estimate=0.0)
-    monkeypatch.setattr(search, "fitted", lambda run, problem, start: begun)
+    monkeypatch.setattr(search, "fitted", lambda run, problem, start: stub_fit(total))
     monkeypatch.setattr(search, "refined", refined)
     tried.run = tried.problem = None
     tried._reached(SimpleNamespace(estimate=-100.0, coarse=True))

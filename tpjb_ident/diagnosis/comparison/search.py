@@ -189,12 +189,14 @@ class _Search:
         fit, leader = fitted(self.run, self.problem, start), self._leader()
         if fit is None or not fit.faults:
             return fit
+        if start.coarse:  # derivatives from before a jump led here, and say little of what lies behind it
+            before, fit = fit, self._renewed(fit)
+            if fit is before:  # refused once, they would be refused again
+                return fit
         right = min(f.posterior.scale for f in (leader or fit, fit)) <= self.settings.right
         # where a fit keeps what its start foretold, derivatives of its own would say the same
         worth = min(Deciding.worth_derivatives, Deciding.foretold * abs(self._log_probability(fit) - start.estimate))
-        nats = worth if right else 0.0
-        if start.coarse:  # past its jumps, what derivatives from before them promise says nothing
-            nats = math.inf if fit.posterior.scale <= Deciding.passed else self.settings.mistaken
+        nats = self.settings.mistaken if start.coarse else worth if right else 0.0
         tenable_first = right and leader is None  # whether it is tenable tells none that has not arrived
         if not (tenable_first or self._near(fit, fit.posterior.promised, nats)):
             return fit
@@ -202,9 +204,7 @@ class _Search:
             fit = self._renewed(fit, whole=False)  # where all that is fitted is wrong, most promises are
             if not self._near(fit, fit.posterior.total, 0.0):
                 return fit
-        again = self._renewed(fit)
-        # those from before a jump led here; refused once, they would be refused again
-        return self._renewed(again) if start.coarse and again is not fit else again
+        return self._renewed(fit)
 
     def _fit(self, proposal: Start) -> None:
         """Fit a proposal; one that leads and is surely wrong, or stopped at a jump, once more with a coarse start."""

@@ -74,8 +74,6 @@ class Deciding:
     worth_derivatives, foretold = 15.0, 5.0
     #: Scale of the likeliest single fault above which it is taken for wrong, and faults that begin with a coarse start.
     suspect, coarse = 0.4, 5
-    #: Scale up to which a coarse start is past its jumps: it leaves no more than is stated; others leave 7 and more.
-    passed = 1.0
     #: Stated deviations of a tolerance while a coarse start passes the jumps of pads that empty.
     held = 0.2
 
