@@ -79,7 +79,7 @@ def test_a_campaign_can_be_browsed_and_the_model_moved(chromium, view_of_demo):
         for words in (
             "7 operating points, all to be trusted",
             "22 Hz (1320 rpm)",
-            "66.00\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.57",
+            "66.00\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.54",
             "measured pivots",
         ):
             assert words in verdict

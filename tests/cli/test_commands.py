@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from model.bearing_file import load_bearing
 from model.growth import Growth
 from model.options import Options
 from rigdata.campaign import load_campaign
@@ -311,8 +310,8 @@ PLANNED = {"oil_viscosity", "supply_temperature", "thermal_growth", "pivot_flexi
 
 @pytest.mark.slow
 def test_plan_tells_floor_and_look_alikes_of_a_thin_campaign(rocker_file, tmp_path, monkeypatch):
-    some = [c for c in planning.one_amplitude(load_bearing(rocker_file)) if c.name in PLANNED]
-    monkeypatch.setattr(planning, "one_amplitude", lambda bearing: some)
+    everything = planning.candidates
+    monkeypatch.setattr(planning, "candidates", lambda setup: [c for c in everything(setup) if c.name in PLANNED])
     result = ended(
         0, "plan", rocker_file, "--load", "5 kN", "--excitation", "25 Hz", "--locus", 0, "--no-dry", "--push", 0,
         "--no-temperatures", "--data-sets", "--out", tmp_path / "out",
