@@ -28,16 +28,20 @@ _MESH = (20, 4)
 #: Rounding of the heat number, logarithmic: 2 % of the temperature rise.
 _STEP = 0.02
 #: What the trailing edge of the first film has lost of the gap at the pivot, and by which factors it goes on.
-_FIRST, _DEEPER, _FLATTER = 0.4, 1.4, 0.68
-_ROWS = 40
-#: Points of a curve from one row to the next: cubics through four rows, straight from point to point.
-BETWEEN = 4
+_FIRST, _DEEPER, _FLATTER = 0.4, 1.5, 0.5
+#: And what its leading edge has more, about: of central pivots 0.65 to 0.7, of those at 0.65 of the arc 0.6 to 0.7.
+_OPENS = 0.66
+_ROWS = 24
+#: Points of a curve from one row to the next; straight from point to point.
+_BETWEEN = 8
 #: Films thinner than this share of the clearance, or hotter by so much [K], are of no concern.
 _DEEPEST, _HOTTEST = 60.0, 300.0
 #: Attitudes beyond this are of no concern: the journal would stand clearances away.
 _FARTHEST = -0.8
 #: Where a step fails it is halved, up to this factor.
 _LEAST_STEP = 0.96
+#: A last move by this share of the gap leaves less than the mesh does.
+_MOVED = 1e-2
 #: Below this wedge, as a share of the first, heat alone balances a film.
 _FLATTEST = 0.015
 
@@ -48,7 +52,7 @@ class Attitudes(NamedTuple):
     curvature: FloatArray  #: (n,): A
     wedge: FloatArray  #: (n,): B
     load: FloatArray  #: (n,): Radial force over mu U R^2 L / Cp^2.
-    rise: FloatArray  #: (n // `BETWEEN` + 1, rows, columns): Temperature above the inlet [K].
+    rise: FloatArray  #: (n, rows, columns): Temperature above the inlet [K].
 
 
 class Heat(NamedTuple):
@@ -91,38 +95,62 @@ def _attitudes(ends: tuple[float, float], radius: float, length: float, heat: He
     """Solve the attitudes of a film between two angles from the pivot; none if it never carries."""
     grid = film_grid(*ends, radius, length, _MESH, True)
     work = film_work(grid, 40.0)
-    shape = work.temperature.shape
     isothermal = math.isinf(heat.capacity)
     oil = (1.0, heat.exponent, 1.0, heat.expansion)
     running = Running(1.0, oil, (1.0 if isothermal else heat.capacity, heat.conduction))
     numbers = np.zeros((2 * _ROWS, 3))
-    rises = np.zeros((2 * _ROWS, *shape))
+    rises = np.zeros((2 * _ROWS, *work.temperature.shape))
     low, high = walk(grid, work, running, (isothermal, depth * radius**2 * length), (numbers, rises))
-    numbers[low - 1] = 0.0  # a parallel film
-    if not isothermal:
-        rises[low - 1] = rises[low]
-    rows = slice(low - 1, high)
     if high - low < 3:
         nothing = np.zeros(1)
-        return Attitudes(nothing, nothing, nothing, np.zeros((1, *shape)))
-    curvature, wedge, load = _between(numbers[rows]).T.copy()
-    return Attitudes(curvature, wedge, load / (radius**2 * length), rises[rows].copy())
+        return Attitudes(nothing, nothing, nothing, np.zeros((1, *work.temperature.shape)))
+    (curvature, wedge, load), rise = points_between(numbers[low:high], rises[low:high])
+    return Attitudes(curvature, wedge, load / (radius**2 * length), rise)
 
 
-def _between(rows: FloatArray) -> FloatArray:
-    """Points of a curve (A, B, W) between its rows, (n, 3): cubics in log(B), straight from the parallel film on."""
-    along = np.log(rows[:, 1] + rows[1, 1])
-    place = np.arange(BETWEEN * (len(rows) - 1) + 1) / BETWEEN
-    x = np.interp(place, np.arange(len(rows)), along)
-    first = np.clip(place.astype(int) - 1, 1, len(rows) - 4)
-    out = np.zeros((len(x), 3))
-    for k in range(4):
-        others = [(x - along[first + j]) / (along[first + k] - along[first + j]) for j in range(4) if j != k]
-        out += np.prod(others, axis=0)[:, None] * rows[first + k]
-    straight = place[: BETWEEN + 1, None]
-    out[: BETWEEN + 1] = (1.0 - straight) * rows[0] + straight * rows[1]
-    out[:, 0] = np.maximum(out[:, 0], _FARTHEST)
-    return out
+@compiled
+def points_between(rows: FloatArray, rises: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points (A, B, W) of a curve, (3, n), and their temperatures: cubics through four rows (A, B, W).
+
+    A is nearly a parabola of the wedge, W nearly a power of it; from the parallel film on to the first row all is
+    straight.
+    """
+    last, count = len(rows) - 1, min(4, len(rows))
+    points = np.zeros((3, _BETWEEN * (last + 1) + 1))
+    warm = np.empty((points.shape[1], rises.shape[1], rises.shape[2]))
+    logarithms = np.log(rows[:, 1:])
+    for p in range(points.shape[1]):
+        row, share = p // _BETWEEN - 1, p % _BETWEEN / _BETWEEN
+        if row < 0:
+            points[:, p], warm[p] = share * rows[0], rises[0]
+            continue
+        first = min(max(row - 1, 0), last + 1 - count)
+        place = logarithms[row, 0] + share * (logarithms[min(row + 1, last), 0] - logarithms[row, 0])
+        points[1, p], power = np.exp(place), 0.0
+        by_wedge = _weights(rows[first : first + count, 1], points[1, p])
+        by_power = _weights(logarithms[first : first + count, 0], place)
+        for k in range(count):
+            points[0, p] += by_wedge[k] * rows[first + k, 0]
+            power += by_power[k] * logarithms[first + k, 1]
+        points[0, p], points[2, p] = max(points[0, p], _FARTHEST), np.exp(power)
+        for i in range(warm.shape[1]):
+            for j in range(warm.shape[2]):
+                rise = 0.0
+                for k in range(count):
+                    rise += by_wedge[k] * rises[first + k, i, j]
+                warm[p, i, j] = rise
+    return points, warm
+
+
+@inner
+def _weights(places: FloatArray, place: float) -> FloatArray:
+    """Of values at places, (n,), in the polynomial through them, elsewhere (Lagrange)."""
+    weights = np.ones(len(places))
+    for k in range(len(places)):
+        for j in range(len(places)):
+            if j != k:
+                weights[k] *= (place - places[j]) / (places[k] - places[j])
+    return weights
 
 
 @compiled
@@ -133,70 +161,74 @@ def walk(
     limits: tuple[bool, float],
     out: tuple[FloatArray, FloatArray],
 ) -> tuple[int, int]:
-    """Fill rows (A, B, W) and temperature rises, from the middle on deeper and flatter; first row and end.
+    """Fill rows (A, B, W) and temperature rises, from the middle on flatter and deeper; first row and end.
 
     `limits`: whether the film is isothermal, the largest load.
     """
     numbers, rises = out
     isothermal, depth = limits
-    middle = numbers.shape[0] // 2
-    if not grid.angle[-1] > 0.0 or not grid.angle[0] < 0.0:
+    middle, ahead = numbers.shape[0] // 2, grid.angle[0]
+    if not grid.angle[-1] > 0.0 or not ahead < 0.0:
         return middle, middle
     first = _FIRST / np.sin(grid.angle[-1])
-    low, high, curvature = middle, middle, 0.1
-    for row in range(middle, numbers.shape[0]):
-        wedge = first * _DEEPER ** (row - middle)
-        if row > middle + 1:
-            slope = (numbers[row - 1, 0] - numbers[row - 2, 0]) / (numbers[row - 1, 1] - numbers[row - 2, 1])
-            curvature = numbers[row - 1, 0] + slope * (wedge - numbers[row - 1, 1])
-            _warm(work, rises, row - 1, row - 2)
-        found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
-        if not found:
-            break
-        _keep(work, numbers, rises, row, (curvature, wedge, load))
-        high = row + 1
-        hottest = largest(rises[row].reshape(-1))
-        if load > depth or curvature > _DEEPEST or hottest > _HOTTEST:
-            break
-    if high == middle:
+    curvature = max(2.0 * (_OPENS + first * ahead) / ahead**2, -0.75)
+    found, curvature, load = _balance(grid, work, running, isothermal, curvature, first)
+    if not found or not load > 0.0:
         return middle, middle
-    row, flatter = middle - 1, _FLATTER
-    while row > 0 and flatter < _LEAST_STEP:
-        before = row + 1
-        wedge = numbers[before, 1] * flatter
+    _keep(work, out, middle, (curvature, first, load))
+    low, high = middle, middle + 1
+    flatter = _FLATTER
+    while low > 0 and flatter < _LEAST_STEP and numbers[low, 0] != _FARTHEST:
+        wedge = numbers[low, 1] * flatter
         if wedge < _FLATTEST * first:
             break
-        curvature = numbers[before, 0] * flatter
-        if row + 2 < high:
-            slope = (numbers[before, 0] - numbers[row + 2, 0]) / (numbers[before, 1] - numbers[row + 2, 1])
-            most = 0.3 * (1.0 + numbers[before, 0])
-            curvature = numbers[before, 0] + min(max(slope * (wedge - numbers[before, 1]), -most), most)
-        _warm(work, rises, before, min(before + 1, high - 1))
+        rises[low - 1] = rises[low]  # the parallel film, where rows are few
+        known = low if high - low > 3 else low - 1
+        curvature = _ahead(work, out, wedge, (known, min(low + 3, high), low))
         work.ruptured[:] = False
-        found, curvature, load = _balance(grid, work, running, isothermal, max(curvature, -0.75), wedge)
+        found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
         if found and load > 0.0:
-            _keep(work, numbers, rises, row, (curvature, wedge, load))
-            low, row = row, row - 1
-            if curvature == _FARTHEST:
-                break
+            low -= 1
+            _keep(work, out, low, (curvature, wedge, load))
         else:
             flatter = np.sqrt(flatter)
+    work.ruptured[:] = False
+    while high < numbers.shape[0]:
+        before = high - 1
+        hottest = largest(rises[before].reshape(-1))
+        if numbers[before, 2] > depth or numbers[before, 0] > _DEEPEST or hottest > _HOTTEST:
+            break
+        wedge = numbers[before, 1] * _DEEPER
+        curvature = _ahead(work, out, wedge, (max(high - 3, low), high, before))
+        found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
+        if not found or not load > 0.0:
+            break
+        _keep(work, out, high, (curvature, wedge, load))
+        high += 1
     return low, high
 
 
 @inner
-def _warm(work: FilmWork, rises: FloatArray, last: int, before: int) -> None:
-    """Temperatures as the last two rows head, row by row."""
+def _ahead(work: FilmWork, out: tuple[FloatArray, FloatArray], wedge: float, rows: tuple[int, int, int]) -> float:
+    """Curvature at a wedge, and temperatures into `work`, as rows head: from the first on, to an end; the nearest."""
+    numbers, rises = out
+    first, end, nearest = rows
+    weights, curvature = _weights(numbers[first:end, 1], wedge), 0.0
+    for k in range(len(weights)):
+        curvature += weights[k] * numbers[first + k, 0]
     for i in range(work.temperature.shape[0]):
         for j in range(work.temperature.shape[1]):
-            rise = rises[last, i, j]
-            work.temperature[i, j] = 40.0 + min(max(2.0 * rise - rises[before, i, j], 0.5 * rise), 1.5 * rise)
+            rise, last = 0.0, rises[nearest, i, j]
+            for k in range(len(weights)):
+                rise += weights[k] * rises[first + k, i, j]
+            work.temperature[i, j] = 40.0 + min(max(rise, 0.5 * last), 1.5 * last)
+    most = 0.5 * (1.0 + numbers[nearest, 0])
+    return max(numbers[nearest, 0] + min(max(curvature - numbers[nearest, 0], -most), most), -0.75)
 
 
 @inner
-def _keep(
-    work: FilmWork, numbers: FloatArray, rises: FloatArray, row: int, attitude: tuple[float, float, float]
-) -> None:
+def _keep(work: FilmWork, out: tuple[FloatArray, FloatArray], row: int, attitude: tuple[float, float, float]) -> None:
+    numbers, rises = out
     numbers[row, 0], numbers[row, 1], numbers[row, 2] = attitude
     for i in range(work.temperature.shape[0]):
         for j in range(work.temperature.shape[1]):
@@ -228,7 +260,7 @@ def _balance(
         settled = warmer < max(0.3, 0.01 * hottest)
         if settled and curvature == _FARTHEST and move < 0.0:
             return True, curvature, load  # the pad carries as far off as is of concern
-        if settled and abs(move) < 1e-3 * (1.0 + curvature):
+        if settled and abs(move) < _MOVED * (1.0 + curvature):
             return True, curvature + share * move, load
         # a film that comes nearer grows hotter, and needs less of a step than one that stays as warm (Aitken)
         if last != 0.0:

@@ -93,13 +93,14 @@ def film_grid(
     along = np.full(nt + 1, dx)
     along[[0, -1]] = 0.5 * dx
     area = np.outer(along, across) * (2.0 if symmetric else 1.0)
-    at_faces = np.stack([np.append(face, angle[-1]), angle]).repeat(nz + 1, axis=1)
+    faces = np.stack([np.append(face, angle[-1]), angle])
+    cos_face, sin_face = (values.repeat(nz + 1, axis=1) for values in (np.cos(faces), np.sin(faces)))
     conducts, drags = np.zeros((2, nt + 1, nz + 1)), np.zeros((2, nt + 1, nz + 1))
     conducts[0, :-1], drags[0, :-1] = height / dx, height
     conducts[1, :, :-1] = dx / dz
     node = np.arange(area.size).reshape(area.shape)[1:-1, first:-1].ravel()
     return FilmGrid(
-        angle, z, np.cos(angle), np.sin(angle), np.cos(at_faces), np.sin(at_faces), conducts.reshape(2, -1),
+        angle, z, np.cos(angle), np.sin(angle), cos_face, sin_face, conducts.reshape(2, -1),
         drags.reshape(2, -1), node, dx, dz, height, area, np.array([nz + 1, 1]), first,
     )  # fmt: skip
 

@@ -28,6 +28,8 @@ from model.film.slopes import derivatives, force_of, rupture_line
 from model.film.turbulence import heat_beyond, resist
 from rigdata.arrays import FloatArray
 
+#: Share of the clearance below which there is no film: thinner than an atom in a tenth of a millimetre.
+THINNEST = 1e-6
 #: A cold start moves the rupture line by one node a step, so that fine meshes need many.
 _MAX_ACTIVE_SET_STEPS = 2000
 
@@ -95,7 +97,7 @@ def solve_film(
     Eq. (2) of Dang, Chatterton, Pennacchi, Lubricants 2019, 7, 61; perturbed pressure zero where ruptured.
     """
     min_film = _thickness(grid, work, wedge)
-    if not min_film > 0.0:
+    if not min_film > THINNEST * wedge[0]:
         return FilmForces(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)), min_film, -1)
     faces = film_faces(grid, work, wedge, speed)
     if turbulent is not None and turbulent:

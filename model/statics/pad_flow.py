@@ -9,6 +9,7 @@ import numpy as np
 from model.bearing import Oil
 from model.film.mesh import FilmWork
 from model.film.oil_state import edge_flows
+from model.film.reynolds import THINNEST
 from model.film.turbulence import shear_factor
 from model.statics.pad_film import PadFilm
 from rigdata.arrays import FloatArray
@@ -106,7 +107,7 @@ def power_loss(films: Sequence[PadFilm], surface_speed: float, turbulent: bool =
             total += film.resting.power if film.resting is not None else 0.0
             continue
         work, grid = film.work, film.grid
-        if not work.thickness.min() > 0:  # a lost film, of a prediction that did not converge
+        if not work.thickness.min() > THINNEST * film.pad.pad_clearance:  # lost, of a prediction that did not converge
             return math.nan
         shearing = work.viscosity if film.cross is None else film.cross.shear
         couette = shearing * surface_speed**2 / work.thickness

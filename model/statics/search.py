@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from model.conditions import named
-from model.film.attitudes import BETWEEN, attitudes
+from model.film.attitudes import attitudes
 from model.film.following_heat import heat_impedance
 from model.film.oil_state import set_viscosity
 from model.film.resting import RestingFilm
@@ -171,8 +171,8 @@ class Search:
             point = np.interp(reach[m], curve, np.arange(len(curve)))
             if np.isnan(point):  # a search that has run away: its status says so
                 continue
-            row = min(int((low + point) / BETWEEN), len(rises) - 2)
-            part = (low + point) / BETWEEN - row
+            row = min(int(low + point), len(rises) - 2)
+            part = low + point - row
             along, across = _spread(rises.shape[1:], temperature.shape, film.grid.first == 1)
             temperature[:] = pads["inlet"][m] + along @ ((1.0 - part) * rises[row] + part * rises[row + 1]) @ across
             if film.cross is not None:
