@@ -31,6 +31,7 @@ from tpjb_ident.phasors.reading_cache import with_kept_beginning
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.run_phasors import run_phasors
 from tpjb_ident.phasors.windows import RecordTooShortError
+from tpjb_ident.terms.mains import MAINS_ON_LINE
 
 #: Samples read at a time; signs and lines are judged on the first block [samples].
 _BLOCK = 2**19
@@ -66,6 +67,7 @@ class Observation:
     #: (m,): size of what turns with the shaft, SI; empty where nothing tells it
     shaft_line: FloatArray = field(default_factory=lambda: np.empty(0), repr=False)
     shaft_force: float = math.nan  #: of the 1X force, see `tpjb_ident.check.lines`
+    on_mains: bool = False  #: whether mains, of another phase in every run, stand on its excitation line
 
     def pick(self, quantity: str) -> list[int]:
         """Places of the channels of `quantity` in `channels`."""
@@ -145,8 +147,8 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0, mass: fl
     if phasors is None:
         return observation
     astray = [k for k in range(len(phasors.lines.excitation)) if not _near_set_point(run, phasors, k)]
-    size, force = shaft_line(phasors, live), shaft_force(phasors)
-    return replace(observation, other_line=other_line(phasors, astray), shaft_line=size, shaft_force=force)
+    observation = replace(observation, shaft_line=shaft_line(phasors, live), shaft_force=shaft_force(phasors))
+    return replace(observation, other_line=other_line(phasors, astray), on_mains=MAINS_ON_LINE in phasors.conditions)
 
 
 def _is_timed(report: Reporter, run: Run, length: int) -> bool:
