@@ -181,7 +181,7 @@ def _motion(case, points, point, miss, rng) -> tuple[np.ndarray, np.ndarray]:
     a = omega[:, None] ** 2 * (d + case.shaft_gives * force)
     if case.mount == "cells":
         for k in range(n):
-            rows = np.eye(2) - omega[k] ** 2 * MASS * COMPLIANCE
+            rows = np.eye(2) - omega[k] ** 2 * MASS * (1 + case.mass_error) * COMPLIANCE
             a[k] = -np.linalg.solve(rows, omega[k] ** 2 * COMPLIANCE @ force[k])
     if not case.accelerometers and case.mount == "unknown":
         a = 0 * a

@@ -78,6 +78,7 @@ class Rig:
     repeats: int = 1
     mount: str = "cells"
     mass: float = 30.0
+    stated_mass: float = 0.0  #: where it is another one
     springs: tuple[float, float] = (4e8, 6e8)
     foundation: tuple[float, float] = (
         0.0,
@@ -353,7 +354,7 @@ def campaign_of(rig: Rig, signals: list[Signal], channels: tuple[Channel, ...]) 
         runs.append(Run(name, tuple(lines), values, rig.seconds, warmth, rig.tilt))
     if rig.with_clearance:
         runs.append(Run("c-1", ('kind = "clearance"',), clearance_sweep(rig), 8.0))
-    head = ("[housing]", f'mass = "{rig.mass:g} kg"', *rig.head)
+    head = ("[housing]", f'mass = "{rig.stated_mass or rig.mass:g} kg"', *rig.head)
     off = rig.detune if rig.excitation == "sine" else 0.0
     bearing = bearing_file(rig.diameter, rig.clearance)
     return Campaign(head, bearing, channels, tuple(runs), lambda w, f: rig.film.h(f + off, w), lambda f: f + off)

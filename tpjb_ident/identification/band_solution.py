@@ -23,7 +23,7 @@ from tpjb_ident.estimate.term import Term
 from tpjb_ident.identification.band_blocks import BandBlocks, line_products
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.distortion import Distortion
-from tpjb_ident.terms.registry import campaign_terms, learnt_rig
+from tpjb_ident.terms.registry import campaign_terms, learnt_mass, learnt_rig
 from tpjb_ident.terms.run_gain import RunGain
 
 #: Parts of a band whose h becomes a point.
@@ -141,7 +141,7 @@ def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution,
     wide = student_widening(freedom)
     task = task.with_gains(np.hypot(by_load, size * wide * spare))
     solution = task.solved(start, shape)
-    rig = learnt_rig(task.rig, solution)
+    rig = learnt_mass(learnt_rig(task.rig, solution), data.blocks, data.line, solution)
     if rig is not task.rig:
         task = replace(task, rig=rig).with_gains(np.hypot(by_load, size * wide * spare))
         solution = task.solved(start, shape, solution)

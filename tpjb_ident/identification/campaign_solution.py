@@ -29,7 +29,7 @@ from tpjb_ident.terms.mains import (
     force_pickup_spread,
     mains_pickup,
 )
-from tpjb_ident.terms.registry import campaign_terms, learnt_rig
+from tpjb_ident.terms.registry import campaign_terms, learnt_mass, learnt_rig
 
 #: Scatter of the force from run to run with which mains is fitted, at least.
 _LEAST_SCATTER = 1e-3
@@ -95,6 +95,7 @@ def solve_campaign(
     last = solved_with_clocks(sensors, rate, solved)
     blocks, start, rates = last.blocks, last.start, last.task.rates
     learnt = learnt_rig(last.rig, last.solution)
+    learnt = learnt_mass(learnt, blocks, np.arange(len(blocks.points)), last.solution)
     if learnt is not last.rig:
         again = solver(learnt, blocks, start, rates).begun(last.solution).run()
         last = replace(last, rig=learnt, solution=again)

@@ -35,8 +35,8 @@ _OTHERWISE, _GROSS = 0.05, 0.2
 _CLEAR = 5.0
 #: Loss of a cell's mount, at most: bolted joints have 0.01. What goes beyond it is a delay.
 _LOSS = 0.04
-#: No housing stands on springs as stiff as this [nm/N]: a steel bar of 1 m^2 and 2 m has it.
-_STIFFEST = 0.01
+#: No housing stands on springs as stiff as this [m/N]: a steel bar of 1 m^2 and 2 m has it.
+STIFFEST = 0.01 * _NANOMETRE
 #: Ratio of the springs along X and Y that no rig has: a sensitivity is ten times off.
 _ALIKE = 1 / 6
 #: Share of the acceleration that the housing's equations leave where sensors are right, at most: rigs have 0.05. Of a
@@ -164,7 +164,7 @@ class Housing(Term):
             faults.append("they move with the cells' force, and not against it")
         elif abs(xy) > max(_CLEAR * error[2], 0.5 * np.sqrt(abs(xx * yy))):
             faults.append("each answers the force along the other's axis")
-        silent = [axis for axis, c, e in zip("XY", (xx, yy), error) if abs(c) + _CLEAR * e < _STIFFEST]
+        silent = [axis for axis, c, e in zip("XY", (xx, yy), error) if _NANOMETRE * (abs(c) + _CLEAR * e) < STIFFEST]
         if silent:
             faults.append(f"they show nothing along {' and '.join(silent)}: are they connected?")
         if faults:
@@ -180,12 +180,11 @@ class Housing(Term):
             return (Condition("accelerometers-doubtful", text),)
         return _out_of_step(loss, error[3], "cells", self._omega)
 
-    def springs(self, fitted: Fitted) -> tuple[float, float] | None:
-        """Stiffness under the housing along X and Y [N/m]; None where no accelerometer shows it."""
+    def standing_on(self, fitted: Fitted) -> ComplexArray | None:
+        """Compliance of the springs under the housing (2, 2) [m/N]; None where no accelerometer shows it."""
         if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2 or self.is_on_foundation(fitted):
             return None
-        x, y = (1 / (_NANOMETRE * max(float(c), _STIFFEST)) for c in fitted.value[:2])
-        return x, y
+        return _compliance(fitted.value)
 
     def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
         """Cells, or probes of a floating stator, as uncertain in time as accelerometers lead them.

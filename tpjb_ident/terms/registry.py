@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from rigdata.arrays import ComplexArray, IntArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.term import Term
@@ -14,10 +17,10 @@ from tpjb_ident.terms.corner import Corner
 from tpjb_ident.terms.delay import Delay
 from tpjb_ident.terms.distortion import Distortion
 from tpjb_ident.terms.gain import Gain
-from tpjb_ident.terms.housing import Housing
+from tpjb_ident.terms.housing import STIFFEST, Housing
 from tpjb_ident.terms.load import Load
 from tpjb_ident.terms.load_turn import LoadTurn
-from tpjb_ident.terms.mass import Mass
+from tpjb_ident.terms.mass import Mass, with_doubted_mass
 from tpjb_ident.terms.run_gain import RunGain
 from tpjb_ident.terms.shaft import Shaft
 from tpjb_ident.terms.temperature import Temperature
@@ -67,7 +70,21 @@ def learnt_rig(rig: Rig, solution: Solution) -> Rig:
     return rig
 
 
+def learnt_mass(rig: Rig, blocks: Blocks, group: IntArray, solution: Solution) -> Rig:
+    """The rig, its mass as uncertain as frequencies contradict it; `group` (P,) of every point in the solution."""
+    compliance = _springs(solution)
+    return rig if compliance is None else with_doubted_mass(rig, blocks, group, solution, compliance)
+
+
 def cell_stiffness(solution: Solution) -> tuple[float, float] | None:
     """Stiffness of what the housing stands on along X and Y [N/m]; None where no accelerometer shows it."""
+    compliance = _springs(solution)
+    if compliance is None:
+        return None
+    x, y = 1 / np.maximum(compliance.real.diagonal(), STIFFEST)
+    return float(x), float(y)
+
+
+def _springs(solution: Solution) -> ComplexArray | None:
     housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
-    return None if housing is None else housing.springs(solution.fitted[housing.name])
+    return None if housing is None else housing.standing_on(solution.fitted[housing.name])

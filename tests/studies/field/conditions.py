@@ -32,6 +32,7 @@ HEAVY: Entries = {**FLOATING, "film": cf.HEAVY, "loads": (3000.0,), "mass": 60.0
 PLAIN: Entries = {"film": cf.PLAIN, "loads": (0.0,)}
 NEGATIVE: Entries = {"film": cf.NEGATIVE, "loads": (2000.0,)}
 SOFT: Entries = {"springs": (3e7, 4e7), "mass": 60.0}
+STANDING: Entries = {"mount": "cells", "static": True, "frequencies": (20.0, 35.0, 55.0, 70.0)}
 STIFF: Entries = {"springs": (4e9, 4e9), "mass": 8.0}
 BAND: Entries = {"seconds": 6.0, "directions": (20.0, 110.0), "repeats": 2}
 MARCHED: Entries = {"speed": 97.0, "shaft_mass": 200.0, "mass": 120.0, "seconds": 3.0, "unbalance": 0.004}
@@ -144,6 +145,7 @@ def good_rigs() -> list[Condition]:
         rig("foundation with a resonance of 44 Hz", **FOUNDATION),
         rig("accelerometers' inputs have a corner of 1 Hz", ("A1", {"fault": FAULTS["input"]})),
         rig("the same on soft cells", ("A1", {"fault": FAULTS["input"]}), **SOFT),
+        rig("soft cells, added mass, four frequencies", limits=WIDER, **{**HEAVY, **SOFT, **STANDING}),
         rig("stiff cells, no accelerometers", without="A1", **STIFF),
         rig("stiff cells, an accelerometer dead", ("A1H", {"fault": FAULTS["dead"]}), **STIFF),
         rig("heavy shaft between shaker and film", shaft_mass=1400.0, directions=(0.0, 60.0, 120.0)),
@@ -298,6 +300,8 @@ def bad_data() -> list[Condition]:
         bad("a probe drifts by 0.1 %/K, not stated", ("X1A", {"drift": 1e-3}), repeats=2, **warming),
         bad("no accelerometers, floating and heavy", without="A1", **HEAVY),
         bad("no accelerometers, soft cells", without="A1", **SOFT),
+        bad("housing of 45 kg stated as 30, soft cells", stated_mass=30.0, **{**SOFT, **STANDING, "mass": 45.0}),
+        bad("the same, random", stated_mass=30.0, **{**SOFT, **BAND, "mass": 45.0, "excitation": "random"}),
         bad("accelerometers inverted, floating", ("A1", inverted), **HEAVY),
         bad("accelerometers exchanged, soft cells", *two_axes(90, 0, "A1H A1V"), **SOFT),
         bad(
