@@ -8,7 +8,10 @@ from model.dynamics import bearing_impedance
 from model.pivots import pivot_laws
 from model.predict import predict_setup
 from model.setup import Setup
+from rigdata.campaign import load_campaign
+from tests.rigs import closed_form
 from tpjb_ident.estimators.stiffness import DynamicStiffness
+from tpjb_ident.identification.identify import identify
 from tpjb_ident.results.frequency_outliers import frequency_outlier
 
 K, C = 1e6 * np.array([[80.0, 6.0], [-5.0, 250.0]]), 1e5 * np.array([[6.5, 0.1], [0.1, 11.0]])
@@ -40,9 +43,9 @@ def test_a_gain_a_range_or_a_delay_of_one_frequency_is_told(fault, mass):
     h = film(frequencies, mass)
     assert frequency_outlier(estimates(frequencies, h)) is None
     h[2] = h[2] @ fault
-    place, share = frequency_outlier(estimates(frequencies, h))
+    place, distance = frequency_outlier(estimates(frequencies, h))
     assert place == 2
-    assert share > 0.05
+    assert np.linalg.norm(distance) > 0.05 * np.linalg.norm(h[2])
 
 
 def test_noise_and_few_frequencies_tell_nothing():
@@ -64,3 +67,23 @@ def test_a_film_that_bends_over_frequency_has_no_outlier(rocker_file, frequencie
         prediction = predict_setup(setup, 8000.0, -np.pi / 2, 138.0, omega)
         h = bearing_impedance(setup, prediction.equilibrium, omega)
         assert frequency_outlier(estimates(frequencies, h, error=1e3)) is None
+
+
+def test_an_outlier_s_interval_reaches_to_what_the_others_let_expect(tmp_path):
+    plan = closed_form.Rig(frequencies=(20.0, 35.0, 55.0, 70.0))
+
+    def up(values, rng, number):
+        return values * (1.1 if 4 <= number < 8 else 1.0)
+
+    channels = closed_form.with_entries(closed_form.channels_of(plan), "X1A", fault=up)
+    result = identify(load_campaign(closed_form.write_rig(tmp_path, plan, channels)))
+    flagged = [[c for c in p.quality if c == "frequency-outlier"] for p in result.points]
+    assert [len(conditions) for conditions in flagged] == [0, 1, 0, 0]
+    point = result.points[1]
+    h = plan.film.h(35.0, 5000.0)
+    off = np.abs(point.stiffness.vector - np.concatenate([h.real.ravel(), h.imag.ravel()]))
+    assert off.max() > 0.03 * np.linalg.norm(h)
+    assert (off < point.stiffness.half_width()).all()
+    assert all((e.half_width() > off).all() for e in point.by_method.values())
+    total = sum(point.budget.values())
+    np.testing.assert_allclose(total, point.stiffness.covariance + point.stiffness.systematic, rtol=1e-6, atol=1e6)

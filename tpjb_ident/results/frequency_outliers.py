@@ -12,6 +12,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.point_result import PointResult, by_static_point
 
@@ -28,20 +29,36 @@ _CLEARLY, _ALONE = 25.0, 5.0
 
 
 def with_frequency_outliers(points: Sequence[PointResult]) -> tuple[PointResult, ...]:
-    """The points, with a condition on each that stands apart from the other frequencies of its load."""
+    """The points, each that stands apart from the other frequencies of its load with a condition and a wider interval.
+
+    Which of them is right nothing tells: a gain or a range that is off, or a film that does so.
+    """
     result = list(points)
     for places in by_static_point(points):
         outlier = frequency_outlier([points[i].stiffness for i in places])
         if outlier is not None:
-            point, share = points[places[outlier[0]]], outlier[1]
+            k, distance = outlier
+            share = float(np.linalg.norm(distance) / np.linalg.norm(points[places[k]].stiffness.h))
             others = f"the other {len(places) - 1} frequencies of this load"
             doubt = Condition("frequency-outlier", f"h is {100 * share:.0f} % from what {others} let expect")
-            result[places[outlier[0]]] = replace(point, quality=merged(point.quality, (doubt,)))
+            result[places[k]] = _widened(points[places[k]], CHANGE_AS_DEVIATION * distance, doubt)
     return tuple(result)
 
 
-def frequency_outlier(estimates: Sequence[DynamicStiffness]) -> tuple[int, float] | None:
-    """Place of the estimate that stands apart, and by which share of its H; None where none does."""
+def _widened(point: PointResult, deviation: FloatArray, doubt: Condition) -> PointResult:
+    """The point, h by every method uncertain by a further source of one deviation (8,) [N/m]."""
+    covariance = np.outer(deviation, deviation)
+    by_method = {
+        name: replace(estimate, systematic=estimate.systematic + covariance)
+        for name, estimate in point.by_method.items()
+    }
+    default = next(name for name, estimate in point.by_method.items() if estimate is point.stiffness)
+    quality, budget = merged(point.quality, (doubt,)), {**point.budget, "other frequencies": covariance}
+    return replace(point, stiffness=by_method[default], by_method=by_method, quality=quality, budget=budget)
+
+
+def frequency_outlier(estimates: Sequence[DynamicStiffness]) -> tuple[int, FloatArray] | None:
+    """Place of the estimate that stands apart, and its distance (8,) from the others' curve; None where none does."""
     omega = np.array([e.omega for e in estimates])
     if len(np.unique(omega)) < _FREQUENCIES:
         return None
@@ -51,16 +68,17 @@ def frequency_outlier(estimates: Sequence[DynamicStiffness]) -> tuple[int, float
     w = omega / np.exp(np.log(omega).mean())
     everyone = np.ones(len(w), dtype=bool)
     smooth = float(np.sum(_remainder(w, size, y, everyone, _POWERS) ** 2)) + noise
-    distance, rest = np.zeros(len(w)), np.full(len(w), np.inf)
+    distance, rest = np.zeros((len(w), 8)), np.full(len(w), np.inf)
     for k in range(len(w)):
         others = np.arange(len(w)) != k
         if np.abs(w[others] - w[k]).min() > _REACH * np.ptp(w[others]):
             continue  # the others are too far off to tell
         left = _remainder(w, size, y, others, _K_C_M)
-        distance[k], rest[k] = np.linalg.norm(left[k]), np.sum(left[others] ** 2) + noise
+        distance[k], rest[k] = left[k], np.sum(left[others] ** 2) + noise
     place, second = np.argsort(rest)[:2].tolist()
-    is_apart = distance[place] > _NOTABLE and _CLEARLY * rest[place] < smooth and _ALONE * rest[place] < rest[second]
-    return (place, float(distance[place])) if is_apart else None
+    is_clear = _CLEARLY * rest[place] < smooth and _ALONE * rest[place] < rest[second]
+    is_apart = np.linalg.norm(distance[place]) > _NOTABLE and is_clear
+    return (place, distance[place] * size[place]) if is_apart else None
 
 
 def _remainder(

@@ -59,6 +59,7 @@ FAULTS: dict[str, Fault] = {
     "every other": lambda v, r, i: v * (1.15 if i % 2 else 1.0),
     "every third": lambda v, r, i: v * (0.8 if i % 3 == 0 else 1.0),
     "input": lambda v, r, i: lfilter(*butter(1, 1.0, "high", fs=2000.0), v - v[0]),
+    "second four": lambda v, r, i: v * (1.1 if 4 <= i < 8 else 1.0),
     "first four": lambda v, r, i: v * (7.87 / 7.78 if i < 4 else 1.0),
 }
 
@@ -297,6 +298,7 @@ def bad_data() -> list[Condition]:
         bad("a probe's gain 15 % up in every other run", ("X1A", {"fault": FAULTS["every other"]})),
         bad("a cell's gain 20 % down in every third run", ("L1V", {"fault": FAULTS["every third"]})),
         bad("runs differ by 15 %", stiffness_scatter=0.15),
+        bad("a probe 10 % up at one of four frequencies", ("X1A", {"fault": FAULTS["second four"]}), **STANDING),
         bad("a probe drifts by 0.1 %/K, not stated", ("X1A", {"drift": 1e-3}), repeats=2, **warming),
         bad("no accelerometers, floating and heavy", without="A1", **HEAVY),
         bad("no accelerometers, soft cells", without="A1", **SOFT),
