@@ -6,7 +6,6 @@ a chi distribution with 2 q degrees of freedom; everything below is an expectati
 
 import functools
 from collections.abc import Callable
-from math import comb
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,8 @@ from rigdata.arrays import FloatArray
 _NORMAL_MAD = 0.6744897501960817
 #: Probabilities beyond which a window begins to lose weight, and beyond which none is left.
 _BEGIN, _END = 0.99, 0.9999
+#: Where a distribution ends, u^2, and values that stand for it.
+_WIDEST, _VALUES = 400.0, 4000
 
 
 def student_widening(freedom: float) -> float:
@@ -76,21 +77,13 @@ def half_shrinkage(dimension: int, share: float) -> float:
 @functools.cache
 def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
     """Constant c at which the bisquare location/regression estimate has this Gaussian efficiency."""
-
-    def shortfall(c: float) -> float:
-        # psi^2 = u^2 (1 - v)^4 and the mean slope (1 - v)^2 - 4 v (1 - v) / d, with v = (u / c)^2
-        slopes = (1.0, -2.0 - 4 / dimension, 1.0 + 4 / dimension)
-        a = b = 0.0
-        for k in range(5):
-            a += comb(4, k) * (-1) ** k * _moment(dimension, k + 1, c**2) / c ** (2 * k) / dimension
-        for k, slope in enumerate(slopes):
-            b += slope * _moment(dimension, k, c**2) / c ** (2 * k)
-        return b**2 / a - efficiency
-
-    lower, upper = 2.0, 30.0
+    x, density = _chi_square(dimension, _WIDEST)
+    lower, upper = 1.0, 20.0
     while upper - lower > 1e-12:  # halved: scipy's root finders take longer to import than `identify` to solve
         middle = (lower + upper) / 2
-        lower, upper = (lower, middle) if shortfall(middle) > 0 else (middle, upper)
+        v = np.minimum(x / middle**2, 1.0)
+        power, slope = density @ (x * (1 - v) ** 4) / dimension, density @ ((1 - v) ** 2 - 4 / dimension * v * (1 - v))
+        lower, upper = (lower, middle) if slope**2 > efficiency * power else (middle, upper)
     return lower
 
 
@@ -98,20 +91,16 @@ def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
 def trimming_limits(dimension: int) -> tuple[float, float, float]:
     """Squared distances where a window starts to lose weight and where it has none; the variance that weights leave."""
     lower, upper = _quantile(_BEGIN, dimension), _quantile(_END, dimension)
-    # the weight as a polynomial of the squared distance: 1 - 3 v^2 + 2 v^3 with v from 0 to 1 between the limits
-    v = np.polynomial.Polynomial([-lower, 1.0]) / (upper - lower)
-    moments = [_moment(dimension, k, lower) for k in range(2)]
-    weight: list[float] = (1 - 3 * v**2 + 2 * v**3).coef.tolist()
-    for k, coefficient in enumerate(weight):
-        for n in range(2):
-            moments[n] += coefficient * (_moment(dimension, k + n, upper) - _moment(dimension, k + n, lower))
-    return lower, upper, moments[1] / (dimension * moments[0])
+    x, density = _chi_square(dimension, upper)
+    weight = density * trimming_weight(x, lower, upper)
+    return lower, upper, float(weight @ x / (dimension * weight.sum()))
 
 
-def _moment(dimension: int, k: int, limit: float) -> float:
-    """E[x^k; x < limit] of the chi-square distribution, by its recursion x^k p_d(x) ~ p_(d + 2 k)(x)."""
-    rising = float(np.prod(dimension + 2.0 * np.arange(k)))
-    return rising * float(chdtr(dimension + 2 * k, limit))
+def _chi_square(dimension: int, most: float) -> tuple[FloatArray, FloatArray]:
+    """Values u^2 up to `most`, and the share of the distribution about each: midpoints over u."""
+    u = np.sqrt(most) * (np.arange(_VALUES) + 0.5) / _VALUES
+    density = u ** (dimension - 1) * np.exp(-(u**2) / 2)
+    return u**2, density / density.sum()
 
 
 def _quantile(share: float, dimension: int) -> float:

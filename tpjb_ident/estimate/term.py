@@ -152,11 +152,17 @@ class Term:
 
 
 class Factor(Term):
-    """A term that multiplies readings: exp(sum of parameter times exponent)."""
+    """A term that multiplies readings: exp(sum of parameter times exponent); `sensors` (m, q) that each has part in."""
+
+    sensors: FloatArray
+
+    def rate(self, blocks: Blocks) -> ComplexArray | FloatArray:
+        """Change of the logarithm of a sensor's readings per unit of a parameter that it has part in, (n,)."""
+        raise NotImplementedError
 
     def exponent(self, blocks: Blocks) -> ComplexArray:
         """Change of the readings' logarithm per unit of every parameter, (n, m, q)."""
-        raise NotImplementedError
+        return np.asarray(self.rate(blocks)[:, None, None] * self.sensors, complex)
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """Exponent times reading."""

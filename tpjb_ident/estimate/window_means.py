@@ -116,13 +116,13 @@ def _pooled(
 ) -> WindowMeans:
     """Weighted mean and slope of every run, and the covariance of a window about them."""
     g = len(present)
-    total = totals(run, weights, g)
-    safe = np.maximum(total, 1e-12)
-    mean = _sums(weights[:, None] * z, run, g) / safe[:, None]
-    middle = totals(run, weights * time, g) / safe
+    of_run = weights * (run == np.arange(g)[:, None])
+    total = of_run.sum(axis=1)
+    share = of_run / np.maximum(total, 1e-12)[:, None]
+    mean, middle = share @ z, share @ time
     away = time - middle[run]
-    spread = totals(run, weights * away**2, g)
-    slope = _sums((weights * away)[:, None] * z, run, g) / np.maximum(spread, 1e-12)[:, None]
+    spread = of_run @ away**2
+    slope = of_run @ (away[:, None] * z) / np.maximum(spread, 1e-12)[:, None]
     slope[total < _DRIFT_WINDOWS] = 0.0
     drift = _drift(mean, slope, readings.devices)
     residual = z - mean[run] - drift[run] * away[:, None]
@@ -141,13 +141,6 @@ def _pooled(
     noise = noise + (1e-24 + _FLOOR * float(np.trace(noise).real)) * np.eye(z.shape[1])
     moved = (weights[:, None] * motion).T @ motion.conj() / max(spare, 1.0)
     return WindowMeans(mean, slope, middle, total, spread, noise, moved, spare, weights, residual)
-
-
-def _sums(rows: ComplexArray, run: IntArray, g: int) -> ComplexArray:
-    """Sums of rows (n, m) by run, (g, m)."""
-    table = np.zeros((g, rows.shape[1]), complex)
-    np.add.at(table, run, rows)
-    return table
 
 
 def _drift(mean: ComplexArray, slope: ComplexArray, devices: Sequence[str]) -> ComplexArray:

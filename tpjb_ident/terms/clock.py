@@ -34,22 +34,22 @@ class Clock(Factor):
         #: Rates that the windows were turned back by before they were averaged, relative.
         self._taken_off = np.array([(taken_off or {}).get(device, 0.0) for device in devices])
         self.parameters = tuple(Parameter(device or "records", "100 ppm", _QUARTZ) for device in devices)
-        self._fast = np.array([[sensor.device == device for device in devices] for sensor in rig.sensors], dtype=float)
-        self._fast = self._fast.reshape(len(rig), len(devices))
+        self.sensors = np.array(
+            [[sensor.device == device for device in devices] for sensor in rig.sensors], dtype=float
+        )
 
     def rates(self, value: FloatArray) -> dict[str, float]:
         """Rates by device, relative."""
         return {device: _UNIT * float(rate) for device, rate in zip(self._devices, value)}
 
-    def exponent(self, blocks: Blocks) -> ComplexArray:
+    def rate(self, blocks: Blocks) -> ComplexArray:
         """-i omega t, per 100 ppm."""
-        turned = -1j * _UNIT * blocks.omega * blocks.time
-        return turned[:, None, None] * self._fast
+        return np.asarray(-1j * _UNIT * blocks.omega * blocks.time)
 
     def slope_columns(self, blocks: Blocks, reading: ComplexArray) -> ComplexArray:
         """-i omega times the reading, per 100 ppm."""
-        rate = -1j * _UNIT * blocks.omega
-        return np.asarray(rate[:, None, None] * self._fast * reading[:, :, None])
+        turned = -1j * _UNIT * blocks.omega[:, None] * reading
+        return np.asarray(turned[:, :, None] * self.sensors)
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Rates that stand clear of their errors."""

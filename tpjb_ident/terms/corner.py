@@ -28,20 +28,17 @@ class Corner(Factor):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        self._rows = []
+        self.sensors = np.zeros((len(rig), 0))
         asked = {"cells": ("force", not rig.static), "accelerometers": ("acceleration", rig.out_of_step)}
         for name, (quantity, applies) in asked.items():
-            rows = [j for j in rig.of(quantity) if rig.sensors[j].corner_uncertainty]
-            if rows and applies:
-                self._rows.append(rows)
-                self.parameters += (Parameter(name, "Hz", rig.sensors[rows[0]].corner_uncertainty),)
+            uncertain = np.array([s.corner_uncertainty * (s.quantity == quantity) for s in rig.sensors])
+            if uncertain.any() and applies:
+                self.sensors = np.column_stack([self.sensors, uncertain > 0])
+                self.parameters += (Parameter(name, "Hz", float(uncertain[uncertain > 0][0])),)
 
-    def exponent(self, blocks: Blocks) -> ComplexArray:
-        """I / f in the rows of each quantity, per Hz."""
-        exponent = np.zeros((*blocks.z.shape, self.width), complex)
-        for k, rows in enumerate(self._rows):
-            exponent[:, rows, k] = 2j * np.pi / blocks.omega[:, None]
-        return exponent
+    def rate(self, blocks: Blocks) -> ComplexArray:
+        """I / f, per Hz."""
+        return np.asarray(2j * np.pi / blocks.omega)
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
         """The high pass itself: its gain falls by half the square of the lead."""

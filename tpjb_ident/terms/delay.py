@@ -31,14 +31,14 @@ class Delay(Factor):
                 device = sensor.device or sensor.quantity
                 deviations[device] = max(sensor.delay_uncertainty, deviations.get(device, 0.0))
         self.parameters = tuple(Parameter(name, "ms", dev / _MILLISECOND) for name, dev in deviations.items())
-        self._late = np.zeros((len(rig), len(deviations)))
+        self.sensors = np.zeros((len(rig), len(deviations)))
         for k, device in enumerate(deviations):
             for j, sensor in enumerate(rig.sensors):
-                self._late[j, k] = (sensor.device or sensor.quantity) == device and sensor.delay_uncertainty > 0
+                self.sensors[j, k] = (sensor.device or sensor.quantity) == device and sensor.delay_uncertainty > 0
 
-    def exponent(self, blocks: Blocks) -> ComplexArray:
+    def rate(self, blocks: Blocks) -> ComplexArray:
         """-i omega, per ms."""
-        return np.asarray(-1j * _MILLISECOND * blocks.omega[:, None, None] * self._late, complex)
+        return np.asarray(-1j * _MILLISECOND * blocks.omega)
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""

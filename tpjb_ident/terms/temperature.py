@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
@@ -23,16 +23,16 @@ class Temperature(Factor):
         measured = np.isfinite(blocks.temperature)
         self._reference = float(blocks.temperature[measured].mean()) if measured.any() else 0.0
         uncertain = [j for j, sensor in enumerate(rig.sensors) if sensor.temperature_coefficient_uncertainty]
-        self._rows = uncertain if measured.any() else []
+        rows = uncertain if measured.any() else []
+        self.sensors = np.eye(len(rig))[:, rows]
         self.parameters = tuple(
             Parameter(rig.sensors[j].name, "1e-3/K", rig.sensors[j].temperature_coefficient_uncertainty / _UNIT)
-            for j in self._rows
+            for j in rows
         )
 
-    def exponent(self, blocks: Blocks) -> ComplexArray:
-        """Kelvins away from the reference, in the sensor's own row."""
-        away = np.nan_to_num(blocks.temperature - self._reference)
-        return _UNIT * away[:, None, None] * np.eye(len(self.rig))[:, self._rows].astype(complex)
+    def rate(self, blocks: Blocks) -> FloatArray:
+        """Thousandths per kelvin away from the reference."""
+        return _UNIT * np.nan_to_num(blocks.temperature - self._reference)
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Drifts beyond what is stated."""
