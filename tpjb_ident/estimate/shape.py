@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.arrowhead import NUMBERS
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.term import Fitted
@@ -66,14 +66,29 @@ def over_frequency(model: str, group: IntArray, omega: FloatArray, middle: Float
 
     `group`, `omega` (P,) [rad/s], `middle` (G,) [rad/s].
     """
-    w = omega / middle[group]
-    columns = np.zeros((len(w), NUMBERS, 4 * MODELS[model]))
-    for k in range(4):
-        columns[:, k, k] = 1.0
-        columns[:, 4 + k, 4 + k] = w
-        if model == "K-C-M":
-            columns[:, k, 8 + k] = -(w**2)
-    return Shape(group, columns, len(middle))
+    return Shape(group, power_columns(omega / middle[group], MODELS[model]), len(middle))
+
+
+def power_columns(w: FloatArray, count: int) -> FloatArray:
+    """Change of the eight numbers of h = K + i w C + (i w)^2 M + .. by the entries of each matrix, (n, 8, 4 count)."""
+    powers = (1j * w)[:, None] ** np.arange(count)
+    parts = np.stack([powers.real, powers.imag], axis=1)
+    return np.einsum("npk,ab->npakb", parts, np.eye(4)).reshape(len(w), NUMBERS, 4 * count)
+
+
+def remainder(columns: FloatArray, values: FloatArray, root: FloatArray, used: BoolArray | slice) -> FloatArray:
+    """What a model, fitted to some of n points, leaves of c sets of numbers of all of them, (n, 8, c).
+
+    `columns` (n, 8, k), `values` (n, 8, c), both weighed by `root` (n, 8, 8), `used` (n,).
+    """
+    design, rows = root @ columns, root @ values
+    return np.asarray(rows - design @ _numbers(design[used], rows[used]))
+
+
+def _numbers(design: FloatArray, rows: FloatArray) -> FloatArray:
+    """Least squares of rows (n, 8, c) over a design (n, 8, k), (k, c)."""
+    k, c = design.shape[2], rows.shape[2]
+    return np.asarray(np.linalg.lstsq(design.reshape(-1, k), rows.reshape(-1, c), rcond=None)[0])
 
 
 def free_force(D: ComplexArray, F: ComplexArray) -> tuple[Shape, ComplexArray]:
@@ -103,7 +118,6 @@ def nearest(shape: Shape, h: ComplexArray, weight: FloatArray) -> FloatArray:
         used = np.flatnonzero((shape.group == g) & np.isfinite(numbers).all(axis=1) & (weight > 0))
         if not len(used):
             continue
-        root = np.sqrt(weight[used])
-        design = (shape.columns[used] * root[:, None, None]).reshape(-1, shape.numbers)
-        x[g] = np.linalg.lstsq(design, (numbers[used] * root[:, None]).ravel(), rcond=None)[0]
+        root = np.sqrt(weight[used])[:, None, None]
+        x[g] = _numbers(shape.columns[used] * root, numbers[used, :, None] * root)[:, 0]
     return x

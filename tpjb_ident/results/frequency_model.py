@@ -14,7 +14,7 @@ from scipy.special import chdtrc
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.errors import ArgumentError
-from tpjb_ident.estimate.shape import MODELS, over_frequency
+from tpjb_ident.estimate.shape import MODELS, power_columns
 from tpjb_ident.estimate.statistics import half_width
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.point_result import PointResult, by_static_point
@@ -131,8 +131,7 @@ def fit_over_frequency(
         raise ArgumentError(f"{model} needs {needed} frequencies with an answer, got {len(np.unique(omega))}")
     # Natural scales keep the normal equations well conditioned: per omega, per omega^2.
     middle = float(np.sqrt(omega.min() * omega.max()))
-    design = over_frequency(model, np.zeros(len(chosen), dtype=np.intp), omega, np.array([middle])).columns
-    assert design is not None
+    design = power_columns(omega / middle, MODELS[model])
     y, covariance = np.array([e.vector for e in chosen]), np.array([e.covariance for e in chosen])
     weight = np.linalg.inv(covariance)
     weighted = design.transpose(0, 2, 1) @ weight

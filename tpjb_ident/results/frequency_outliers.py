@@ -10,16 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.estimate.arrowhead import NUMBERS
+from tpjb_ident.estimate.shape import MODELS, power_columns, remainder
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.point_result import PointResult, by_static_point
 
 #: Frequencies from which K-C-M leaves something over when one of them is free.
 _FREQUENCIES = 4
-#: Powers of frequency in the real and the imaginary entries: of K-C-M, and one more.
-_K_C_M, _POWERS = ((0, 2), (1,)), ((0, 2, 4), (1, 3))
+#: Powers of frequency with one more than K-C-M in the real entries and in the imaginary ones.
+_SMOOTH = 5
 #: Share of H by which a point stands apart, at least: pads and pivots bend H over frequency by less.
 _NOTABLE = 0.03
 #: Distance from the nearest frequency up to which the others tell of a point, over their span.
@@ -63,30 +65,18 @@ def frequency_outlier(estimates: Sequence[DynamicStiffness]) -> tuple[int, Float
     if len(np.unique(omega)) < _FREQUENCIES:
         return None
     size = np.array([np.linalg.norm(e.h) for e in estimates])
-    y = np.array([e.vector for e in estimates]) / size[:, None]
+    y, root = np.array([e.vector for e in estimates])[:, :, None], np.eye(NUMBERS) / size[:, None, None]
     noise = sum(float(np.trace(e.covariance)) / s**2 for e, s in zip(estimates, size))
     w = omega / np.exp(np.log(omega).mean())
-    everyone = np.ones(len(w), dtype=bool)
-    smooth = float(np.sum(_remainder(w, size, y, everyone, _POWERS) ** 2)) + noise
-    distance, rest = np.zeros((len(w), 8)), np.full(len(w), np.inf)
+    smooth = float(np.sum(remainder(power_columns(w, _SMOOTH), y, root, slice(None)) ** 2)) + noise
+    distance, rest = np.zeros((len(w), NUMBERS)), np.full(len(w), np.inf)
     for k in range(len(w)):
         others = np.arange(len(w)) != k
         if np.abs(w[others] - w[k]).min() > _REACH * np.ptp(w[others]):
             continue  # the others are too far off to tell
-        left = _remainder(w, size, y, others, _K_C_M)
+        left = remainder(power_columns(w, MODELS["K-C-M"]), y, root, others)[:, :, 0]
         distance[k], rest[k] = left[k], np.sum(left[others] ** 2) + noise
     place, second = np.argsort(rest)[:2].tolist()
     is_clear = _CLEARLY * rest[place] < smooth and _ALONE * rest[place] < rest[second]
     is_apart = np.linalg.norm(distance[place]) > _NOTABLE and is_clear
     return (place, distance[place] * size[place]) if is_apart else None
-
-
-def _remainder(
-    w: FloatArray, size: FloatArray, y: FloatArray, used: BoolArray, powers: tuple[tuple[int, ...], ...]
-) -> FloatArray:
-    """What powers of frequency w (n,), fitted to some estimates, leave of all of them, (n, 8) in shares of their H."""
-    parts = []
-    for numbers, exponents in zip(np.split(y, 2, axis=1), powers):
-        columns = w[:, None] ** np.array(exponents) / size[:, None]
-        parts.append(numbers - columns @ np.linalg.lstsq(columns[used], numbers[used], rcond=None)[0])
-    return np.concatenate(parts, axis=1)

@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from rigdata.arrays import ComplexArray, IntArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, totals
+from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State, film_force_rows, force_rows, with_factor
-from tpjb_ident.estimate.shape import over_frequency, real_numbers
+from tpjb_ident.estimate.shape import MODELS, power_columns, real_numbers, remainder
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION, Additive, Fitted, Parameter
 
@@ -53,43 +53,31 @@ def with_doubted_mass(rig: Rig, blocks: Blocks, group: IntArray, solution: Solut
 
     `group` (P,) of every point in the solution, `compliance` (2, 2) of the springs under the housing [m/N].
     """
-    groups, first = np.unique(group, return_index=True)
-    runs = np.maximum(totals(blocks.point, np.ones(len(blocks)), len(group)), 1.0)
-    omega = (totals(blocks.point, blocks.omega, len(group)) / runs)[first]
-    h = solution.h[first] + rig.bare.at(omega)
+    groups, first = np.unique(group[blocks.point], return_index=True)
+    omega, point = blocks.omega[first], blocks.point[first]
     flexible = (omega**2)[:, None, None] * compliance
+    h = solution.h[point] + rig.bare.at(omega)
     change = -flexible @ np.linalg.inv(np.eye(2) - rig.mass * flexible) @ h
-    loads: dict[tuple[object, ...], list[int]] = {}
-    for k, p in enumerate(first):
-        if np.isfinite(h[k]).all():
-            loads.setdefault(blocks.points[p].static_key, []).append(k)
+    values = np.stack([real_numbers(h), real_numbers(change)], axis=2)
+    keys = [blocks.points[p].static_key if np.isfinite(solution.h[p]).all() else None for p in point]
     products, spare = np.zeros((2, 2)), 0
-    for places in loads.values():
+    for load in dict.fromkeys(keys):
+        places = [k for k, key in enumerate(keys) if load and key == load]
         if len(np.unique(np.round(omega[places], 6))) >= _FREQUENCIES:
-            rows = _beyond_model(omega[places], h[places], change[places], solution.records[groups[places]])
-            products, spare = products + rows.T @ rows, spare + len(rows) - 12
-    chi_square, along, size = products[0, 0], products[0, 1], products[1, 1]
+            columns = power_columns(omega[places] / omega[places].max(), MODELS["K-C-M"])
+            root = np.linalg.inv(np.linalg.cholesky(solution.records[groups[places]]))
+            rows = remainder(columns, values[places], root, slice(None)).reshape(-1, 2)
+            products, spare = products + rows.T @ rows, spare + len(rows) - columns.shape[2]
+    (chi_square, along), (_, size) = products
     if not size > 0:
         return rig
-    heavier, error, gone = along / size, size**-0.5, along**2 / size
-    left = chi_square - gone
-    is_clear = gone > _CLEARLY * max(left / spare, 1.0) and left < _LEFT * chi_square + _NOISE * spare
-    ratio = (rig.mass - heavier) / max(rig.mass, 1e-9)
-    if not (is_clear and 1 / _PLAUSIBLE < ratio < _PLAUSIBLE and abs(heavier) > 3 * rig.mass_uncertainty):
+    lighter, error, left = along / size, size**-0.5, chi_square - along**2 / size
+    is_clear = chi_square - left > _CLEARLY * max(left / spare, 1.0) and left < _LEFT * chi_square + _NOISE * spare
+    mass = rig.mass - lighter
+    is_plausible = rig.mass / _PLAUSIBLE < mass < rig.mass * _PLAUSIBLE
+    if not (is_clear and is_plausible and abs(lighter) > 3 * rig.mass_uncertainty):
         return rig
-    text = f"over frequency the cells show the inertia of {rig.mass - heavier:.3g} kg (standard error {error:.2g} kg)"
+    text = f"over frequency the cells show the inertia of {mass:.3g} kg (standard error {error:.2g} kg)"
     condition = Condition("housing-mass-doubtful", f"{text}, not of {rig.mass:.3g} kg")
-    doubt = float(CHANGE_AS_DEVIATION * (abs(heavier) + 2 * error))
+    doubt = float(CHANGE_AS_DEVIATION * (abs(lighter) + 2 * error))
     return replace(rig, mass_uncertainty=doubt, contradicted={**rig.contradicted, Mass.name: (condition,)})
-
-
-def _beyond_model(omega: FloatArray, h: ComplexArray, change: ComplexArray, covariance: FloatArray) -> FloatArray:
-    """What K-C-M leaves of h and of a change of it (n, 2, 2), of unit variance, (8 n, 2)."""
-    shape = over_frequency(
-        "K-C-M", np.zeros(len(h), dtype=np.intp), omega, np.array([np.sqrt(omega.min() * omega.max())])
-    )
-    numbers = np.stack([real_numbers(h), real_numbers(change)], axis=2)
-    white = np.linalg.solve(np.linalg.cholesky(covariance), np.concatenate([shape.columns, numbers], axis=2))
-    basis = np.linalg.qr(white[:, :, :-2].reshape(-1, shape.numbers))[0]
-    rows = white[:, :, -2:].reshape(-1, 2)
-    return np.asarray(rows - basis @ (basis.T @ rows))
