@@ -63,7 +63,7 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
     solution = solver(rig).run()
     learnt = learnt_rig(rig, solution)
     if learnt is not rig:
-        solution = solver(learnt).begun(solution).run()
+        solution = solver(learnt).run()
     _check_accelerometers(observations, learnt.of("acceleration"), blocks, solution)
     return solution
 

@@ -48,10 +48,6 @@ class State:
         change = blocks.miss.real[:, None, None] * self.slope[blocks.point]
         return self.h[blocks.point] + np.where(known, change, 0.0) + self.bare
 
-    def cell_force(self, rig: Rig, blocks: Blocks) -> ComplexArray:
-        """Force of the cells along X and Y, the film's without the housing's inertia, (n, 2) [N]."""
-        return np.einsum("nij,nj->ni", self.at_run(blocks), self.u[:, :2]) - rig.mass * self.u[:, 2:]
-
     def reading(self, rig: Rig, blocks: Blocks) -> ComplexArray:
         """T B u, (n, m + 2)."""
         return np.einsum("nri,ni->nr", with_factor(self.factor, motion_matrix(rig, blocks, self)), self.u)
@@ -67,15 +63,19 @@ def motion_matrix(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
     B[:, cells, :2] = along[:, cells] @ h
     B[:, cells, 2:] = -rig.mass * along[:, cells]
     B[:, accelerometers, 2:] = along[:, accelerometers]
-    square = (blocks.omega**2)[:, None, None]
-    if rig.mount == "cells":
-        B[:, m:, :2] = square * (state.compliance @ h)
-        B[:, m:, 2:] = np.eye(2) - square * rig.mass * state.compliance
-    else:
-        B[:, m:, :2] = -square * (state.floating + state.compliance @ h)
-        B[:, m:, 2:] = np.eye(2)
+    B[:, m:] = housing_rows(rig, blocks, state, h)
     B[:, :m][~blocks.present] = 0.0
     return B
+
+
+def housing_rows(rig: Rig, blocks: Blocks, state: State, h: ComplexArray) -> ComplexArray:
+    """Rows of the housing, (n, 2, 4); `h` (n, 2, 2) of the runs."""
+    square = (blocks.omega**2)[:, None, None]
+    if rig.mount == "cells":
+        moved, own = square * (state.compliance @ h), square * rig.mass * state.compliance
+    else:
+        moved, own = -square * (state.floating + state.compliance @ h), np.zeros_like(h)
+    return np.concatenate([moved, np.eye(2) - own], axis=2)
 
 
 def with_factor(factor: ComplexArray, B: ComplexArray) -> ComplexArray:

@@ -29,13 +29,13 @@ def slopes_over_load(points: Sequence[OperatingPoint], h: ComplexArray) -> tuple
             values = h[members]
             slope[members] = _log_gradient(values.real, log_load) + 1j * _log_gradient(values.imag, log_load)
             known[members] = True
+    told = np.flatnonzero(known).tolist()
     for i in np.flatnonzero(~known).tolist():
-        j = _nearest(points, i, known)
-        if j is not None:
-            ratio = points[i].excitation / points[j].excitation
-            slope[i] = slope[j].real + 1j * slope[j].imag * ratio
-    borrowed = [i for i in np.flatnonzero(~known) if _nearest(points, int(i), known) is not None]
-    known[borrowed] = True
+        like = [j for j in told if points[j].static_key == points[i].static_key]
+        if like:
+            j = min(like, key=lambda j: abs(points[j].excitation - points[i].excitation))
+            slope[i] = slope[j].real + 1j * slope[j].imag * points[i].excitation / points[j].excitation
+            known[i] = True
     return slope, known
 
 
@@ -47,10 +47,3 @@ def _log_gradient(values: FloatArray, log_load: FloatArray) -> FloatArray:
     logarithm = np.log(np.where(one_sign, np.abs(values), 1.0))
     power = values * np.gradient(logarithm, log_load, axis=0, edge_order=order)
     return np.where(one_sign, power, plain)
-
-
-def _nearest(points: Sequence[OperatingPoint], i: int, known: BoolArray) -> int | None:
-    """Point with a known slope at the same load, direction and speed, nearest in excitation."""
-    p = points[i]
-    like = [j for j in np.flatnonzero(known).tolist() if points[j].static_key == p.static_key]
-    return min(like, key=lambda j: abs(points[j].excitation - p.excitation), default=None)

@@ -121,16 +121,6 @@ class Solver:
         self.moved = False
         self.housing_noise = HOUSING_NOISE[rig.mount]
 
-    def begun(self, solution: Solution) -> Solver:
-        """The same, from where another solve of the blocks ended; what is new to it begins at its prior."""
-        for term in self.terms:
-            fitted = solution.fitted.get(term.name)
-            if fitted is not None and len(fitted.value) == len(term.parameters):
-                (self.by_point if term.points else self.shared).put(term, fitted.value)
-        self.h = np.where(np.isfinite(solution.h), solution.h, self.h)
-        self.housing_noise = solution.housing_noise
-        return self
-
     def run(self) -> Solution:
         """Steps until H rests; where it runs away, once more without it: no point has an answer then."""
         try:
@@ -220,7 +210,7 @@ class Solver:
 
     def _apply(self, blocks: Blocks, state: State, additive: bool) -> None:
         for term in self.terms:
-            if term.additive == additive:
+            if isinstance(term, Additive) == additive:
                 term.apply(blocks, state, state.parameters[term.name])
 
     def _rows(self, blocks: Blocks, state: State, scatter: FloatArray) -> _Rows:

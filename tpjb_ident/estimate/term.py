@@ -71,8 +71,6 @@ class Term:
         than the prior.
     never_estimated : bool
         Whether no record can tell them: their priors pass into the covariance, whatever the equations seem to say.
-    additive : bool
-        Whether it adds to readings, and so is applied after what multiplies them.
     sentence, scale : str, float
         Said of every parameter `p` that the records tell, with its `value` and its `error` times the scale.
 
@@ -86,7 +84,6 @@ class Term:
     name = ""
     always_estimated = False
     never_estimated = False
-    additive = False
     sentence = ""
     scale = 1.0
 
@@ -180,8 +177,6 @@ class Factor(Term):
 
 class Additive(Term):
     """A term that adds to readings."""
-
-    additive = True
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
         """Add to the state's shift."""

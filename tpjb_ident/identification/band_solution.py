@@ -108,13 +108,12 @@ class _Task:
     taken_off: Mapping[str, float]  #: rates of devices' clocks, put right before
     held: Solution | None  #: whose scatter, weights and shared parameters stay
 
-    def solved(self, start: ComplexArray, shape: Shape, begun: Solution | None = None) -> Solution:
-        """One solve from a start (P, 2, 2), NaN where points take no part, or from where another one ended."""
+    def solved(self, start: ComplexArray, shape: Shape) -> Solution:
+        """One solve from a start (P, 2, 2), NaN where points take no part."""
         if self.held is not None:
             scatter = self.held.scatter
             shape = replace(shape, scatter=scatter.fixed(shape.groups, scatter.weights), held=self.held.fitted)
-        solver = Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape)
-        return (solver if begun is None else solver.begun(begun)).run()
+        return Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape).run()
 
     def with_gains(self, deviation: FloatArray) -> _Task:
         """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
@@ -144,7 +143,7 @@ def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution,
     rig = learnt_mass(learnt_rig(task.rig, solution), data.blocks, data.line, solution)
     if rig is not task.rig:
         task = replace(task, rig=rig).with_gains(np.hypot(by_load, size * wide * spare))
-        solution = task.solved(start, shape, solution)
+        solution = task.solved(start, shape)
     return solution, task, size * float(spare.any())
 
 

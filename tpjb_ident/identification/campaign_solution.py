@@ -97,7 +97,7 @@ def solve_campaign(
     learnt = learnt_rig(last.rig, last.solution)
     learnt = learnt_mass(learnt, blocks, np.arange(len(blocks.points)), last.solution)
     if learnt is not last.rig:
-        again = solver(learnt, blocks, start, rates).begun(last.solution).run()
+        again = solver(learnt, blocks, start, rates).run()
         last = replace(last, rig=learnt, solution=again)
     force = force_pickup([digest.mains_force for digest in digests])
     pickup, fits = _mains(points, digests, last, force) if correct else (None, {})

@@ -1,5 +1,7 @@
 """Angles of the sensors' axes, as far as the manifest states their uncertainty: one number a sensor."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rigdata.arrays import ComplexArray
@@ -21,12 +23,9 @@ class Axis(Additive):
         )
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
-        """(-sin, cos) times the vector that the sensor measures."""
+        """What the sensors would read across their axes, (-sin, cos) times the vector that they measure."""
         columns = self.no_columns(blocks)
-        force = state.cell_force(self.rig, blocks)
-        vectors = {"displacement": state.u[:, :2], "force": force, "acceleration": state.u[:, 2:]}
-        for k, j in enumerate(self._rows):
-            across = np.stack([-blocks.along[:, j, 1], blocks.along[:, j, 0]], axis=1)
-            measured = vectors[self.rig.sensors[j].quantity]
-            columns[:, j, k] = state.factor[:, j] * np.einsum("na,na->n", across, measured) * blocks.present[:, j]
+        across = np.stack([-blocks.along[:, :, 1], blocks.along[:, :, 0]], axis=2)
+        turned = state.reading(self.rig, replace(blocks, along=across))
+        columns[:, self._rows, np.arange(self.width)] = turned[:, self._rows]
         return columns

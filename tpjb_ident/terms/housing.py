@@ -13,7 +13,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, film_force, vector
-from tpjb_ident.estimate.equation import State
+from tpjb_ident.estimate.equation import State, housing_rows
 from tpjb_ident.estimate.term import OUT_OF_STEP, Fitted, Parameter, Term
 
 _NANOMETRE = 1e-9
@@ -109,26 +109,15 @@ class Housing(Term):
         return np.asarray(square * (moved + film_force(self.rig, blocks) @ compliance))
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
-        """In the housing's own rows."""
+        """In the housing's own rows, which are linear in every single parameter."""
         columns = self.no_columns(blocks)
-        m, square = blocks.z.shape[1], blocks.omega**2
-        if self.rig.mount != "cells":
-            moved = -square[:, None] * state.u[:, :2]
-            if self.rig.mount == "unknown":
-                columns[:, m:, 0] = moved
-                return columns
-            columns[:, m, :2], columns[:, m + 1, 2:4] = moved, moved
-            force = np.einsum("nij,nj->ni", state.at_run(blocks), state.u[:, :2])
-            force = -square[:, None] * _NANOMETRE * force
-            columns[:, m, 4], columns[:, m + 1, 5] = force[:, 0], force[:, 1]
-            columns[:, m:, 6] = -1j * moved
-            return columns
-        force = state.cell_force(self.rig, blocks)
-        loss = complex(1 - 1j * state.parameters[self.name][3])
-        scaled = square[:, None] * _NANOMETRE * loss * force
-        columns[:, m, 0], columns[:, m + 1, 1] = scaled[:, 0], scaled[:, 1]
-        columns[:, m, 2], columns[:, m + 1, 2] = scaled[:, 1], scaled[:, 0]
-        columns[:, m:, 3] = -1j * square[:, None] * np.einsum("ij,nj->ni", state.compliance / loss, force)
+        m, h, value = blocks.z.shape[1], state.at_run(blocks), state.parameters[self.name]
+        for k, unit in enumerate(np.eye(len(value))):
+            more, less = replace(state), replace(state)
+            self.apply(blocks, more, value + unit)
+            self.apply(blocks, less, value - unit)
+            rows = [housing_rows(self.rig, blocks, changed, h) for changed in (more, less)]
+            columns[:, m:, k] = np.einsum("nij,nj->ni", (rows[0] - rows[1]) / 2, state.u)
         return columns
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, film_force_rows, force_rows, with_factor
+from tpjb_ident.estimate.equation import State
 from tpjb_ident.estimate.shape import MODELS, power_columns, real_numbers, remainder
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION, Additive, Fitted, Parameter
@@ -38,10 +38,8 @@ class Mass(Additive):
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """-m a in the cells, and in what springs under the housing make of their force."""
-        inertia = -self.rig.mass * state.u[:, 2:, None]
-        if self.rig.mount == "cells":
-            return film_force_rows(self.rig, blocks, state, inertia)
-        return with_factor(state.factor, force_rows(self.rig, blocks, inertia))
+        heavier = replace(self.rig, mass=2 * self.rig.mass)
+        return (state.reading(heavier, blocks) - state.reading(self.rig, blocks))[:, :, None]
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """What the frequencies said of it."""
