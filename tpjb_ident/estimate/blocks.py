@@ -181,5 +181,7 @@ def film_force(rig: Rig, blocks: Blocks) -> ComplexArray:
 
 
 def totals(place: IntArray, values: FloatArray | BoolArray, number: int) -> FloatArray:
-    """Sums of values (n,) by place (n,), (number,)."""
-    return np.asarray(np.bincount(place, weights=values, minlength=number), dtype=float)
+    """Sums of values (n, ..) by place (n,), (number, ..)."""
+    sums = np.zeros((number, *values.shape[1:]))
+    np.add.at(sums, place, values)
+    return sums

@@ -86,16 +86,6 @@ def with_factor(factor: ComplexArray, B: ComplexArray) -> ComplexArray:
     return result
 
 
-def force_rows(rig: Rig, blocks: Blocks, force: ComplexArray) -> ComplexArray:
-    """Forces (n, 2, ..) as the cells would read them, nothing in the other rows, (n, m + 2, ..)."""
-    n, m = blocks.z.shape
-    rows = np.zeros((n, m + HOUSING_ROWS, *force.shape[2:]), complex)
-    cells = rig.of("force")
-    seen = blocks.along[:, cells] * blocks.present[:, cells, None]
-    rows[:, cells] = np.einsum("nja,na...->nj...", seen, force)
-    return rows
-
-
 def film_columns(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
     """d(T B u) / d(h_xx, h_xy, h_yx, h_yy), complex, (n, m + 2, 4): h at the set point moves h at the run's load."""
     n = len(blocks)
@@ -126,8 +116,12 @@ def film_change_rows(rig: Rig, blocks: Blocks, state: State, changes: ComplexArr
 
 def film_force_rows(rig: Rig, blocks: Blocks, state: State, force: ComplexArray) -> ComplexArray:
     """Forces of the film (n, 2, ..) as the cells read them and the housing answers, (n, m + 2, ..)."""
-    rows = with_factor(state.factor, force_rows(rig, blocks, force))
+    n, m = blocks.z.shape
+    rows = np.zeros((n, m + HOUSING_ROWS, *force.shape[2:]), complex)
+    cells = rig.of("force")
+    seen = blocks.along[:, cells] * (state.factor * blocks.present)[:, cells, None]
+    rows[:, cells] = np.einsum("nja,na...->nj...", seen, force)
     square = (blocks.omega**2).reshape((-1,) + (1,) * (force.ndim - 1))
     sign = 1.0 if rig.mount == "cells" else -1.0
-    rows[:, blocks.z.shape[1] :] = sign * square * np.einsum("ij,nj...->ni...", state.compliance, force)
+    rows[:, m:] = sign * square * np.einsum("ij,nj...->ni...", state.compliance, force)
     return rows

@@ -106,10 +106,10 @@ class Scatter:
         used = weights > 0.05
         # where too few good runs remain all count in full, and nothing has to be made up for
         corrected = np.where(weights < 1.0, weights / _expected(fit.rows), 1.0)
-        chi = _by_point(group, corrected[:, None] * fit.force, points)
+        chi = totals(group, corrected[:, None] * fit.force, points)
         rows = totals(group, np.asarray(used), points)[:, None]
-        information = _by_point(group, corrected[:, None] * fit.information, points)
-        spare = np.where(solvable[:, None], rows - _by_point(group, used[:, None] * fit.spent, points), 0.0)
+        information = totals(group, corrected[:, None] * fit.information, points)
+        spare = np.where(solvable[:, None], rows - totals(group, used[:, None] * fit.spent, points), 0.0)
         usable = (spare > _LEAST_SPARE) & (information > 0)
         gain = np.where(usable, information * spare / np.maximum(rows, 1.0), 1.0)
         unusual = _unusual(
@@ -167,11 +167,6 @@ def _alike(moment: FloatArray, freedom: FloatArray) -> FloatArray:
     weight = freedom + 1e-9
     mean = np.sum(weight * moment, axis=-1, keepdims=True) / np.sum(weight, axis=-1, keepdims=True)
     return np.asarray((freedom * moment + _ALIKE * mean) / (freedom + _ALIKE))
-
-
-def _by_point(group: IntArray, values: FloatArray, points: int) -> FloatArray:
-    """Sums of the columns of values (n, 4) by point, (P, 4)."""
-    return np.stack([totals(group, column, points) for column in values.T], axis=1)
 
 
 def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.shape import complex_matrix
+from tpjb_ident.estimate.shape import complex_matrix, real_numbers
 
 MAINS_ON_LINE = "mains on excitation line"
 MAINS_CORRECTED = "mains corrected"
@@ -120,8 +120,7 @@ class MainsEquations:
 
     def start(self, h: ComplexArray) -> FloatArray:
         """Unknowns for a given H: the angles are those of what H leaves of the displacements; `h` (2, 2) [N/m]."""
-        scaled = h.ravel() / self.scale
-        return np.concatenate([scaled.real, scaled.imag, self._angles(h).ravel()])
+        return np.concatenate([real_numbers(h) / self.scale, self._angles(h).ravel()])
 
     def _angles(self, h: ComplexArray) -> FloatArray:
         """Angles for given H, batched: (..., 2, 2) -> (..., g, m)."""
