@@ -81,10 +81,6 @@ class Sums:
         self.G += flat.T @ flat
         self.g_t += flat.T @ r.reshape(-1)
 
-    def conditional(self, numbers: int) -> FloatArray:
-        """Covariance of the first `numbers` of every point with all parameters given, (P, numbers, numbers)."""
-        return np.asarray(np.linalg.inv(self.A[:, :numbers, :numbers]), dtype=float)
-
     def drop(self, points: BoolArray, numbers: int) -> None:
         """Leave points (P,) out that have no answer, `numbers` of H each."""
         self.A[points], self.E[points], self.g_h[points] = 0.0, 0.0, 0.0

@@ -132,7 +132,8 @@ class Solver:
 
     def _settled(self) -> Solution:
         # runs that stand apart are told at the robust start, before one of them pulls the others away
-        self.scatter = self._scatter(self._sums(first=True)[1], 0)
+        fit = self._sums(first=True)[1]
+        self.scatter = self.scatter.updated(self.group, fit, self.answered, 0)
         for count in range(1, _STEPS + 1):
             sums, fit = self._sums()
             last = step(sums, self.shared.prior(), self.by_point.prior())
@@ -142,7 +143,7 @@ class Solver:
                 misfit = [state.reading(self.rig, blocks)[:, m:] for _, blocks, state in self._states()]
                 self.housing_noise = housing_noise(self.rig, self.blocks, self.u, np.concatenate(misfit))
             if self.scatter.follows and count < _SCATTER_STEPS:
-                self.scatter = self._scatter(fit, count)
+                self.scatter = self.scatter.updated(self.group, fit, self.answered, count)
             elif count > 3 and change < _CONVERGED:
                 break
         sums, fit = self._sums()
@@ -153,9 +154,6 @@ class Solver:
         """Values of a term's parameters."""
         table = self.by_point if term.points else self.shared
         return table.of(term, table.value)
-
-    def _scatter(self, fit: Residuals, count: int) -> Scatter:
-        return self.scatter.updated(self.group, fit, self.answered, count)
 
     def _states(self) -> Iterator[tuple[slice, Blocks, State]]:
         """Places of some blocks at a time, the blocks, and the last iterate for them."""
@@ -182,7 +180,7 @@ class Solver:
             self.answered &= are_told(sums.A[:, : self.shape.numbers, : self.shape.numbers])
             self.solvable &= self.answered[self.shape.group]
         sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)), self.shape.numbers)  # none of its blocks counts
-        conditional = sums.conditional(self.shape.numbers)
+        conditional = np.linalg.inv(sums.A[:, : self.shape.numbers, : self.shape.numbers])
         parts = [rows.residuals(weight, conditional[group]) for group, rows, weight in fits]
         joined = (np.concatenate([getattr(part, name) for part in parts]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)

@@ -144,32 +144,20 @@ def phasor_table(
     `D`, `F` (n, 2) [m], [N], `direction` (n,), `reference` (n, 2).
     """
     R, f = r_matrix(D, F)
-    # the block of R that both force equations share, and the forces
-    displacement, force = np.ascontiguousarray(R[0::2, 0:2]), f.reshape(-1, 2)
-    n = len(displacement)
+    # the block of R that both force equations share, the forces, and instruments
+    given = [R[0::2, 0:2], f.reshape(-1, 2)] + ([] if reference is None else [np.asarray(reference, dtype=complex)])
+    n = len(given[0])
     labels = np.arange(n) if direction is None else np.asarray(direction).ravel()
     if len(labels) != n:
         raise ArgumentError(f"direction must have one label per window: {n} windows, {len(labels)} labels")
-    valid = np.asarray(np.isfinite(displacement).all(axis=1) & np.isfinite(force).all(axis=1))
-    instruments = None
-    if reference is not None:
-        instruments = np.asarray(reference, dtype=complex)
-        if instruments.shape != displacement.shape:
-            raise ArgumentError(f"reference must be {displacement.shape} like D, got {instruments.shape}")
-        valid &= np.isfinite(instruments).all(axis=1)
-        instruments = instruments[valid]
-        instruments = instruments / _scale(instruments)
-    d_scale, f_scale = _scale(displacement[valid]), _scale(force[valid])
+    if given[-1].shape != (n, 2):
+        raise ArgumentError(f"reference must be {(n, 2)} like D, got {given[-1].shape}")
+    valid = np.isfinite(np.concatenate(given, axis=1)).all(axis=1)
+    scales = [_scale(phasors[valid]) for phasors in given]
+    tables = [phasors[valid] / scale for phasors, scale in zip(given, scales)]
     _, codes = np.unique(labels[valid], return_inverse=True)
-    return PhasorTable(
-        displacement[valid] / d_scale,
-        force[valid] / f_scale,
-        codes.astype(np.intp).ravel(),
-        d_scale,
-        f_scale,
-        instruments,
-        valid,
-    )
+    instruments = None if reference is None else tables[2]
+    return PhasorTable(*tables[:2], codes.astype(np.intp).ravel(), *scales[:2], instruments, valid)
 
 
 def _scale(phasors: ComplexArray) -> float:

@@ -192,7 +192,11 @@ def with_probe_doubts(
     """
     if not clearance or not clearance > 0:
         return tuple(points)
-    sentences = list(_sweeps(swept, clearance).values())
+    by_probe: dict[str, str] = {}
+    for (run, name), half in swept.items():
+        if not _TRAVEL[0] * clearance < half < _TRAVEL[1] * clearance:
+            by_probe[name] = f"{name} travels {1e6 * half:.3g} um to either side in the sweep {run}"
+    sentences = list(by_probe.values())
     places = np.array([p.position for p in points if np.isfinite(p.position).all()]).reshape(-1, 2)
     distance = float(np.hypot(*np.ptp(places, axis=0))) if len(places) else 0.0
     if distance > _APART * clearance:
@@ -205,15 +209,6 @@ def with_probe_doubts(
     text = f"{'; '.join(sentences)} (clearance {1e6 * clearance:.0f} um): {cure}"
     doubts = holding((sentences, "probes-contradict-clearance", text))
     return tuple(replace(point, quality=merged(point.quality, doubts)) for point in points)
-
-
-def _sweeps(swept: Mapping[tuple[str, str], float], clearance: float) -> dict[str, str]:
-    """By probe, what it says of a sweep in which it travels too little or too far."""
-    table: dict[str, str] = {}
-    for (run, name), half in swept.items():
-        if not _TRAVEL[0] * clearance < half < _TRAVEL[1] * clearance:
-            table[name] = f"{name} travels {1e6 * half:.3g} um to either side in the sweep {run}"
-    return table
 
 
 def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float]]:
