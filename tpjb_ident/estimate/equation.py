@@ -90,11 +90,10 @@ def film_columns(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
     """d(T B u) / d(h_xx, h_xy, h_yx, h_yy), complex, (n, m + 2, 4): h at the set point moves h at the run's load."""
     n = len(blocks)
     h = state.h[blocks.point]
-    growth = np.ones((n, 2, 2))
-    known = state.slope_known[blocks.point]
+    known = blocks.miss.real * state.slope_known[blocks.point]
     size = np.where(h.real == 0.0, 1.0, h.real)
     power = np.clip(state.slope[blocks.point].real / size, -2.0, 2.0)
-    growth[known] += (blocks.miss.real[:, None, None] * power)[known]
+    growth = 1 + known[:, None, None] * power
     return film_change_rows(rig, blocks, state, entry_changes(growth.reshape(n, 4)))
 
 

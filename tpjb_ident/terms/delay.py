@@ -25,16 +25,12 @@ class Delay(Factor):
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
         self._omega = blocks.usual_omega
-        deviations: dict[str, float] = {}
-        for sensor in rig.sensors:
-            if sensor.delay_uncertainty:
-                device = sensor.device or sensor.quantity
-                deviations[device] = max(sensor.delay_uncertainty, deviations.get(device, 0.0))
-        self.parameters = tuple(Parameter(name, "ms", dev / _MILLISECOND) for name, dev in deviations.items())
-        self.sensors = np.zeros((len(rig), len(deviations)))
-        for k, device in enumerate(deviations):
-            for j, sensor in enumerate(rig.sensors):
-                self.sensors[j, k] = (sensor.device or sensor.quantity) == device and sensor.delay_uncertainty > 0
+        devices = np.array([sensor.device or sensor.quantity for sensor in rig.sensors])
+        deviation = np.array([sensor.delay_uncertainty for sensor in rig.sensors])
+        names = list(dict.fromkeys(devices[deviation > 0].tolist()))
+        self.sensors = ((devices[:, None] == np.array(names, dtype=str)) & (deviation[:, None] > 0)).astype(float)
+        largest = (self.sensors * deviation[:, None]).max(axis=0) / _MILLISECOND
+        self.parameters = tuple(Parameter(name, "ms", float(size)) for name, size in zip(names, largest))
 
     def rate(self, blocks: Blocks) -> ComplexArray:
         """-i omega, per ms."""

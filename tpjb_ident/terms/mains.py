@@ -105,11 +105,9 @@ class MainsEquations:
         g, m = len(self.D), len(self.patterns)
         h, clean = self.h(x), self.D - self.vectors(x)
         slope = np.zeros((g, 2, 8 + g * m), dtype=complex)
-        for a in range(2):
-            for b in range(2):
-                column = -self.scale * clean[:, b] / self.sigma
-                slope[:, a, 2 * a + b] = column
-                slope[:, a, 4 + 2 * a + b] = 1j * column
+        columns = -self.scale * clean / self.sigma[:, None]
+        slope[:, 0, 0:2], slope[:, 1, 2:4] = columns, columns
+        slope[:, :, 4:8] = 1j * slope[:, :, 0:4]
         turn = 1j * np.exp(1j * x[8:].reshape(g, m))
         push = h @ self.patterns.T
         rows = np.arange(g)
