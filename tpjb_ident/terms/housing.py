@@ -211,27 +211,25 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
     none = np.zeros_like(x)
     design = np.stack([np.stack([x, none, y], axis=1), np.stack([none, y, x], axis=1)], axis=1)
     lines = np.round(np.log(blocks.omega) / _ONE_LINE)
-    rows = rig.of("acceleration")
-    noise = np.sqrt(blocks.noise_power(rows))
+    noise = np.sqrt(blocks.noise_power(rig.of("acceleration")))
     lines[~(np.linalg.norm(acceleration, axis=1) > 2 * _CLEAR * noise)] = np.nan
-    supports, places, left, judged = [], [], 0.0, 0.0
+    low, supports, left, judged = [], 0, 0.0, 0.0
     usable = np.unique(lines[np.isfinite(lines)])
     for place, line in enumerate(usable):
         pushes, shown = design[lines == line].reshape(-1, 3), acceleration[lines == line].ravel()
         support, _, rank, _ = np.linalg.lstsq(np.nan_to_num(pushes), shown, rcond=1e-3)
         if rank == 3 and len(pushes) > 3:
-            supports.append(support)
-            places.append(place)
+            supports += 1
+            low += [support] if 4 * place <= len(usable) else []
             left += float(np.linalg.norm(shown - pushes @ support)) ** 2 * len(pushes) / (len(pushes) - 3)
             judged += float(np.linalg.norm(shown)) ** 2
-    if len(supports) < 2 or not judged > 0.5 * float(np.linalg.norm(np.nan_to_num(acceleration))) ** 2:
+    if supports < 2 or not judged > 0.5 * float(np.linalg.norm(np.nan_to_num(acceleration))) ** 2:
         return not (blocks.windows > 1).any()
     if not left < _LEFT**2 * judged:
         return False
-    low = [support for support, place in zip(supports, places) if 4 * place <= len(usable)]
     if not low:  # nothing tells what the support is below its resonance
         return True
-    xx, yy, xy = np.mean(low[: (len(supports) + 3) // 4], axis=0)
+    xx, yy, xy = np.mean(low[: (supports + 3) // 4], axis=0)
     springs = np.array([[xx, xy], [xy, yy]])
     has_loss = np.abs(springs.imag).max() >= 2 * _LOSS * np.abs(springs).max()
     return bool(np.linalg.eigvalsh(springs.real)[0] > 0 and not has_loss)
