@@ -150,14 +150,8 @@ def stacked(
     usual: dict[str, Any] = dict.fromkeys(("z", "slope"), np.zeros(m, complex)) | dict.fromkeys(("point", "run"), 0)
     usual |= {"omega": 0.0, "present": np.zeros(m, dtype=bool), "along": np.zeros((m, 2)), "dof": 1.0, "windows": 1.0}
     usual |= {"calibration": np.zeros(m, dtype=int), "noise": np.zeros((m, m), complex), "slope_noise": np.eye(m) + 0j}
-    usual |= {
-        "time": 0.0,
-        "temperature": np.nan,
-        "miss": 0j,
-        "miss_error": 0.0,
-        "shaft": np.nan + 0j,
-        "uneven": np.zeros(2),
-    }
+    usual |= {"time": 0.0, "temperature": np.nan, "shaft": np.nan + 0j, "uneven": np.zeros(2)}
+    usual |= {"miss": 0j, "miss_error": 0.0}
     columns = {
         name: np.array([row.get(name, value) for row in rows], np.asarray(value).dtype).reshape(-1, *np.shape(value))
         for name, value in usual.items()

@@ -50,10 +50,9 @@ def with_frequency_outliers(points: Sequence[PointResult]) -> tuple[PointResult,
 def _widened(point: PointResult, deviation: FloatArray, doubt: Condition) -> PointResult:
     """The point, h by every method uncertain by a further source of one deviation (8,) [N/m]."""
     covariance = np.outer(deviation, deviation)
-    by_method = {
-        name: replace(estimate, systematic=estimate.systematic + covariance)
-        for name, estimate in point.by_method.items()
-    }
+    by_method = dict(point.by_method)
+    for name, estimate in point.by_method.items():
+        by_method[name] = replace(estimate, systematic=estimate.systematic + covariance)
     default = next(name for name, estimate in point.by_method.items() if estimate is point.stiffness)
     quality, budget = merged(point.quality, (doubt,)), {**point.budget, "other frequencies": covariance}
     return replace(point, stiffness=by_method[default], by_method=by_method, quality=quality, budget=budget)

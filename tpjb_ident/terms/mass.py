@@ -1,8 +1,7 @@
 """The housing's mass, as far as the manifest states its uncertainty: it weighs the inertia in the cells' force.
 
-An error of it goes into H. On springs it changes H by -omega^2 C (1 - omega^2 m C)^-1 H per kilogram, in Re h and Im h
-alike, as no film near K-C-M does: there several frequencies tell it, as a doubt. Of a floating housing it is an added
-mass of the film.
+On springs an error of it changes H by -omega^2 C (1 - omega^2 m C)^-1 H per kilogram, Re h and Im h alike, as no film
+near K-C-M does: several frequencies contradict it there. Of a floating housing it is an added mass of the film.
 """
 
 from dataclasses import replace
@@ -11,6 +10,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, IntArray
 from tpjb_ident.conditions import Condition
+from tpjb_ident.estimate.arrowhead import NUMBERS
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State
 from tpjb_ident.estimate.shape import MODELS, power_columns, real_numbers, remainder
@@ -23,6 +23,8 @@ _FREQUENCIES = 4
 _CLEARLY, _LEFT, _NOISE = 50.0, 0.02, 1.5
 #: Largest ratio of the true mass and the stated one, or the other way round.
 _PLAUSIBLE = 3.0
+#: Variance that every number has at least, of all: keeps computed records solvable.
+_RIDGE = 1e-9
 
 
 class Mass(Additive):
@@ -63,7 +65,9 @@ def with_doubted_mass(rig: Rig, blocks: Blocks, group: IntArray, solution: Solut
         places = [k for k, key in enumerate(keys) if load and key == load]
         if len(np.unique(np.round(omega[places], 6))) >= _FREQUENCIES:
             columns = power_columns(omega[places] / omega[places].max(), MODELS["K-C-M"])
-            root = np.linalg.inv(np.linalg.cholesky(solution.records[groups[places]]))
+            covariance = solution.records[groups[places]]
+            ridge = _RIDGE * np.trace(covariance, axis1=1, axis2=2)[:, None, None] * np.eye(NUMBERS)
+            root = np.linalg.inv(np.linalg.cholesky(covariance + ridge))
             rows = remainder(columns, values[places], root, slice(None)).reshape(-1, 2)
             products, spare = products + rows.T @ rows, spare + len(rows) - columns.shape[2]
     (chi_square, along), (_, size) = products
