@@ -165,8 +165,8 @@ class Solver:
             yield places, blocks, self._state(blocks, places, slope, with_slope & self.to_set_point)
 
     def _sums(self, first: bool = False) -> tuple[Sums, Residuals]:
-        numbers = self.shape.numbers + self.by_point.value.shape[1]
-        sums = Sums.empty(self.shape.groups, self.shared.value.size, numbers)
+        k = self.shape.numbers
+        sums = Sums.empty(self.shape.groups, self.shared.value.size, k + self.by_point.value.shape[1])
         fits = []
         for places, blocks, state in self._states():
             group = self.group[places]
@@ -177,10 +177,10 @@ class Solver:
             self._add_slopes(sums, group, weight, blocks, state)
             fits.append((group, rows, weight**2))
         if first:  # a point whose readings leave a number untold has no answer
-            self.answered &= are_told(sums.A[:, : self.shape.numbers, : self.shape.numbers])
+            self.answered &= are_told(sums.A[:, :k, :k])
             self.solvable &= self.answered[self.shape.group]
-        sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)), self.shape.numbers)  # none of its blocks counts
-        conditional = np.linalg.inv(sums.A[:, : self.shape.numbers, : self.shape.numbers])
+        sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)), k)  # none of its blocks counts
+        conditional = np.asarray(np.linalg.inv(sums.A[:, :k, :k]), dtype=float)
         parts = [rows.residuals(weight, conditional[group]) for group, rows, weight in fits]
         joined = (np.concatenate([getattr(part, name) for part in parts]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)

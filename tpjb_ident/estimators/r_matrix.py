@@ -157,7 +157,7 @@ def phasor_table(
     tables = [phasors[valid] / scale for phasors, scale in zip(given, scales)]
     _, codes = np.unique(labels[valid], return_inverse=True)
     instruments = None if reference is None else tables[2]
-    return PhasorTable(*tables[:2], codes.astype(np.intp).ravel(), *scales[:2], instruments, valid)
+    return PhasorTable(tables[0], tables[1], codes.astype(np.intp).ravel(), scales[0], scales[1], instruments, valid)
 
 
 def _scale(phasors: ComplexArray) -> float:
