@@ -177,7 +177,6 @@ def write_diagnosis_report(
     """Write report.html and its figures into an existing folder."""
     verdict = result.diagnosis.verdict
     table = before_and_after(result.diagnosis, result.identification)
-    answer, *more = verdict_sentences(campaign.id, verdict, median_deviations(table))
     points = () if result.identification is None else result.identification.points
     title = "Effects added to the model, with 95 % intervals"
     added = Table(title, ["effect", "parameter", "value"], parameter_rows(verdict))
@@ -185,8 +184,7 @@ def write_diagnosis_report(
     page = Page(
         title=f"{campaign.id}: what the model lacks",
         subtitle=campaign.description,
-        answer=answer,
-        more=more,
+        sentences=verdict_sentences(campaign.id, verdict, median_deviations(table)),
         facts=tested_facts(campaign, result.setup.bearing, points),
         values=values_table(points),
         flags=flags_line([p.quality for p in points], len(points)),
@@ -227,7 +225,7 @@ def _other_explanations(verdict: Verdict) -> Section:
         notes.append(f"These data cannot tell apart: {names}.")
     if verdict.effects:
         notes += _rivals(verdict)
-    if verdict.next_test:
+    if verdict.next_test and verdict.verdict != "consistent":
         notes.append(f"Next test: {in_words(verdict.next_test)}.")
     return Section("What else could it be, and the test that tells", notes)
 

@@ -158,9 +158,9 @@ def _add_results(document: Any, session: Session, tabs: Any) -> None:
         with session.lock:
             identification = session.identification
         assert identification is not None
-        children = {"verdict": verdict_tab(session), "points and windows": points_tab(identification)}
+        children = {"verdict": verdict_tab(session, identification), "points and windows": points_tab(identification)}
         if session.bearing is not None:
-            children["prediction and measurement"] = model_tab(session)
+            children["prediction and measurement"] = model_tab(session, identification)
     except (RigError, TpjbError, ValueError) as error:  # what is wrong with the records stands on the page
         children = {"verdict": Div(text=html.escape(printable(error)), name="verdict")}
     found = [TabPanel(child=child, title=title) for title, child in children.items()]

@@ -13,7 +13,7 @@ from rigdata.problem import Problem
 from rigdata.run import Run
 from tpjb_ident.check.findings import Finding, grouped
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.columns import amount, place_of
+from tpjb_ident.columns import place_of, set_point
 from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.rounding import counted, listed
@@ -134,23 +134,15 @@ def _set_up(run: Run) -> tuple[float, float, float]:
     return run.point.static_load, run.point.static_load_direction, run.point.spin
 
 
-def _load(point: OperatingPoint) -> str:
-    return f"{amount(point.static_load, 'load')} at {point.static_load_direction_deg:g} deg"
-
-
 def described(run: Run) -> str:
     """A test in words and units."""
-    p = run.point
     if run.kind == "dry_pivot":
         return f"dry load steps on pad #{run.pad}, {run.branch}"
     if run.kind == "clearance":
         return "clearance sweep"
-    words = [_load(p), f"shaft {p.shaft_speed_hz:g} Hz"]
-    if p.excitation:
-        words.append(f"excited at {p.excitation_hz:g} Hz")
-    if run.excitation_direction is not None:
-        words.append(f"along {math.degrees(run.excitation_direction):.0f} deg")
-    return ", ".join(words)
+    direction = run.excitation_direction
+    along = "" if direction is None else f", along {math.degrees(direction):.0f} deg"
+    return set_point(run.point) + along
 
 
 def lacking(point: PointResult) -> str:
@@ -196,7 +188,7 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         when = f"({described(run)})"
         if run.kind in _TURNING:
             is_later = at is not None and _set_up(run) != _set_up(at)
-            back = f"when you are back at {_load(run.point)}, {run.point.shaft_speed_hz:g} Hz"
+            back = f"when you are back at {set_point(replace(run.point, excitation=0.0))}"
             when = back if is_later else "before you change the load"
         text = f"Repeat {run.id} {when}: {located(problem)}. {problem.cure}."
         steps.append((is_later, Step("repeat", text, (run.id,))))

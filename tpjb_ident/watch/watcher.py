@@ -3,7 +3,6 @@
 import contextlib
 import datetime
 import functools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -262,13 +261,12 @@ def _read(run: Run, path: Path, mark: tuple[Any, ...]) -> _Record:
 
 def _name_cut_records(observations: Sequence[Observation], lengths: Sequence[float]) -> None:
     """Note records below `_WHOLE` of the median length of their kind, before everything else that follows from it."""
-    of_kind: dict[str, list[float]] = {}
+    kinds = np.array([observation.run.kind for observation in observations])
+    known = np.array(lengths) > 0.0
     for observation, length in zip(observations, lengths, strict=True):
-        of_kind.setdefault(observation.run.kind, []).append(length or math.nan)
-    for observation, length in zip(observations, lengths, strict=True):
-        same_kind = of_kind[observation.run.kind]
-        usual = float(np.nanmedian(same_kind)) if length else 0.0
-        if 0 < length < _WHOLE * usual and np.isfinite(same_kind).sum() > 2:
+        same_kind = np.array(lengths)[known & (kinds == observation.run.kind)]
+        usual = float(np.median(same_kind)) if len(same_kind) > 2 else 0.0
+        if 0.0 < length < _WHOLE * usual:
             cure = "Copy it again from the logger, or repeat the run"
             what = f"{length:.3g} s long, the others of its kind {usual:.3g} s: cut off, or not written to its end"
             observation.report.note("short record", "error", "record", what, cure)

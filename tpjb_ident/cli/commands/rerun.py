@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from tpjb_ident.cli.command import COMMANDS, Command, command
+from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.commands.verify import STATES, files_of, recorded
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
@@ -78,9 +78,10 @@ def _run_again(name: str, entry: Mapping[str, Any], folder: Path, out: Path) -> 
     """Run the command of an entry as if it were typed again, its inputs where they are now."""
     from typer.main import get_command
 
-    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-    app.command()(COMMANDS[name.split(" ")[0]])
-    program = get_command(app)
+    from tpjb_ident.cli.commands.app import app
+
+    program: Any = get_command(app)
+    program = program.commands[name.split(" ")[0]]
     typed = _typed(program.params, entry, folder)
     try:
         code = program.main([f"--out={out}", "--quiet", *typed], prog_name="tpjb", standalone_mode=False)
