@@ -56,7 +56,7 @@ def _in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
     """A table in MN/m, kN s/m, kN and µm to four digits; of coefficients without the columns that only scripts want."""
     import pandas as pd
 
-    names = list(frame)
+    names = list(frame.columns)
     if STIFFNESS.columns[0] in frame:
         names = [name for name in names if _FOR_PEOPLE.fullmatch(name)]
     table: dict[str, Any] = {}

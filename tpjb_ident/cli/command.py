@@ -265,12 +265,12 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
 
     def decorate(function: Callable[..., None]) -> Callable[..., None]:
         name = function.__name__
-        own = list(inspect.signature(function).parameters.values())[1:]
+        declared = list(inspect.signature(function).parameters.values())[1:]
 
         def run(
             out: Path | None = None, as_json: bool = False, units: str = "si", quiet: bool = False, **options: Any
         ) -> None:
-            recorded = {p.name: options[p.name] for p in own if p.name not in _UNRECORDED}
+            recorded = {p.name: options[p.name] for p in declared if p.name not in _UNRECORDED}
             recorded |= {"units": units} if units != "si" else {}
             c = Command(name, recorded, out, as_json or quiet)
             exit_code = c.run(function, options)
@@ -283,7 +283,7 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
         *common, _ = inspect.signature(run).parameters.values()
         functools.update_wrapper(run, function)
         parameters = []
-        for parameter in (*own, *common):
+        for parameter in (*declared, *common):
             annotation = Annotated[hints[parameter.name], option(name, parameter.name)]  # type: ignore
             run.__annotations__[parameter.name] = annotation
             parameters.append(parameter.replace(annotation=annotation, kind=inspect.Parameter.KEYWORD_ONLY))

@@ -100,9 +100,9 @@ def write_report(
 def deviations_table(table: pd.DataFrame) -> Table:
     """How far predictions of a table of comparison.csv are off, by pivot model."""
     rows = []
-    for name, found in agreements(table).iterrows():
-        cells = [f"{percent(median)} ({percent(found['worst', k])})" for k, median in found["median"].items()]
-        rows.append([MODEL_LABELS.get(str(name), str(name)), *cells, number_inside(found)])
+    for name, agreement in agreements(table).iterrows():
+        cells = [f"{percent(median)} ({percent(agreement['worst', k])})" for k, median in agreement["median"].items()]
+        rows.append([MODEL_LABELS.get(str(name), str(name)), *cells, number_inside(agreement)])
     return Table(
         "Predicted / measured - 1: median (largest); inside: predictions within the measured 95 % interval",
         ["", *DIRECT, "inside"],

@@ -122,10 +122,10 @@ def place(range_text: str) -> str:
 
 def in_words(text: str) -> str:
     """A sentence of a diagnosis without the names of its variables."""
-    found = place(text).removeprefix("at ")
+    sentence = place(text).removeprefix("at ")
     for name, words in _OBSERVABLES.items():
-        found = found.replace(name, words)
-    return label_in_words(re.sub(r"(-?\d(?:\.\d+)?e[+-]?\d+) (N/m|N s/m|m|rad)\b", _read, found))
+        sentence = sentence.replace(name, words)
+    return label_in_words(re.sub(r"(-?\d(?:\.\d+)?e[+-]?\d+) (N/m|N s/m|m|rad)\b", _read, sentence))
 
 
 def _read(number: re.Match[str]) -> str:
@@ -235,16 +235,16 @@ def _rivals(verdict: Verdict) -> list[str]:
     names = {effect.name for effect in verdict.effects}
     listed = verdict.candidates
     named = [c for c in listed if {label.split()[0] for label in c.parameters} - set(TERMS) == names][:1]
-    own = named[0].probability if named else 0.0
+    probability = named[0].probability if named else 0.0
     odds = DiagnoseSettings.included / (1.0 - DiagnoseSettings.included)
     notes = []
     for rival in listed:
-        if rival not in named and rival.probability * odds > own:
+        if rival not in named and rival.probability * odds > probability:
             sizes = [
                 finding(label.split()[0], {key: Estimate(**value) for key, value in parameters.items()})
                 for label, parameters in rival.parameters.items()
             ]
-            share = f"probability {rival.probability:.2f}, that of what is named {own:.2f}"
+            share = f"probability {rival.probability:.2f}, that of what is named {probability:.2f}"
             notes.append(f"It may also be that {' and '.join(sizes)}: {share}.")
     return notes or [f"No other explanation that was fitted comes within odds of 1 to {odds:.0f} of it."]
 

@@ -119,7 +119,7 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
 def interval_cells(frame: pd.DataFrame, column: str, scale: float) -> list[str]:
     """Values of a column with half their intervals."""
     ends = frame[[column, f"{column}_lo", f"{column}_hi"]].itertuples(index=False, name=None)
-    return [with_interval(*values, scale) for values in ends]
+    return [with_interval(value, low, high, scale) for value, low, high in ends]
 
 
 def coefficient_cells(frame: pd.DataFrame, kinds: Sequence[Coefficient], side: str = "") -> dict[str, list[str]]:

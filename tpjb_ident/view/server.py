@@ -163,10 +163,10 @@ def _add_results(document: Any, session: Session, tabs: Any) -> None:
             children["prediction and measurement"] = model_tab(session, identification)
     except (RigError, TpjbError, ValueError) as error:  # what is wrong with the records stands on the page
         children = {"verdict": Div(text=html.escape(printable(error)), name="verdict")}
-    found = [TabPanel(child=child, title=title) for title, child in children.items()]
+    panels = [TabPanel(child=child, title=title) for title, child in children.items()]
 
     def show() -> None:
-        tabs.tabs = [found[0], *tabs.tabs[1:], *found[1:]]
+        tabs.tabs = [panels[0], *tabs.tabs[1:], *panels[1:]]
 
     document.add_next_tick_callback(show)
 

@@ -23,6 +23,10 @@ State = Literal["to run", "being written", "good", "look", "repeat", "replaced"]
 _LOST_SAMPLES = ("clipped", "dead", "empty", "missing", "stuck", "gap", "jitter", "short", "no excitation", "step")
 
 
+#: Key of the finding that a record is cut off, which says nothing of the next one.
+CUT = "short record"
+
+
 @dataclass(frozen=True)
 class RunStatus:
     """One run of the plan, or beside it."""
@@ -43,16 +47,16 @@ def judge_states(
     expected: Sequence[RunStatus], observations: Sequence[Observation]
 ) -> tuple[list[RunStatus], list[list[Finding]]]:
     """State of every run, and the findings that so many runs share that no repeat will cure them."""
-    seen = {observation.run.id: observation.report.findings for observation in observations}
-    grave = [f for f in itertools.chain.from_iterable(seen.values()) if f.problem.severity != "note"]
+    reported = {observation.run.id: observation.report.findings for observation in observations}
+    grave = [f for f in itertools.chain.from_iterable(reported.values()) if f.problem.severity != "note"]
     groups = grouped(grave, [observation.run for observation in observations])
     common = [group for group, concerned in groups if concerned]
     shared = set(map(id, itertools.chain.from_iterable(common)))
     states = []
     for status in expected:
-        found = seen.get(status.run.id)
-        if status.state == "to run" and found is not None:
-            findings = sorted((f for f in found if id(f) not in shared), key=_urgency)
+        of_run = reported.get(status.run.id)
+        if status.state == "to run" and of_run is not None:
+            findings = sorted((f for f in of_run if id(f) not in shared), key=_urgency)
             grave = [finding for finding in findings if finding.problem.severity != "note"]
             state: State = "repeat" if any(map(_forces_repeat, findings)) else "look" if grave else "good"
             status = replace(status, state=state, findings=tuple(findings))
@@ -166,7 +170,7 @@ def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
     steps: list[Step] = []
     stopped: set[str] = set()
     for finding in landed[0].findings if landed else ():
-        if not finding.key.startswith(_LOST_SAMPLES) or finding.problem.severity == "note":
+        if finding.problem.severity == "note" or finding.key == CUT or not finding.key.startswith(_LOST_SAMPLES):
             continue
         with_it = itertools.takewhile(lambda s: finding.key in {f.key for f in s.findings}, landed)  # noqa: B023 (here)
         runs = tuple(s.run.id for s in with_it)[::-1]

@@ -29,7 +29,7 @@ from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.runs.run_store import FileState, RunStore, file_state
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.watch.landing import NewFiles, Unplanned, place_record
-from tpjb_ident.watch.next_steps import RunStatus, State, Step, judge_states, next_steps, plan_lacks
+from tpjb_ident.watch.next_steps import CUT, RunStatus, State, Step, judge_states, next_steps, plan_lacks
 
 #: Share of the usual length below which a record was cut off.
 _WHOLE = 0.8
@@ -269,6 +269,6 @@ def _name_cut_records(observations: Sequence[Observation], lengths: Sequence[flo
         if 0.0 < length < _WHOLE * usual:
             cure = "Copy it again from the logger, or repeat the run"
             what = f"{length:.3g} s long, the others of its kind {usual:.3g} s: cut off, or not written to its end"
-            observation.report.note("short record", "error", "record", what, cure)
-            found: list[Finding] = observation.report.findings
-            found.insert(0, found.pop())
+            observation.report.note(CUT, "error", "record", what, cure)
+            findings: list[Finding] = observation.report.findings
+            findings.insert(0, findings.pop())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,11 +67,9 @@ def _campaign_session(c: Command, source: Path) -> Session:
     campaign = c.open(source)
     session = Session(name=campaign.id, campaign=campaign)
     if campaign.of_kind("dynamic"):
-        from tpjb_ident.cli.identification import identify_settings
-        from tpjb_ident.identification.identify import identify
+        from tpjb_ident.cli.identification import identified
 
-        settings = identify_settings(c, campaign)
-        session.identify = lambda: identify(campaign, settings)
+        session.identify = functools.partial(identified, c, campaign)
         if c.has_bearing(campaign):
             session.bearing = c.bearing_of(campaign)
             session.pivots = {"rigid": "rigid", "kirk": "kirk", **_measured_laws(c, campaign, session.bearing)}
