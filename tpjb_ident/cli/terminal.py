@@ -235,7 +235,7 @@ def _titled_table(title: str, columns: list[Column], headings: list[str], rows: 
     varying = list(range(len(columns)))
     if len(rows) > 1 and _total(_sizes([headings, *rows])) > _width():
         varying = [i for i, column in enumerate(columns) if column.words or len({row[i] for row in rows}) > 1]
-        constant = [i for i in range(len(columns)) if i not in varying]
+        constant = [i for i in range(len(columns)) if i not in varying and rows[0][i].strip(" -")]
         title = "; ".join([title, *(readable(columns[i].with_unit(rows[0][i].strip())) for i in constant)])
     names, *cells = [[row[i] for i in varying] for row in [headings, *rows]]
     words = [k for k, i in enumerate(varying) if columns[i].words]
