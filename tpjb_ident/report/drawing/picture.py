@@ -73,6 +73,7 @@ MODEL_LABELS = {
     "kirk-secant": "Kirk, secant",
     "measured": "measured pivots",
     "model before": "model as stated",
+    "before": "as stated",
 }
 #: Blue through paper to orange: signs that nobody confuses.
 DIVERGING = LinearSegmentedColormap.from_list("tpjb-diverging", ["#004c7a", "#4f9bcb", "#f6f7f8", "#e8a33d", "#9a4a00"])
