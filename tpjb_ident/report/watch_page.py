@@ -58,7 +58,9 @@ def coverage_table(snapshot: Snapshot) -> Table:
     """How many runs of every kind and set-up have landed."""
     groups: dict[str, list[RunStatus]] = {}
     for status in snapshot.states:
-        groups.setdefault(_group(status), []).append(status)
+        kind = status.run.kind
+        name = set_point(status.run.point) if kind == "dynamic" else KINDS_IN_WORDS.get(kind, kind)
+        groups.setdefault(name, []).append(status)
     rows = []
     for name, group in groups.items():
         good = sum(s.counts for s in group)
@@ -66,11 +68,6 @@ def coverage_table(snapshot: Snapshot) -> Table:
         missing = sum(s.state in _WAITING for s in group)
         rows.append([name, str(good), str(again), str(missing)])
     return Table("How far the plan is", ["", "good", "to repeat", "to run"], rows)
-
-
-def _group(status: RunStatus) -> str:
-    kind = status.run.kind
-    return KINDS_IN_WORDS.get(kind, kind) if kind != "dynamic" else set_point(status.run.point)
 
 
 def _sections(snapshot: Snapshot, bearing: Any) -> list[Section]:

@@ -56,17 +56,14 @@ def judge_states(
     for status in expected:
         of_run = reported.get(status.run.id)
         if status.state == "to run" and of_run is not None:
-            findings = sorted((f for f in of_run if id(f) not in shared), key=_urgency)
+            # what has a say in the state of a run comes first, then the gravest
+            order = sorted(of_run, key=lambda f: (not _forces_repeat(f), SEVERITIES.index(f.problem.severity)))
+            findings = [finding for finding in order if id(finding) not in shared]
             grave = [finding for finding in findings if finding.problem.severity != "note"]
             state: State = "repeat" if any(map(_forces_repeat, findings)) else "look" if grave else "good"
             status = replace(status, state=state, findings=tuple(findings))
         states.append(status)
     return _replaced(states), common
-
-
-def _urgency(finding: Finding) -> tuple[bool, int]:
-    """What has a say in the state of a run comes first, then the gravest."""
-    return not _forces_repeat(finding), SEVERITIES.index(finding.problem.severity)
 
 
 def _forces_repeat(finding: Finding) -> bool:
