@@ -57,10 +57,6 @@ def _curves(value: Any, name: str) -> Any:
     return curves
 
 
-def _comparison(value: Any, name: str) -> Any:
-    return _required(hasattr(value, "predictions"), value, name, "be what compare_campaign gives")
-
-
 def least_clearance(campaign: Campaign, warn: Callable[[str], Any]) -> float | None:
     """Smallest assembled clearance [m] of the bearing that a campaign carries; None without one that can be read."""
     from model.bearing import BearingError
@@ -76,18 +72,11 @@ def least_clearance(campaign: Campaign, warn: Callable[[str], Any]) -> float | N
     return min(pad.assembled_clearance for pad in bearing.pads)
 
 
-def _with_clearance(settings: Any, campaign: Campaign) -> Any:
-    """Settings whose amplitude check knows the campaign's bearing, as those of the command line do."""
-    if settings.clearance is not None:
-        return settings
-    clearance = least_clearance(campaign, lambda text: warnings.warn(f"identify: {text}", stacklevel=5))
-    return dataclasses.replace(settings, clearance=clearance)
-
-
 #: What arguments of these names may be.
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     "campaign": as_campaign, "bearing": as_bearing, "source": _path, "path": _path,
-    "folder": lambda value, name: Path(_path(value, name)), "curves": _curves, "comparison": _comparison,
+    "folder": lambda value, name: Path(_path(value, name)), "curves": _curves,
+    "comparison": lambda v, name: _required(hasattr(v, "predictions"), v, name, "be what compare_campaign gives"),
 }  # fmt: skip
 
 
@@ -112,7 +101,10 @@ def checked(
                     bound.arguments[name] = _CHECKS[name](bound.arguments[name], name)
             if settings is not None:
                 chosen = bound.arguments.get("settings") or settings()
-                bound.arguments["settings"] = _with_clearance(chosen, bound.arguments["campaign"])
+                if chosen.clearance is None:  # the amplitude check knows the bearing, as on the command line
+                    warn = functools.partial(warnings.warn, stacklevel=3)
+                    chosen = dataclasses.replace(chosen, clearance=least_clearance(bound.arguments["campaign"], warn))
+                bound.arguments["settings"] = chosen
             return function(*bound.args, **bound.kwargs)
         except ValueError as error:
             text = str(error)

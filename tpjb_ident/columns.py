@@ -1,9 +1,11 @@
 """Columns of a table that people read: heading, unit and form; the one place that says in which units they read."""
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from rigdata.operating_point import ROTATIONS
+from rigdata.operating_point import ROTATIONS, OperatingPoint
+from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.rounding import significant
 
@@ -19,6 +21,7 @@ _SI = {
     "length": ("µm", 1e-6),
     "size": ("mm", 1e-3),
     "pressure": ("MPa", 1e6),
+    "acceleration": ("m/s²", 1.0),
     "angle": ("deg", 1.0),
     "frequency": ("Hz", 1.0),
     "speed": ("Hz", 1.0),
@@ -62,14 +65,18 @@ def size(quantity: str) -> float:
     return UNITS[quantity][1]
 
 
-#: Calibrated quantities whose unit changes with the system, and those that people read in one unit everywhere.
-_SHOWN = {"displacement": "length", "force": "force", "pressure": "pressure"}
-_EVERYWHERE = {"acceleration": "m/s²", "temperature": "K", "speed": "rad/s"}
+#: Unit of a kelvin's scale in US units: its symbol, its size and its zero in K.
+FAHRENHEIT = ("degF", 5 / 9, 459.67 * 5 / 9)
 
 
-def channel_unit(quantity: str) -> tuple[str, float]:
-    """Symbol and size of the unit in which people read a calibrated channel; no symbol where it has none."""
-    return UNITS[_SHOWN[quantity]] if quantity in _SHOWN else (_EVERYWHERE.get(quantity, ""), 1.0)
+def channel_unit(quantity: str) -> tuple[str, float, float]:
+    """Symbol, size and zero in SI of the unit in which people read a calibrated channel; no symbol if it has none."""
+    if quantity == "temperature":
+        return FAHRENHEIT if in_us_units() else ("degC", 1.0, ZERO_CELSIUS)
+    if quantity == "speed":
+        return symbol("speed"), 2 * math.pi * size("speed"), 0.0
+    unit, scale = UNITS.get("length" if quantity == "displacement" else quantity, ("", 1.0))
+    return unit, scale, 0.0
 
 
 class Column(NamedTuple):
@@ -83,12 +90,16 @@ class Column(NamedTuple):
     title: str  #: heading, with the unit of a quantity as {load}
     form: str | Callable[..., str] = "g"  #: of one number, or a function of all numbers of a cell
     words: bool = False  #: to the left, broken at spaces where room is short
-    quantity: str = ""  #: in `UNITS`, where the heading has none
 
     @property
     def heading(self) -> str:
         """Title with the unit."""
-        return self.title.format_map({quantity: unit for quantity, (unit, _) in UNITS.items()})
+        return self.with_unit()
+
+    def with_unit(self, cell: str = "") -> str:
+        """Title with the unit, behind a cell: ``load 2.5 kN``."""
+        text = self.title.format_map({quantity: f"{cell} {unit}".strip() for quantity, (unit, _) in UNITS.items()})
+        return f"{text} {cell}".strip() if text == self.title else text
 
     def cell(self, value: Any) -> str:
         """Write a value of this column: a number, several, words, or None."""
@@ -96,21 +107,16 @@ class Column(NamedTuple):
             return "-"
         if isinstance(value, str):
             return value
-        quantity = self.quantity or self.title.partition("{")[2].partition("}")[0]
+        quantity = self.title.partition("{")[2].partition("}")[0]
         unit = size(quantity) if quantity else 1.0
         if callable(self.form):
             return self.form(*(number / unit for number in value))
-        return format(value / unit, self.form)
+        return significant(value / unit, self.form)
 
 
 def words(*titles: str) -> list[Column | str]:
     """Columns of words."""
     return [Column(title, words=True) for title in titles]
-
-
-def per(quantity: str) -> float:
-    """Factor that makes of a value in SI one in the unit that people read."""
-    return 1.0 / size(quantity)
 
 
 def amount(value: float, quantity: str, form: str = ".6g") -> str:
@@ -139,6 +145,12 @@ def degrees(celsius: float) -> str:
     '40 °C'
     """
     return f"{1.8 * celsius + 32:.4g} °F" if in_us_units() else f"{celsius:.4g} °C"
+
+
+def set_point(point: OperatingPoint) -> str:
+    """An operating point in words."""
+    words = f"{amount(point.static_load, 'load')} at {point.static_load_direction_deg:g} deg, shaft {point.speed_words}"
+    return f"{words}, excited at {point.excitation_hz:g} Hz" if point.excitation else words
 
 
 def place_of(load: float, excitation: float) -> str:

@@ -9,21 +9,19 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.columns import SYSTEMS
+from tpjb_ident.columns import FAHRENHEIT, SYSTEMS
 from tpjb_ident.columns import UNITS as SHOWN
-from tpjb_ident.schema import KINDS, POINT_COLUMNS
+from tpjb_ident.schema import KINDS, POINT_COLUMNS, STIFFNESS
 
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Rows of a table in a notebook.
-_MOST_ROWS = 30
 #: Unit in a column's name: the quantity whose unit people read.
 _DISPLAYED = {**{kind.suffix: kind.quantity for kind in KINDS.values()}, "N": "load", "m": "length", "Pa": "pressure"}
-_WITH_UNIT = re.compile(rf"(.+?)_({'|'.join(_DISPLAYED)}|deg|Hz|K)(_lo|_hi|_se|_predicted)?")
-_COEFFICIENT = re.compile(r"[kc](?:xx|xy|yx|yy)_")
+_NAMES = re.compile(rf"(.+?)_({'|'.join(_DISPLAYED)}|deg|Hz|degC|K)((?:_[a-z0-9]+)*)")
+#: Columns of coefficients that not only scripts want.
 _FOR_PEOPLE = re.compile(
-    rf"{_COEFFICIENT.pattern}(?:N|Ns)_per_m(?:_lo|_hi|_predicted)?|{'|'.join(POINT_COLUMNS)}|pivots|quality"
+    rf"[kc](?:xx|xy|yx|yy)_(?:N|Ns)_per_m(?:_lo|_hi|_predicted)?|{'|'.join(POINT_COLUMNS)}|pivots|quality"
 )
 
 
@@ -51,7 +49,7 @@ class Presented:
 
     def _repr_html_(self) -> str:
         sentences = "".join(f"<p>{html.escape(line)}</p>" for line in self.summary().splitlines())
-        return f"{sentences}{_in_display_units(self.to_dataframe()).to_html(index=False, max_rows=_MOST_ROWS)}"
+        return f"{sentences}{_in_display_units(self.to_dataframe()).to_html(index=False, max_rows=30)}"
 
 
 def _in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
@@ -59,13 +57,12 @@ def _in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
     import pandas as pd
 
     names = list(frame.columns)
-    for_people = [name for name in names if _FOR_PEOPLE.fullmatch(name)]
-    if any(_COEFFICIENT.match(name) for name in for_people):
-        names = for_people
+    if STIFFNESS.columns[0] in frame:
+        names = [name for name in names if _FOR_PEOPLE.fullmatch(name)]
     table: dict[str, Any] = {}
     for name in names:
-        match = _WITH_UNIT.fullmatch(name)
-        words, unit, end = (match[1], match[2], match[3] or "") if match else (name, "", "")
+        match = _NAMES.fullmatch(name)
+        words, unit, end = match.groups() if match else (name, "", "")
         label, scale = SHOWN.get(_DISPLAYED.get(unit, ""), (unit, 1.0))
         values = frame[name]
         if pd.api.types.is_float_dtype(values):
@@ -98,11 +95,10 @@ def changed(settings: Any) -> str:
 
 
 #: Unit in a column's name: unit there in US units, its size in SI, and the zero of its scale in SI.
-UNITS = {"degC": ("degF", 5 / 9, -160 / 9), "K": ("degF", 5 / 9, 459.67 * 5 / 9)}
+UNITS = {"degC": ("degF", 5 / 9, -160 / 9), "K": FAHRENHEIT}
 for _suffix, _quantity in _DISPLAYED.items():
     _symbol, _size = SYSTEMS["us"][_quantity]
     UNITS[_suffix] = (_symbol.replace("/", "_per_").replace(" ", ""), _size, 0.0)
-_NAMES = re.compile(rf"(.+?)_({'|'.join(UNITS)})((?:_[a-z0-9]+)*)")
 #: Endings of what is a difference, which has no zero.
 _WIDTHS = re.compile(r"_se|_difference|95")
 
@@ -122,7 +118,7 @@ def us_table(frame: pd.DataFrame) -> pd.DataFrame:
             continue
         if name == "shaft_speed_Hz":
             names[name], converted[name] = "shaft_speed_rpm", 60.0 * frame[name]
-        elif match is not None:
+        elif match is not None and match[2] in UNITS:
             unit, size, zero = UNITS[match[2]]
             names[name] = f"{match[1]}_{unit}{match[3]}"
             converted[name] = (frame[name] - (0.0 if _WIDTHS.search(match[3]) else zero)) / size

@@ -68,9 +68,9 @@ def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> 
     return f"{plain(value / scale, digits)} ± {plain(half, digits)}"
 
 
-def percent(share: float, digits: int = 1) -> str:
+def percent(share: float) -> str:
     """A share as a signed percentage; a dash if there is none."""
-    return f"{signed(100 * share, digits)}\N{NO-BREAK SPACE}%" if math.isfinite(share) else "–"
+    return f"{signed(100 * share)}\N{NO-BREAK SPACE}%" if math.isfinite(share) else "–"
 
 
 def signed(value: float, digits: int = 1) -> str:

@@ -46,7 +46,7 @@ def pivot_flexibility(setup: Setup, stiffness_factor: float) -> Setup:
     PAD,
     _FACTOR,
     source="Pad #5 of the paper is the softest of five (Lubricants 2019, 7, 61, Fig. 12)",
-    finding="the pivot of {pad} has {stiffness_factor} of the formula's stiffness",
+    finding="the pivot of {pad} has {stiffness_factor} of the others' stiffness",
     physics="One pivot gives more, or less, than the others. It stands in series with that pad's film.",
     on_the_rig="One dry test is off; coefficients are off along that pad's direction.",
     check="that pad's seat, pivot and fit",

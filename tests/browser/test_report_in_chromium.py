@@ -190,7 +190,7 @@ def test_every_picture_names_its_curves_once(chromium, report):
             ".filter((t) => getComputedStyle(t).visibility !== 'hidden').map((t) => t.textContent)"
         )
     assert 2 < labels.count("Kirk pivots") <= figures
-    assert labels.count("off measured, %") >= 4
+    assert labels.count("deviation, %") >= 4
 
 
 def test_a_printed_page_is_signed_numbered_and_legible(chromium, report, tmp_path):
@@ -237,7 +237,7 @@ def test_a_hostile_campaign_stays_text(chromium, tmp_path):
 
     bad = "<script>document.title='owned'</script><img src=x onerror=\"document.title='owned'\">"
     section = Section(bad, [bad], tables=[Table(bad, [bad, "n"], [[bad, "1"]] * 4)])
-    page = Page(bad, bad, bad, more=[bad], sections=[section], settings={bad: bad}, inputs={bad: bad})
+    page = Page(bad, bad, [bad, bad], sections=[section], settings={bad: bad}, inputs={bad: bad})
     path = Path(tmp_path) / "bad.html"
     path.write_text(render_page(page, {}), encoding="utf-8")
     with chromium() as tab:

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 import tpjb_ident.report
+from tests.report.plot_cases import locus
 from tests.report.tags import Page
 from tpjb_ident.report import page as report_page
 from tpjb_ident.report.drawing.picture import add_legend, longest_series, new_picture
@@ -35,9 +36,8 @@ def page_and_svg(tmp_path_factory):
     page = report_page.Page(
         title=HOSTILE,
         subtitle=HOSTILE,
-        answer=HOSTILE,
+        sentences=[HOSTILE, HOSTILE],
         then=HOSTILE,
-        more=[HOSTILE],
         key_table=Table(HOSTILE, [HOSTILE, "n"], [[HOSTILE, "1"]]),
         sections=[Section(HOSTILE, notes=[HOSTILE], panels=panels, tables=[Table("t", ["a"], [[HOSTILE]])])],
         settings={HOSTILE: HOSTILE},
@@ -133,7 +133,7 @@ def test_markers_carry_their_values(page_and_svg):
 
 
 def test_a_title_in_the_running_head_cannot_leave_its_string():
-    page = report_page.Page(title='x"; } body { display: none } </style><script>', subtitle="", answer="")
+    page = report_page.Page(title='x"; } body { display: none } </style><script>', subtitle="", sentences=[""])
     style = render_page(page, {}).split("<style>")[1].split("</style>")[0]
     (head,) = re.findall(r'@top-left \{ content: "([^"]*)"', style)
     assert re.fullmatch(r"(?:[A-Za-z0-9]|\\[0-9a-f]{6})+", head)
@@ -142,7 +142,7 @@ def test_a_title_in_the_running_head_cannot_leave_its_string():
 
 def test_what_was_tested_stands_before_the_verdict():
     html = render_page(
-        report_page.Page("t", "", "The verdict.", facts={"Shaft": "22 Hz (1320 rpm)"}, flags="No flags."), {}
+        report_page.Page("t", "", ["The verdict."], facts={"Shaft": "22 Hz (1320 rpm)"}, flags="No flags."), {}
     )
     assert html.index("22 Hz (1320 rpm)") < html.index("The verdict.") < html.index("No flags.")
 
@@ -225,8 +225,8 @@ def test_measured_points_have_their_intervals_and_predictions_their_lines():
 
 def test_positions_need_something_to_show():
     drawn = (np.radians([-90.0, -18.0, 54.0, 126.0, 198.0]), np.full(5, 80e-6))
-    assert position_panels(None, drawn, np.zeros((0, 2)), {}) == []
+    assert position_panels(None, drawn, None, {}) == []
     circle = 40e-6 * np.column_stack([np.cos([0, 2, 4]), np.sin([0, 2, 4])])
-    (panel,) = position_panels(None, drawn, circle, {"rigid": circle})
+    (panel,) = position_panels(None, drawn, locus(3), {"rigid": circle})
     labels = {line.get_label() for line in panel.figure.axes[0].get_lines()}
     assert labels == {"clearance, drawing", "rigid pivots", "locus, measured"}

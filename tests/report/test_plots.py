@@ -153,7 +153,7 @@ def test_no_global_style(name):
 
 @pytest.mark.parametrize("cells_every", [1, 4])
 def test_coherence_pairs_what_was_read_at_one_time(cells_every):
-    lines = plots.coherence_spectrum(Shaken(cells_every=cells_every), segment=0.25, up_to=100.0).axes[0].get_lines()
+    lines = plots.coherence_spectrum(Shaken(cells_every=cells_every), segment=0.25).axes[0].get_lines()
     frequency, value = lines[0].get_xdata(), lines[0].get_ydata()
     at_line = np.abs(frequency - 25.0) < 3.0
     assert value[at_line].max() > 0.98

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rigdata.problem import RigError
-from tpjb_ident.cli.options import option
+from tpjb_ident.cli.options import DEMO, ROCKER, option
 from tpjb_ident.cli.terminal import Progress, Terminal
 from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.conditions import Condition, sentences, untrusted
@@ -64,8 +64,7 @@ class Command(Terminal):
     def __init__(self, name: str, options: Mapping[str, Any], out: Path | None = None, silent: bool = False) -> None:
         super().__init__(silent)
         self.name, self.out = name, out
-        self.options = dict(options)  #: as run.json records them
-        self.given = _plain(self.options)  #: as they were typed
+        self.options, self.typed = dict(options), dict(options)  #: as run.json records them, and as they were typed
         self.remarks: Sequence[str] = ()  #: flags that run.json repeats
         self.arithmetic: dict[str, None] = {}  #: warnings of single operations, in order
         self.target = out or Path(f"tpjb-{name}-out")
@@ -101,10 +100,15 @@ class Command(Terminal):
 
         return load_bearing(self.file(path))
 
-    def bearing_of(self, campaign: Campaign, path: Path | None = None) -> Bearing:
-        """Load the bearing that a campaign carries, or the file in its place."""
+    def has_bearing(self, campaign: Campaign) -> bool:
+        """Whether there is a bearing to load: the file of ``--bearing``, or what the campaign carries."""
+        return bool(self.typed.get("bearing") or campaign.bearing_text)
+
+    def bearing_of(self, campaign: Campaign) -> Bearing:
+        """Load the bearing that a campaign carries, or the file of ``--bearing`` in its place."""
         from model.bearing_file import parse_bearing
 
+        path = self.typed.get("bearing")
         if "bearing" in self.options:
             self.options["bearing"] = path or campaign.bearing_name
         if path is not None:
@@ -144,7 +148,7 @@ class Command(Terminal):
         shown = self.progress(activity) if activity else contextlib.nullcontext(lambda *_: None)
         with output_folder(self.target, entry, tuple(self._sources)) as self.folder, shown as show:
             yield show
-            notes = {"remarks": list(self.remarks), "arithmetic": list(self.arithmetic), "options": self.given}
+            notes = {"remarks": list(self.remarks), "arithmetic": list(self.arithmetic), "options": _plain(self.typed)}
             names = write_record(self.folder, self.target, entry, self.options, self.inputs, notes)
         self.wrote(*names)
 
@@ -261,12 +265,12 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
 
     def decorate(function: Callable[..., None]) -> Callable[..., None]:
         name = function.__name__
-        own = list(inspect.signature(function).parameters.values())[1:]
+        declared = list(inspect.signature(function).parameters.values())[1:]
 
         def run(
             out: Path | None = None, as_json: bool = False, units: str = "si", quiet: bool = False, **options: Any
         ) -> None:
-            recorded = {p.name: options[p.name] for p in own if p.name not in _UNRECORDED}
+            recorded = {p.name: options[p.name] for p in declared if p.name not in _UNRECORDED}
             recorded |= {"units": units} if units != "si" else {}
             c = Command(name, recorded, out, as_json or quiet)
             exit_code = c.run(function, options)
@@ -279,12 +283,12 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
         *common, _ = inspect.signature(run).parameters.values()
         functools.update_wrapper(run, function)
         parameters = []
-        for parameter in (*own, *common):
+        for parameter in (*declared, *common):
             annotation = Annotated[hints[parameter.name], option(name, parameter.name)]  # type: ignore
             run.__annotations__[parameter.name] = annotation
             parameters.append(parameter.replace(annotation=annotation, kind=inspect.Parameter.KEYWORD_ONLY))
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        run.examples = examples  # type: ignore[attr-defined]
+        run.examples = [text.format(DEMO=DEMO, ROCKER=ROCKER) for text in examples]  # type: ignore[attr-defined]
         COMMANDS[name] = run
         return run
 

@@ -30,12 +30,13 @@ _MODELS = f"static_load_N model {DIRECT} mxx_kg myy_kg supported"
 POINT = " ".join(POINT_COLUMNS)
 
 
-def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | None) -> IdentifySettings:
-    """Build `IdentifySettings` from options, with the campaign's clearance for the amplitude check."""
+def identify_settings(c: Command, campaign: Campaign) -> IdentifySettings:
+    """Build `IdentifySettings` from ``--method`` and ``--norm``, with the clearance for the amplitude check."""
     from tpjb_ident.arguments import least_clearance
     from tpjb_ident.estimators.estimate import METHODS, NORMS
     from tpjb_ident.identification.settings import IdentifySettings
 
+    method, norm = c.typed.get("method", "mm-eiv"), c.typed.get("norm")
     refuse_unknown(method, METHODS, "--method")
     if norm is not None:
         refuse_unknown(norm, tuple(NORMS), "--norm")
@@ -47,11 +48,11 @@ def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | N
     return IdentifySettings(method=estimator, clearance=least_clearance(campaign, c.warn))
 
 
-def identified(c: Command, campaign: Campaign, method: str, norm: str | None) -> Identification:
+def identified(c: Command, campaign: Campaign) -> Identification:
     """Identify a campaign."""
     from tpjb_ident.identification.identify import identify
 
-    settings = identify_settings(c, campaign, method, norm)
+    settings = identify_settings(c, campaign)
     with c.progress(f"identifying {campaign.id}") as show:
         return identify(campaign, settings, show)
 

@@ -117,16 +117,18 @@ def operating_points(
     return [OperatingPoint(*point, rotation) for point in itertools.product(loads, directions, speeds, frequencies)]
 
 
-def rotation_choice(c: Command, rotation: str | None, bearing: Bearing) -> str:
+def rotation_choice(c: Command, bearing: Bearing) -> str:
     """What --rotation means: itself, or the bearing file's sense of turning."""
+    rotation = c.typed["rotation"]
     if rotation is not None:
         refuse_unknown(rotation, ROTATIONS, "--rotation")
     c.options["rotation"] = chosen = rotation or bearing.rotation or ROTATIONS[0]
     return chosen
 
 
-def pivot_choice(c: Command, text: str) -> str | float | Path:
+def pivot_choice(c: Command) -> str | float | Path:
     """What --pivots means: a name, a stiffness [N/m], or the path of a file."""
+    text: str = c.typed["pivots"]
     if text in _PIVOTS:
         return text
     path = Path(text)
@@ -139,10 +141,9 @@ def pivot_choice(c: Command, text: str) -> str | float | Path:
     raise BadInputError(f"--pivots: {text!r} is no such file and no pivot model. {use}")
 
 
-def model_settings(
-    c: Command, pivots: str | float | Path, thermal: str, path: Path | None, bearing: Bearing | None
-) -> ModelSettings:
-    """Build `ModelSettings` from options; effects that the bearing cannot have, or that count twice, are refused."""
+def model_settings(c: Command, pivots: str | float | Path, bearing: Bearing | None) -> ModelSettings:
+    """Build `ModelSettings` with --thermal and --effects; those that cannot be, or count twice, are refused."""
+    thermal, path = c.typed["thermal"], c.typed["effects"]
     refuse_unknown(thermal, choices("thermal"), "--thermal")
     from tpjb_ident.compare.predictions import ModelSettings, refuse_counted_twice
 
@@ -163,18 +164,17 @@ def model_settings(
     return ModelSettings(pivots, thermal, effects)
 
 
-def open_source(
-    c: Command, campaign: Path | None, table: Path | None, bearing: Path | None, predicted: bool = False
-) -> tuple[Any, Any, list[object]]:
+def open_source(c: Command, predicted: bool = False) -> tuple[Any, Any, list[object]]:
     """Open a campaign with its bearing, or in its place a `TableSource` of coefficients with the bearing file.
 
     A table whose points another program has predicted needs no bearing. With them come the words of a command that
     name the same.
     """
+    campaign, table, bearing = (c.typed[name] for name in ("campaign", "coefficients", "bearing"))
     words: list[object] = [] if bearing is None else ["--bearing", bearing]
     if table is None and campaign is not None:
         source = c.open(campaign)
-        return source, c.bearing_of(source, bearing), [campaign, *words]
+        return source, c.bearing_of(source), [campaign, *words]
     if table is None or campaign is not None:
         raise BadInputError(f"{c.name}: give a campaign, or --coefficients TABLE.csv with --bearing FILE; one of them.")
     from tpjb_ident.compare.coefficient_table import TableSource

@@ -111,9 +111,8 @@ class Terminal:
         self.tables.append({"title": title, "columns": headings, "rows": texts})
         if self._silent:
             return
-        words = [i for i, column in enumerate(columns) if column.words]
         shown = texts[:MOST_ROWS] if file else texts
-        lines = _titled_table(printable(title), headings, shown, words)
+        lines = _titled_table(printable(title), columns, headings, shown)
         if len(shown) < len(texts):
             lines.append(f"{len(texts) - len(shown)} more rows: {file} has all {len(texts)}")
         print("\n".join(["", *lines]), flush=True)
@@ -231,16 +230,16 @@ def wrapped(text: str, width: int) -> list[str]:
     return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False) or [""]
 
 
-def _titled_table(title: str, headings: list[str], rows: list[list[str]], words: list[int]) -> list[str]:
+def _titled_table(title: str, columns: list[Column], headings: list[str], rows: list[list[str]]) -> list[str]:
     """Lines of a title and its table; of one that is too wide, columns of one and the same number go to the title."""
-    columns = list(range(len(headings)))
+    varying = list(range(len(columns)))
     if len(rows) > 1 and _total(_sizes([headings, *rows])) > _width():
-        columns = [i for i in columns if i in words or len({row[i] for row in rows}) > 1]
-        constant = sorted(set(range(len(headings))) - set(columns))
-        title = "; ".join([title, *(f"{headings[i]} {rows[0][i].strip()}" for i in constant)])
-    varying = [[row[i] for i in columns] for row in [headings, *rows]]
-    lines = table_lines(varying[0], varying[1:], [columns.index(i) for i in words], _width())
-    return [*wrapped(title, _width()), *lines, ""]
+        varying = [i for i, column in enumerate(columns) if column.words or len({row[i] for row in rows}) > 1]
+        constant = [i for i in range(len(columns)) if i not in varying and rows[0][i].strip(" -")]
+        title = "; ".join([title, *(readable(columns[i].with_unit(rows[0][i].strip())) for i in constant)])
+    names, *cells = [[row[i] for i in varying] for row in [headings, *rows]]
+    words = [k for k, i in enumerate(varying) if columns[i].words]
+    return [*wrapped(title, _width()), *table_lines(names, cells, words, _width()), ""]
 
 
 def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int) -> list[str]:

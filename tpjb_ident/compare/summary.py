@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from model.effects import kind_of
-from tpjb_ident.columns import amount, per, size, symbol
+from tpjb_ident.columns import amount, size, symbol
 from tpjb_ident.compare.comparison import locus_distances
 from tpjb_ident.compare.effect_words import Estimate, finding
 from tpjb_ident.compare.predictions import printed_formula
@@ -177,7 +177,7 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
     pad = int(np.nanargmax(np.abs(off)))
     digits, unit = 1 if size("length") < 1e-5 else 3, symbol("length")
     mean, median, worst = (
-        signed(per("length") * float(v), digits) for v in (np.nanmean(off), np.nanmedian(off), off[pad])
+        signed(float(v) / size("length"), digits) for v in (np.nanmean(off), np.nanmedian(off), off[pad])
     )
     status = comparison.clearance.status
     remarks = [f"The clearance sweep: {c.detail}." for c in status if c == "probe-gains-differ"]

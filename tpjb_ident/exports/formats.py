@@ -102,7 +102,10 @@ def flags(table: pd.DataFrame) -> list[str]:
     sentences = []
     for row in table[table["quality"] != "ok"].to_dict("records"):
         warning = "" if row["trusted"] else "NOT TO BE TRUSTED, "
-        sentences.append(f"{warning}at {row['excitation_Hz']:g} Hz: {row['quality']}")
+        shaft = f"{60 * row['shaft_speed_Hz']:g} rpm"
+        sentences.append(
+            f"{warning}{row['static_load_N']:g} N, {shaft}, at {row['excitation_Hz']:g} Hz: {row['quality']}"
+        )
     return sentences
 
 

@@ -94,9 +94,8 @@ def write_excel(folder: Path, points: pd.DataFrame, source: str) -> None:
         "frequency_rad_per_s is the excitation; the shaft speed is constant along it.",
         "_lo and _hi: 95 % interval, random and calibration errors together; empty for a prediction.",
         "quality: named conditions, explained in the report; trusted: FALSE was exported against advice.",
+        *flags(points),
     ]
-    for load, rows in points.groupby("static_load_N"):
-        lines += [f"{load:g} N {flag}" for flag in flags(rows)]
     content = io.BytesIO()
     with pd.ExcelWriter(content, engine="openpyxl") as writer:
         frame.to_excel(writer, sheet_name="coefficients", index=False, freeze_panes=(1, 0))
@@ -266,14 +265,11 @@ def write_ross(folder: Path, points: pd.DataFrame, source: str, version: int | N
     for grid in grids(points, "excitation" if number == 2 else "both"):
         speed = f"{grid.speed[0]:g}Hz" if len(grid.speed) == 1 else "speeds"
         tag = grid.name(speed, "excitation" if len(grid.excitation) > 1 or len(grid.speed) == 1 else grid.line)
-        remarks = grid.remarks(source)
-        for hz in grid.speed:
-            remarks += [f"{60 * hz:g} rpm, {flag}" for flag in flags(grid.rows[grid.rows["shaft_speed_Hz"] == hz])]
         axes = {"speed": _HZ * grid.speed, "frequency": _HZ * grid.excitation}
         arrays = {axis: values.tolist() for axis, values in axes.items() if len(values) > 1}
         values = grid.values if len(arrays) == 2 else grid.values.reshape(-1, len(COLUMNS))
         arrays |= {name: values[..., i].tolist() for i, name in enumerate(COLUMNS)}
-        remarks = [printable(remark) for remark in remarks]
+        remarks = [printable(remark) for remark in [*grid.remarks(source), *flags(grid.rows)]]
         fields = {"remarks": remarks, "number": number, "reason": reason, "tag": tag, "arrays": arrays}
         _write(folder / f"ross_{tag}.toml", "ross", fields)
 
@@ -302,37 +298,19 @@ def write_ross_bearing(folder: Path, bearing: Any, version: int | None = None) -
     if clockwise:  # oil goes round the ring in the order of the pads
         bearing = bearing.with_pads(bearing.pads[::-1])
     number, reason = ross_version(version)
-    angles = [pad.pivot_angle for pad in bearing.pads]
-    assembled = fmean(pad.assembled_clearance for pad in bearing.pads)  # that ROSS takes: preloads give each its own
+    pads = bearing.pads
+    angles = [pad.pivot_angle for pad in pads]
+    assembled = fmean(pad.assembled_clearance for pad in pads)  # that ROSS takes: preloads give each its own
     fields = {
         "name": printable(bearing.name),
         "number": number,
         "reason": reason,
-        "remarks": [printable(remark) for remark in _not_held(bearing, number)],
+        "clockwise": clockwise,
         "bearing": bearing,
         "clearance": assembled,
-        "preloads": [1.0 - assembled / pad.pad_clearance for pad in bearing.pads],
-        "thickness": fmean(pad.thickness for pad in bearing.pads),
+        "preloads": [1.0 - assembled / pad.pad_clearance for pad in pads],
+        "thickness": fmean(pad.thickness for pad in pads),
         "angles": [math.pi - angle for angle in angles] if clockwise else angles,
         "viscosity_100": float(bearing.oil.viscosity(100.0)),
     }
     _write(folder / "ross_bearing.py", "ross_bearing", fields)
-
-
-def _not_held(bearing: Any, version: int) -> list[str]:
-    """What a call of `TiltingPad` loses of a bearing."""
-    pads = bearing.pads
-    remarks = [
-        f"pivots ({bearing.pivot.kind}): rigid here; no law per pad, and none that was measured",
-        "mass of pads, their bending, heat into them, thermal expansion of the oil",
-    ]
-    if bearing.rotation == ROTATIONS[1]:
-        remarks.append("the sense of the drawing, clockwise: this is its mirror image, x to -x, last pad first")
-    if len({pad.assembled_clearance for pad in pads}) > 1:
-        clearances = ", ".join(f"{1e6 * pad.assembled_clearance:.4g}" for pad in pads)
-        remarks.append(f"assembled clearance by pad ({clearances} um): the mean stands for all")
-    if len({pad.thickness for pad in pads}) > 1:
-        remarks.append("thickness by pad: the mean stands for all")
-    if version == 2 and len({(pad.arc, pad.pivot_offset, pad.pad_clearance) for pad in pads}) > 1:
-        remarks.append("pads that differ: ROSS 2 takes arc, offset and preload of the first for all")
-    return remarks

@@ -78,14 +78,12 @@ def write_report(
     'report.html'
     """
     frame = comparison.table
-    answer, *more = summary_sentences(comparison)
     points, flagged = comparison.identification.points, _flagged(comparison)
     campaign, bearing = comparison.campaign, comparison.bearing
     page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
         subtitle=campaign.description,
-        answer=answer,
-        more=more,
+        sentences=summary_sentences(comparison),
         facts=tested_facts(campaign, bearing, points) | ({"Note": note} if note else {}),
         key_table=deviations_table(frame),
         values=values_table(points),
@@ -102,9 +100,9 @@ def write_report(
 def deviations_table(table: pd.DataFrame) -> Table:
     """How far predictions of a table of comparison.csv are off, by pivot model."""
     rows = []
-    for name, found in agreements(table).iterrows():
-        cells = [f"{percent(median)} ({percent(found['worst', k])})" for k, median in found["median"].items()]
-        rows.append([MODEL_LABELS.get(str(name), str(name)), *cells, number_inside(found)])
+    for name, agreement in agreements(table).iterrows():
+        cells = [f"{percent(median)} ({percent(agreement['worst', k])})" for k, median in agreement["median"].items()]
+        rows.append([MODEL_LABELS.get(str(name), str(name)), *cells, number_inside(agreement)])
     return Table(
         "Predicted / measured - 1: median (largest); inside: predictions within the measured 95 % interval",
         ["", *DIRECT, "inside"],
@@ -226,12 +224,11 @@ def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None,
     return Table("Measured tangent stiffness, 95 %", columns, rows)
 
 
-def clearance_table(polygon: ClearancePolygon, drawn: FloatArray, calibrated: bool = False) -> Table:
-    """Clearance per pad at zero push load beside the drawing's; `calibrated` with the error of the probes' gains."""
+def clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
+    """Clearance per pad at zero push load beside the drawing's; intervals hold the error of the probes' gains."""
     unit = size("length")
     digits = 2 if unit < 1e-5 else 4
-    gain = polygon.relative_calibration if calibrated else 0.0
-    halves = 1.96 * np.hypot(polygon.clearance_se, gain * polygon.clearance)
+    halves = 1.96 * np.hypot(polygon.clearance_se, polygon.relative_calibration * polygon.clearance)
     rows = []
     for k, (drawing, value, half) in enumerate(zip(drawn, polygon.clearance, halves, strict=True)):
         measured = with_interval(value, value - half, value + half, unit)

@@ -122,10 +122,10 @@ def place(range_text: str) -> str:
 
 def in_words(text: str) -> str:
     """A sentence of a diagnosis without the names of its variables."""
-    found = place(text).removeprefix("at ")
+    sentence = place(text).removeprefix("at ")
     for name, words in _OBSERVABLES.items():
-        found = found.replace(name, words)
-    return label_in_words(re.sub(r"(-?\d(?:\.\d+)?e[+-]?\d+) (N/m|N s/m|m|rad)\b", _read, found))
+        sentence = sentence.replace(name, words)
+    return label_in_words(re.sub(r"(-?\d(?:\.\d+)?e[+-]?\d+) (N/m|N s/m|m|rad)\b", _read, sentence))
 
 
 def _read(number: re.Match[str]) -> str:
@@ -177,7 +177,6 @@ def write_diagnosis_report(
     """Write report.html and its figures into an existing folder."""
     verdict = result.diagnosis.verdict
     table = before_and_after(result.diagnosis, result.identification)
-    answer, *more = verdict_sentences(campaign.id, verdict, median_deviations(table))
     points = () if result.identification is None else result.identification.points
     title = "Effects added to the model, with 95 % intervals"
     added = Table(title, ["effect", "parameter", "value"], parameter_rows(verdict))
@@ -185,8 +184,7 @@ def write_diagnosis_report(
     page = Page(
         title=f"{campaign.id}: what the model lacks",
         subtitle=campaign.description,
-        answer=answer,
-        more=more,
+        sentences=verdict_sentences(campaign.id, verdict, median_deviations(table)),
         facts=tested_facts(campaign, result.setup.bearing, points),
         values=values_table(points),
         flags=flags_line([p.quality for p in points], len(points)),
@@ -227,7 +225,7 @@ def _other_explanations(verdict: Verdict) -> Section:
         notes.append(f"These data cannot tell apart: {names}.")
     if verdict.effects:
         notes += _rivals(verdict)
-    if verdict.next_test:
+    if verdict.next_test and verdict.verdict != "consistent":
         notes.append(f"Next test: {in_words(verdict.next_test)}.")
     return Section("What else could it be, and the test that tells", notes)
 
@@ -237,16 +235,16 @@ def _rivals(verdict: Verdict) -> list[str]:
     names = {effect.name for effect in verdict.effects}
     listed = verdict.candidates
     named = [c for c in listed if {label.split()[0] for label in c.parameters} - set(TERMS) == names][:1]
-    own = named[0].probability if named else 0.0
+    probability = named[0].probability if named else 0.0
     odds = DiagnoseSettings.included / (1.0 - DiagnoseSettings.included)
     notes = []
     for rival in listed:
-        if rival not in named and rival.probability * odds > own:
+        if rival not in named and rival.probability * odds > probability:
             sizes = [
                 finding(label.split()[0], {key: Estimate(**value) for key, value in parameters.items()})
                 for label, parameters in rival.parameters.items()
             ]
-            share = f"probability {rival.probability:.2f}, that of what is named {own:.2f}"
+            share = f"probability {rival.probability:.2f}, that of what is named {probability:.2f}"
             notes.append(f"It may also be that {' and '.join(sizes)}: {share}.")
     return notes or [f"No other explanation that was fitted comes within odds of 1 to {odds:.0f} of it."]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from tpjb_ident.columns import per, place_of, size, spinning, symbol
+from tpjb_ident.columns import place_of, size, spinning, symbol
 from tpjb_ident.compare.difference import Difference, changed_column, difference_sentences
 from tpjb_ident.conditions import KINDS, Condition
 from tpjb_ident.report.drawing.picture import (
@@ -39,7 +39,6 @@ _SIDES = {"a": "first", "b": "second", "difference": "difference"}
 
 def write_difference_report(folder: Path, difference: Difference, origin: Mapping[str, Any]) -> Path:
     """Write report.html and its figure into an existing folder."""
-    answer, *more = difference_sentences(difference)
     a, b, points = difference.a, difference.b, difference.points
     flags = [Condition(name) for name in "; ".join(_flags(points)).split("; ") if name in KINDS]
     page = Page(
@@ -50,8 +49,7 @@ def write_difference_report(folder: Path, difference: Difference, origin: Mappin
         values=_values_table(difference) if len(points) else None,
         flags=flags_line([flags], len(points)),
         lead="difference",
-        answer=answer,
-        more=more,
+        sentences=difference_sentences(difference),
         sections=_sections(difference),
         **origin,
     )
@@ -97,7 +95,7 @@ def _sections(difference: Difference) -> list[Section]:
         tables = [_coefficient_table(points, kind) for kind in (STIFFNESS, DAMPING)]
         sections.append(Section("Coefficients", panels=[Panel("difference", _TITLE, _drawn, points)], tables=tables))
     if len(pivots):
-        loads = (per("load") * pivots["force_N"]).map("{:.3g}".format)
+        loads = (pivots["force_N"] / size("load")).map("{:.3g}".format)
         cells = {"pad": _pads(pivots), f"load, {symbol('load')}": loads, **_both(pivots, TANGENT, "stiffness")}
         table = table_of("Tangent stiffness of the pivots, where both were measured; 95 %", cells)
         sections.append(Section("Pivots", tables=[table]))

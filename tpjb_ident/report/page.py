@@ -67,8 +67,7 @@ class Page:
 
     title: str
     subtitle: str
-    answer: str
-    more: Sequence[str] = ()
+    sentences: Sequence[str]  #: what came out, the answer first
     facts: Mapping[str, str] = field(default_factory=dict)  #: what was tested
     key_table: Table | None = None
     values: Table | None = None  #: K and C at one point

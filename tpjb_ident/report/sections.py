@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,9 +15,9 @@ from matplotlib.ticker import LogLocator
 
 from rigdata.arrays import FloatArray
 from rigdata.problem import RigDataError
-from tpjb_ident.columns import amount, channel_unit, degrees, per, place_of, spinning, symbol
+from tpjb_ident.columns import amount, channel_unit, degrees, place_of, size, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
-from tpjb_ident.conditions import SEVERITIES
+from tpjb_ident.conditions import SEVERITIES, untrusted
 from tpjb_ident.report.drawing.picture import (
     BLUE,
     CROSS,
@@ -80,7 +81,7 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
     measured = ", ".join(text for text in (campaign.date, campaign.by) if text)
     return facts | {
         "Runs": f"{len(campaign.runs)} ({kinds})",
-        "Measured": measured or "date and by are not in campaign.toml",
+        "Measured": measured or "date and by are not stated",
     }
 
 
@@ -91,7 +92,7 @@ def set_points(keys: Sequence[tuple[float, float, float, float, str]]) -> dict[s
     loads, directions, speeds, excitations, senses = zip(*keys, strict=True)
     shaft = ", ".join(spinning(*turning) for turning in sorted(set(zip(speeds, senses, strict=True))))
     at = ", ".join(f"{angle:g}°" for angle in sorted(set(directions)))
-    load = _span({value * per("load") for value in loads}, symbol("load"))
+    load = _span({value / size("load") for value in loads}, symbol("load"))
     return {"Static load": f"{load} at {at}", "Shaft": shaft, "Excitation": _span(set(excitations), "Hz")}
 
 
@@ -117,8 +118,8 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
 
 def interval_cells(frame: pd.DataFrame, column: str, scale: float) -> list[str]:
     """Values of a column with half their intervals."""
-    ends = (frame[column + end] for end in ("", "_lo", "_hi"))
-    return [with_interval(value, low, high, scale) for value, low, high in zip(*ends, strict=True)]
+    ends = frame[[column, f"{column}_lo", f"{column}_hi"]].itertuples(index=False, name=None)
+    return [with_interval(value, low, high, scale) for value, low, high in ends]
 
 
 def coefficient_cells(frame: pd.DataFrame, kinds: Sequence[Coefficient], side: str = "") -> dict[str, list[str]]:
@@ -133,11 +134,10 @@ def coefficient_cells(frame: pd.DataFrame, kinds: Sequence[Coefficient], side: s
 
 def flags_line(flags: Iterable[Iterable[Condition]], points: int) -> str:
     """The flags of a result with how often each is there, gravest first; "" where it has no points."""
-    counts = Counter((str(c), c.severity) for conditions in flags for c in conditions)
-    texts = []
-    for grave in SEVERITIES:
-        texts += [f"{name} ({n})" if n > 1 else name for (name, severity), n in counts.items() if severity == grave]
-    bad = sum(n for (_, severity), n in counts.items() if severity == "error")
+    counts = Counter(itertools.chain.from_iterable(flags))
+    gravest_first = sorted(counts, key=lambda flag: SEVERITIES.index(flag.severity))
+    texts = [f"{flag} ({counts[flag]})" if counts[flag] > 1 else flag for flag in gravest_first]
+    bad = sum(counts[flag] for flag in untrusted(counts))
     head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"
     none = f"No flags on {counted(points, 'point')}." if points else ""
     return f"{head}: {', '.join(texts)}." if texts else none
@@ -156,7 +156,7 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
     """Channels with their calibration."""
     rows = []
     for channel in channels:
-        unit, scale = channel_unit(channel.quantity)
+        unit, scale, _ = channel_unit(channel.quantity)
         if not unit:
             continue
         axis = "" if channel.axis is None else f"{math.degrees(channel.axis):g}°"
@@ -196,7 +196,7 @@ def _run_matrix(runs: Sequence[Run]) -> Table:
     for run in runs:
         p = run.point
         several = run.kind in {"locus", "dry_pivot"}
-        load = f"{p.static_load * per('load'):.6g}" if p.static_load else "–"
+        load = f"{p.static_load / size('load'):.6g}" if p.static_load else "–"
         direction = "several" if several else f"{p.static_load_direction_deg:g}"
         shaft = f"{p.shaft_speed_hz:g} ({60 * p.shaft_speed_hz:.6g})"
         excitation = f"{p.excitation_hz:g}" if p.excitation else "–"
@@ -238,9 +238,7 @@ def _stiffness_panels(result: Identification) -> list[Panel]:
     panels = []
     series = longest_series(result.to_frame(), "frequency") if result.points else None
     if series is not None:
-        title = (
-            f"Dynamic stiffness h over frequency, {constant_along(series, 'frequency')}; a line: the model that fits"
-        )
+        title = f"Dynamic stiffness h over frequency, {constant_along(series, 'frequency')}"
         panels.append(Panel("h-over-frequency", title, frf, result))
     for number, band in enumerate(result.bands, start=1):
         key = band.key()
@@ -300,7 +298,7 @@ def pivot_panels(curves: Sequence[PivotCurve], formula: Formula | None = None) -
 def position_panels(
     polygon: ClearancePolygon | None,
     drawn: tuple[FloatArray, FloatArray],
-    measured: Locus | FloatArray | None,
+    measured: Locus | None,
     predicted: Mapping[str, FloatArray],
     others: Sequence[ClearancePolygon] = (),
 ) -> list[Panel]:
@@ -308,8 +306,6 @@ def position_panels(
 
     `drawn` is the drawing's (n_pads,) pad angles [rad] and clearances [m]; positions are (n, 2) [m].
     """
-    if isinstance(measured, np.ndarray) and not len(measured):
-        measured = None
     if polygon is None and measured is None:
         return []
     polygons = None if polygon is None else {"measured": polygon} | {f"run {p.run}": p for p in others}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tpjb_ident.columns import amount, per, spinning, symbol
+from tpjb_ident.columns import set_point, size, symbol
 from tpjb_ident.report.comparison_page import clearance_table, pivot_stiffness_table
 from tpjb_ident.report.drawing.picture import DIRECT, longest_series
 from tpjb_ident.report.figure import Panel, svg_text
@@ -34,15 +34,13 @@ def write_watch_page(
     folder: Path, snapshot: Snapshot, refresh: int, origin: Mapping[str, Any], bearing: Any = None
 ) -> None:
     """Write ``watch.html``, whole or not at all, with its figures inside; the next command comes after the last run."""
-    answer, *more = [step.text for step in snapshot.steps] or ["Nothing to do: records are being written."]
     landed = snapshot.count("good", "look", "repeat", "replaced")
     points = [p for p in snapshot.measured.points if not lacking(p)]
     page = Page(
         title=f"{snapshot.campaign.id}: while it is measured",
         subtitle=f"{landed} of {len(snapshot.states)} runs are recorded, {snapshot.count('repeat')} to be repeated, "
         f"{snapshot.count('to run')} to run",
-        answer=answer,
-        more=more,
+        sentences=[step.text for step in snapshot.steps] or ["Nothing to do: records are being written."],
         facts=tested_facts(snapshot.campaign, bearing, points),
         key_table=coverage_table(snapshot),
         values=values_table(points),
@@ -60,7 +58,9 @@ def coverage_table(snapshot: Snapshot) -> Table:
     """How many runs of every kind and set-up have landed."""
     groups: dict[str, list[RunStatus]] = {}
     for status in snapshot.states:
-        groups.setdefault(_group(status), []).append(status)
+        kind = status.run.kind
+        name = set_point(status.run.point) if kind == "dynamic" else KINDS_IN_WORDS.get(kind, kind)
+        groups.setdefault(name, []).append(status)
     rows = []
     for name, group in groups.items():
         good = sum(s.counts for s in group)
@@ -68,15 +68,6 @@ def coverage_table(snapshot: Snapshot) -> Table:
         missing = sum(s.state in _WAITING for s in group)
         rows.append([name, str(good), str(again), str(missing)])
     return Table("How far the plan is", ["", "good", "to repeat", "to run"], rows)
-
-
-def _group(status: RunStatus) -> str:
-    run, p = status.run, status.run.point
-    if run.kind != "dynamic":
-        return KINDS_IN_WORDS.get(run.kind, run.kind)
-    shaft = spinning(p.shaft_speed_hz, p.rotation)
-    set_point = f"{amount(p.static_load, 'load')}, {p.static_load_direction_deg:g} deg, shaft {shaft}"
-    return f"{set_point}, excited at {p.excitation_hz:g} Hz"
 
 
 def _sections(snapshot: Snapshot, bearing: Any) -> list[Section]:
@@ -128,7 +119,7 @@ def points_table(points: Sequence[PointResult]) -> Table:
         why, solved = lacking(p), p.stiffness.cells()
         cells = ["–" if why else solved[i] for i in (0, 3, 4, 7)]
         flags = why or ", ".join(q.sentence() for q in p.quality)
-        place = [f"{p.point.static_load * per('load'):.6g}", f"{p.point.excitation_hz:g}", str(p.n_records)]
+        place = [f"{p.point.static_load / size('load'):.6g}", f"{p.point.excitation_hz:g}", str(p.n_records)]
         rows.append([*place, *cells, flags])
     direct = [f"{name}, {symbol('stiffness' if name[0] == 'k' else 'damping')}" for name in DIRECT]
     columns = [f"load, {symbol('load')}", "excitation, Hz", "records", *direct, "flags"]

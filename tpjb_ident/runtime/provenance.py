@@ -33,15 +33,15 @@ def sha256(path: Path) -> str:
 
 
 @functools.cache
-def source_stamp(packages: tuple[str, ...] = ("rigdata", "tpjb_ident")) -> str:
-    """SHA-256 of the versions of all packages and of the sources of some.
+def source_stamp() -> str:
+    """SHA-256 of the versions of all packages and of our sources, the model's apart.
 
     Kept results of other code count for nothing.
     """
     import importlib.util
 
     digest = hashlib.sha256(json.dumps(versions(), sort_keys=True).encode())
-    for package in packages:
+    for package in ("rigdata", "tpjb_ident"):
         spec = importlib.util.find_spec(package)
         for folder in sorted(spec.submodule_search_locations or ()) if spec else ():
             for source in sorted(Path(folder).rglob("*.py")):

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigdata.problem import RigDataError
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
-from tpjb_ident.columns import amount, channel_unit
+from tpjb_ident.columns import channel_unit, set_point
 from tpjb_ident.report.drawing.picture import LIGHT, thinned
 from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.page import Section, render_section
@@ -43,8 +43,8 @@ def records_tab(campaign: Campaign) -> Any:
     facts = Div(name="run-facts", sizing_mode="stretch_width")
     orbit_of_run = text_element("orbit")
     plots = {
-        "time": _new_plot("channels over time", "time, s", "", name="time-plot"),
-        "spectrum": _new_plot("amplitude spectrum", "frequency, Hz", "", y_axis_type="log", name="spectrum-plot"),
+        "time": _new_plot("channels over time", "time, s", name="time-plot"),
+        "spectrum": _new_plot("amplitude spectrum", "frequency, Hz", y_axis_type="log", name="spectrum-plot"),
     }
     data = {name: ColumnDataSource(_nothing()) for name in plots}
     for name, plot in plots.items():
@@ -54,10 +54,6 @@ def records_tab(campaign: Campaign) -> Any:
 
     def update() -> None:
         run = runs[pick.value]
-        p = run.point
-        load = amount(p.static_load, "load")
-        text = f"{run.kind}, {load} at {p.static_load_direction_deg:g} deg, {p.shaft_speed_hz:g} Hz"
-        text += f", excitation {p.excitation_hz:g} Hz" if p.excitation else ""
         try:
             records = [run.record(channel.value), *(run.record(n) for n in further.value if n != channel.value)]
             message = _show_channels(records, plots, data)
@@ -65,7 +61,7 @@ def records_tab(campaign: Campaign) -> Any:
             message = str(error)
             for source in data.values():
                 source.data = _nothing()
-        facts.text = html.escape(printable(f"{text}. {message}"))
+        facts.text = html.escape(printable(f"{run.kind}, {set_point(run.point)}. {message}"))
         orbit_of_run.text = _orbit(run)
 
     follow(update, pick, channel, further)
@@ -98,11 +94,11 @@ def follow(update: Callable[[], None], *widgets: Any, event: str = "value") -> N
 def _show_channels(records: Sequence[Record], plots: dict[str, Any], data: dict[str, Any]) -> str:
     """Draw channels of one quantity over time and frequency; what is to be said of them."""
     first = records[0]
-    unit, scale = channel_unit(first.quantity)
+    unit, scale, zero = channel_unit(first.quantity)
     drawn = [r for r in records if r.quantity == first.quantity][: len(_COLOURS)]
     plots["time"].yaxis.axis_label = f"{first.name if len(drawn) == 1 else first.quantity}, {unit}"
     plots["spectrum"].yaxis.axis_label = f"amplitude, {unit}"
-    paths = [thinned(r.time, r.values / scale, _MOST_POINTS) for r in drawn]
+    paths = [thinned(r.time, (r.values - zero) / scale, _MOST_POINTS) for r in drawn]
     spectra = [amplitude_spectrum(r.values / scale, r.rate) for r in drawn]
     foot = slice(4, None)  # of the window, about zero
     curves = {"time": paths, "spectrum": [(f[foot], np.maximum(a[foot], 1e-12)) for f, a in spectra]}
@@ -134,16 +130,11 @@ def _side_by_side(*parts: Any) -> Any:
     return row(*parts, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
 
 
-def _new_plot(title: str, x: str, y: str, **options: Any) -> Any:
+def _new_plot(title: str, x: str, **options: Any) -> Any:
     """Make an empty plot."""
     from bokeh.plotting import figure
 
-    settings = {
-        "height": 280,
-        "min_width": 330,
-        "sizing_mode": "stretch_width",
-        "tools": "pan,box_zoom,wheel_zoom,reset,save",
-    }
-    plot = figure(title=title, x_axis_label=x, y_axis_label=y, **{**settings, **options})
+    plot = figure(title=title, x_axis_label=x, y_axis_label="", height=280, min_width=330,
+                  sizing_mode="stretch_width", tools="pan,box_zoom,wheel_zoom,reset,save", **options)  # fmt: skip
     plot.toolbar.logo = None
     return plot

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.columns import amount, per, size, symbol
+from tpjb_ident.columns import amount, set_point, size, symbol
 from tpjb_ident.compare.comparison import joined
 from tpjb_ident.compare.predictions import ModelSettings, point_columns, predict_points
 from tpjb_ident.conditions import untrusted
@@ -38,19 +38,17 @@ _LINES = np.arange(5.0, 85.0, 5.0)
 _NEAR = 0.02
 
 
-def verdict_tab(session: Session) -> Any:
+def verdict_tab(session: Session, identification: Identification) -> Any:
     """Build the first tab: what was tested, how far to trust it, K and C at one point, predictions against it."""
-    identification, campaign = session.identification, session.campaign
-    assert identification is not None
-    assert campaign is not None
+    assert session.campaign is not None
     points = identification.points
-    facts = tested_facts(campaign, session.bearing, points)
+    facts = tested_facts(session.campaign, session.bearing, points)
     notes = [f"{name}: {value}" for name, value in facts.items()]
     notes.append(flags_line([p.quality for p in points], len(points)))
     values = values_table(points)
     tables = [] if values is None else [values]
     if session.bearing is not None and points:
-        tables.append(deviations_table(_compared(session, [p.point for p in points], identification.to_frame())))
+        tables.append(deviations_table(_all_compared(session, identification)))
     bad = sum(bool(untrusted(p.quality)) for p in points)
     title = f"{counted(len(points), 'operating point')}, {f'{bad} NOT to be trusted' if bad else 'all to be trusted'}"
     return text_element("verdict", render_section(Section(title, notes, tables=tables)))
@@ -61,10 +59,7 @@ def points_tab(identification: Identification) -> Any:
     from bokeh.layouts import column
     from bokeh.models import Select
 
-    points = {}
-    for p in identification.points:
-        place = f"{amount(p.point.static_load, 'load')} at {p.point.static_load_direction_deg:g} deg"
-        points[f"{place}, {p.point.speed_words}, excitation {p.point.excitation_hz:g} Hz"] = p
+    points = {set_point(p.point): p for p in identification.points}
     choice = Select(title="operating point", options=list(points), value=next(iter(points)), name="point", width=320)
     windows = text_element("windows")
 
@@ -88,35 +83,31 @@ def _points_html(identification: Identification) -> str:
     return render_section(Section("All points", panels=panels, tables=[measured_table(identification)]))
 
 
-def model_tab(session: Session) -> Any:
+def model_tab(session: Session, identification: Identification) -> Any:
     """Build the tab: coefficients over excitation at the slider's load, then the residuals of all points."""
     from bokeh.layouts import column
     from bokeh.models import Slider
 
-    identification = session.identification
-    assert identification is not None
-    loads = sorted({p.point.static_load * per("load") for p in identification.points})
+    loads = sorted({p.point.static_load / size("load") for p in identification.points})
     step = 0.05 if size("load") > 100.0 else 10.0
     load = Slider(title=f"static load, {symbol('load')}", start=step * round(0.8 * loads[0] / step), value=loads[0],
                   end=step * round(1.15 * loads[-1] / step), step=step, name="load", width=320)  # fmt: skip
     curves = text_element("curves")
-    html = functools.lru_cache(maxsize=512)(functools.partial(_curves_html, session))
+    html = functools.lru_cache(maxsize=512)(functools.partial(_curves_html, session, identification))
 
     def update() -> None:
         curves.text = html(round(load.value * size("load"), 3))
 
     follow(update, load, event="value_throttled")  # when a moving slider is let go
-    table = _compared(session, [p.point for p in identification.points], identification.to_frame())
-    residuals = Panel("residual-map", "Residuals of all points", residual_map(table))
+    residuals = Panel("residual-map", "Residuals of all points", residual_map(_all_compared(session, identification)))
     html_of_all = render_section(Section("All points", panels=[residuals]))
     return column(load, curves, text_element("residuals", html_of_all), sizing_mode="stretch_width")
 
 
-def _curves_html(session: Session, load: float) -> str:
+def _curves_html(session: Session, identification: Identification, load: float) -> str:
     """Direct coefficients over excitation at one load, with every pivot model."""
-    assert session.identification is not None
-    first = session.identification.points[0].point
-    measured = session.identification.to_frame()
+    first = identification.points[0].point
+    measured = identification.to_frame()
     measured = measured[(measured["static_load_N"] / load - 1.0).abs() < _NEAR]
     measured = measured.assign(static_load_N=load)
     frequencies = sorted({*_LINES, *measured["excitation_Hz"]})
@@ -128,6 +119,10 @@ def _curves_html(session: Session, load: float) -> str:
         panels.append(Panel(f"model-{name}", f"{name} over excitation at {amount(load, 'load')}", figure))
     note = f"{counted(len(measured), 'measured point')} at this load."
     return render_section(Section("Prediction and measurement", [note], panels))
+
+
+def _all_compared(session: Session, identification: Identification) -> pd.DataFrame:
+    return _compared(session, [p.point for p in identification.points], identification.to_frame())
 
 
 def _compared(session: Session, points: Sequence[OperatingPoint], measured: pd.DataFrame) -> pd.DataFrame:

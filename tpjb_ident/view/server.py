@@ -158,15 +158,15 @@ def _add_results(document: Any, session: Session, tabs: Any) -> None:
         with session.lock:
             identification = session.identification
         assert identification is not None
-        children = {"verdict": verdict_tab(session), "points and windows": points_tab(identification)}
+        children = {"verdict": verdict_tab(session, identification), "points and windows": points_tab(identification)}
         if session.bearing is not None:
-            children["prediction and measurement"] = model_tab(session)
+            children["prediction and measurement"] = model_tab(session, identification)
     except (RigError, TpjbError, ValueError) as error:  # what is wrong with the records stands on the page
         children = {"verdict": Div(text=html.escape(printable(error)), name="verdict")}
-    found = [TabPanel(child=child, title=title) for title, child in children.items()]
+    panels = [TabPanel(child=child, title=title) for title, child in children.items()]
 
     def show() -> None:
-        tabs.tabs = [found[0], *tabs.tabs[1:], *found[1:]]
+        tabs.tabs = [panels[0], *tabs.tabs[1:], *panels[1:]]
 
     document.add_next_tick_callback(show)
 

@@ -13,7 +13,7 @@ from rigdata.problem import Problem
 from rigdata.run import Run
 from tpjb_ident.check.findings import Finding, grouped
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.columns import amount, place_of
+from tpjb_ident.columns import place_of, set_point
 from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.rounding import counted, listed
@@ -21,6 +21,10 @@ from tpjb_ident.rounding import counted, listed
 State = Literal["to run", "being written", "good", "look", "repeat", "replaced"]
 #: Warnings of the check that only another record repairs: what was lost cannot be calibrated back.
 _LOST_SAMPLES = ("clipped", "dead", "empty", "missing", "stuck", "gap", "jitter", "short", "no excitation", "step")
+
+
+#: Key of the finding that a record is cut off, which says nothing of the next one.
+CUT = "short record"
 
 
 @dataclass(frozen=True)
@@ -43,26 +47,23 @@ def judge_states(
     expected: Sequence[RunStatus], observations: Sequence[Observation]
 ) -> tuple[list[RunStatus], list[list[Finding]]]:
     """State of every run, and the findings that so many runs share that no repeat will cure them."""
-    seen = {observation.run.id: observation.report.findings for observation in observations}
-    grave = [f for f in itertools.chain.from_iterable(seen.values()) if f.problem.severity != "note"]
+    reported = {observation.run.id: observation.report.findings for observation in observations}
+    grave = [f for f in itertools.chain.from_iterable(reported.values()) if f.problem.severity != "note"]
     groups = grouped(grave, [observation.run for observation in observations])
     common = [group for group, concerned in groups if concerned]
     shared = set(map(id, itertools.chain.from_iterable(common)))
     states = []
     for status in expected:
-        found = seen.get(status.run.id)
-        if status.state == "to run" and found is not None:
-            findings = sorted((f for f in found if id(f) not in shared), key=_urgency)
+        of_run = reported.get(status.run.id)
+        if status.state == "to run" and of_run is not None:
+            # what has a say in the state of a run comes first, then the gravest
+            order = sorted(of_run, key=lambda f: (not _forces_repeat(f), SEVERITIES.index(f.problem.severity)))
+            findings = [finding for finding in order if id(finding) not in shared]
             grave = [finding for finding in findings if finding.problem.severity != "note"]
             state: State = "repeat" if any(map(_forces_repeat, findings)) else "look" if grave else "good"
             status = replace(status, state=state, findings=tuple(findings))
         states.append(status)
     return _replaced(states), common
-
-
-def _urgency(finding: Finding) -> tuple[bool, int]:
-    """What has a say in the state of a run comes first, then the gravest."""
-    return not _forces_repeat(finding), SEVERITIES.index(finding.problem.severity)
 
 
 def _forces_repeat(finding: Finding) -> bool:
@@ -134,23 +135,15 @@ def _set_up(run: Run) -> tuple[float, float, float]:
     return run.point.static_load, run.point.static_load_direction, run.point.spin
 
 
-def _load(point: OperatingPoint) -> str:
-    return f"{amount(point.static_load, 'load')} at {point.static_load_direction_deg:g} deg"
-
-
 def described(run: Run) -> str:
     """A test in words and units."""
-    p = run.point
     if run.kind == "dry_pivot":
         return f"dry load steps on pad #{run.pad}, {run.branch}"
     if run.kind == "clearance":
         return "clearance sweep"
-    words = [_load(p), f"shaft {p.shaft_speed_hz:g} Hz"]
-    if p.excitation:
-        words.append(f"excited at {p.excitation_hz:g} Hz")
-    if run.excitation_direction is not None:
-        words.append(f"along {math.degrees(run.excitation_direction):.0f} deg")
-    return ", ".join(words)
+    direction = run.excitation_direction
+    along = "" if direction is None else f", along {math.degrees(direction):.0f} deg"
+    return set_point(run.point) + along
 
 
 def lacking(point: PointResult) -> str:
@@ -174,7 +167,7 @@ def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
     steps: list[Step] = []
     stopped: set[str] = set()
     for finding in landed[0].findings if landed else ():
-        if not finding.key.startswith(_LOST_SAMPLES) or finding.problem.severity == "note":
+        if finding.problem.severity == "note" or finding.key == CUT or not finding.key.startswith(_LOST_SAMPLES):
             continue
         with_it = itertools.takewhile(lambda s: finding.key in {f.key for f in s.findings}, landed)  # noqa: B023 (here)
         runs = tuple(s.run.id for s in with_it)[::-1]
@@ -196,7 +189,7 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         when = f"({described(run)})"
         if run.kind in _TURNING:
             is_later = at is not None and _set_up(run) != _set_up(at)
-            back = f"when you are back at {_load(run.point)}, {run.point.shaft_speed_hz:g} Hz"
+            back = f"when you are back at {set_point(replace(run.point, excitation=0.0))}"
             when = back if is_later else "before you change the load"
         text = f"Repeat {run.id} {when}: {located(problem)}. {problem.cure}."
         steps.append((is_later, Step("repeat", text, (run.id,))))

@@ -3,7 +3,6 @@
 import contextlib
 import datetime
 import functools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -30,7 +29,7 @@ from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.runs.run_store import FileState, RunStore, file_state
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.watch.landing import NewFiles, Unplanned, place_record
-from tpjb_ident.watch.next_steps import RunStatus, State, Step, judge_states, next_steps, plan_lacks
+from tpjb_ident.watch.next_steps import CUT, RunStatus, State, Step, judge_states, next_steps, plan_lacks
 
 #: Share of the usual length below which a record was cut off.
 _WHOLE = 0.8
@@ -262,15 +261,14 @@ def _read(run: Run, path: Path, mark: tuple[Any, ...]) -> _Record:
 
 def _name_cut_records(observations: Sequence[Observation], lengths: Sequence[float]) -> None:
     """Note records below `_WHOLE` of the median length of their kind, before everything else that follows from it."""
-    of_kind: dict[str, list[float]] = {}
+    kinds = np.array([observation.run.kind for observation in observations])
+    known = np.array(lengths) > 0.0
     for observation, length in zip(observations, lengths, strict=True):
-        of_kind.setdefault(observation.run.kind, []).append(length or math.nan)
-    for observation, length in zip(observations, lengths, strict=True):
-        same_kind = of_kind[observation.run.kind]
-        usual = float(np.nanmedian(same_kind)) if length else 0.0
-        if 0 < length < _WHOLE * usual and np.isfinite(same_kind).sum() > 2:
+        same_kind = np.array(lengths)[known & (kinds == observation.run.kind)]
+        usual = float(np.median(same_kind)) if len(same_kind) > 2 else 0.0
+        if 0.0 < length < _WHOLE * usual:
             cure = "Copy it again from the logger, or repeat the run"
             what = f"{length:.3g} s long, the others of its kind {usual:.3g} s: cut off, or not written to its end"
-            observation.report.note("short record", "error", "record", what, cure)
-            found: list[Finding] = observation.report.findings
-            found.insert(0, found.pop())
+            observation.report.note(CUT, "error", "record", what, cure)
+            findings: list[Finding] = observation.report.findings
+            findings.insert(0, findings.pop())

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import Column, words
 from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.errors import BadInputError
@@ -34,7 +33,7 @@ def span(*values: float) -> str:
 RANGES = ("rate {frequency}", "load {load}", "direction {angle}", "speed {frequency}", "excitation {frequency}")
 
 
-@command(f"tpjb check {DEMO}", f"tpjb check {DEMO} --json > findings.json")
+@command("tpjb check {DEMO}", "tpjb check {DEMO} --json > findings.json")
 def check(c: Command, campaign: Path) -> None:
     """Report every problem of a campaign, not just the first.
 
@@ -75,7 +74,9 @@ def check(c: Command, campaign: Path) -> None:
         c.next("check" if errors else "identify" if dynamic else "pivot", campaign)
     if errors:
         findings = c.target / "check.json"
-        raise BadInputError(f"{path}: {counted(errors, 'error')}, listed above and in {findings}: to be mended.")
+        raise BadInputError(
+            f"{path}: {counted(errors, 'error')}, listed above and in {findings}. Mend them, then check again."
+        )
 
 
 def check_summary(c: Command, name: str, problems: Sequence[Problem], campaign: Campaign | None) -> dict[str, Any]:
@@ -122,8 +123,9 @@ def _drawing_problems(c: Command, campaign: Campaign, problems: list[Problem]) -
     try:
         return bearing_problems(campaign, c.bearing_of(campaign), problems)
     except BearingError as error:
-        what = str(error).partition("\n")[0]
-        return [Problem("warning", campaign.bearing_name, "", what, "Mend it, or give --bearing where one is needed")]
+        file = campaign.bearing_name
+        what = str(error).partition("\n")[0].removeprefix(file).strip(",:. ")
+        return [Problem("warning", file, "", what, "Or give --bearing FILE where one is needed")]
 
 
 def _show_coverage(c: Command, campaign: Campaign) -> None:

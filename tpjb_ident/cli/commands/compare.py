@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import identified, identify_settings, refuse_untrusted, write_identification
 from tpjb_ident.cli.inputs import model_settings, open_source, parse_share
-from tpjb_ident.cli.options import DEMO, known_names
+from tpjb_ident.cli.options import known_names
 from tpjb_ident.columns import amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import listed, percent
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 
 @command(
-    f"tpjb compare {DEMO}",
-    f'tpjb compare {DEMO} --pivots "kirk, measured" --thermal tehd',
-    f"tpjb compare {DEMO} --prediction xltrc.csv --prediction sheet.csv",
+    "tpjb compare {DEMO}",
+    'tpjb compare {DEMO} --pivots "kirk, measured" --thermal tehd',
+    "tpjb compare {DEMO} --prediction xltrc.csv --prediction sheet.csv",
     "tpjb compare before.h5 after.h5",
 )
 def compare(
@@ -42,7 +42,7 @@ def compare(
     norm: str | None = None,
     prediction: list[Path] | None = None,
 ) -> None:
-    """Compare prediction and measurement, or two campaigns, with a report.
+    """Compare prediction and measurement, or two campaigns.
 
     With rigid, Kirk and measured pivots: report.html, tables of comparison, coefficients, estimators, windows, pivot
     curves, locus and clearance, pivots.toml, figures. Two campaigns of one rig (before and after an overhaul), or
@@ -51,7 +51,7 @@ def compare(
     if campaign is not None and other is not None:
         if prediction:
             raise BadInputError("--prediction: belongs to one campaign. Leave it or the second campaign out.")
-        _compare_two(c, (campaign, other), bearing, method, norm)
+        _compare_two(c, campaign, other)
         return
     from tpjb_ident.compare.comparison import VARIANTS, CompareSettings, compare_campaign, model_side
     from tpjb_ident.compare.predictions import counts_from_measured
@@ -60,8 +60,8 @@ def compare(
 
     c.options["pivots"] = variants = known_names(pivots, VARIANTS, "--pivots")
     tables = read_predictions([c.file(path) for path in prediction or ()])
-    source, drawing, typed = open_source(c, campaign, coefficients, bearing, bool(tables))
-    model = model_settings(c, "kirk", thermal, effects, drawing)
+    source, drawing, typed = open_source(c, bool(tables))
+    model = model_settings(c, "kirk", drawing)
     settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
     with c.results():
         job = background_job(model_side, source, drawing, settings) if coefficients is None else nullcontext()
@@ -69,7 +69,7 @@ def compare(
             import tpjb_ident.report.comparison_page  # noqa: F401  (loaded while the model is at work)
 
             if coefficients is None:
-                settings = replace(settings, identify=identify_settings(c, source, method, norm))
+                settings = replace(settings, identify=identify_settings(c, source))
                 result = compare_campaign(source, drawing, settings, show, ahead)
             else:
                 share = parse_share(reading_error, "--reading-error")
@@ -81,14 +81,14 @@ def compare(
     refuse_comparison(result)
 
 
-def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, method: str, norm: str | None) -> None:
+def _compare_two(c: Command, *paths: Path) -> None:
     """Hold two campaigns against each other."""
     from tpjb_ident.compare.difference import difference_of, difference_sentences
     from tpjb_ident.compare.summary import DIRECT
     from tpjb_ident.report.difference_page import write_difference_report
 
     with c.results():
-        difference = difference_of(*(_side(c, path, bearing, method, norm) for path in paths))
+        difference = difference_of(*(_side(c, path) for path in paths))
         for name, frame in difference.tables.items():
             c.table(name, frame)
         on_records = difference.b.campaign is not None and not difference.b.coefficients.empty
@@ -106,7 +106,7 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
         raise NotTrustedError(f"{len(bad)} points have a flag that forbids trust: {'; '.join(bad[:5])}.")
 
 
-def _side(c: Command, path: Path, bearing: Path | None, method: str, norm: str | None) -> Side:
+def _side(c: Command, path: Path) -> Side:
     """One of two campaigns, identified, or a folder of results as it is."""
     from tpjb_ident.compare.difference import measured_side, recorded_side
 
@@ -116,8 +116,8 @@ def _side(c: Command, path: Path, bearing: Path | None, method: str, norm: str |
     from tpjb_ident.compare.static_tests import measure_static
 
     campaign = c.open(path)
-    identification = identified(c, campaign, method, norm) if campaign.of_kind("dynamic") else None
-    drawing = c.bearing_of(campaign, bearing) if bearing is not None or campaign.bearing_text else None
+    identification = identified(c, campaign) if campaign.of_kind("dynamic") else None
+    drawing = c.bearing_of(campaign) if c.has_bearing(campaign) else None
     return measured_side(campaign, identification, None if drawing is None else measure_static(campaign, drawing))
 
 

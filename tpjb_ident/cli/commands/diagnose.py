@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import refuse_untrusted, write_identification
 from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, pivot_choice
-from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 
 
-@command(f"tpjb diagnose {DEMO}", f"tpjb diagnose {DEMO} --pivots measured --out found")
+@command("tpjb diagnose {DEMO}", "tpjb diagnose {DEMO} --pivots measured --out found")
 def diagnose(
     c: Command,
     campaign: Path | None = None,
@@ -36,7 +35,7 @@ def diagnose(
 ) -> None:
     """Name what the model lacks where it and the rig disagree.
 
-    Says what is left, and so when it does not know. Writes diagnosis.json, updated.effects.toml (for
+    Says what remains, and says so when nothing explains it. Writes diagnosis.json, updated.effects.toml (for
     `tpjb predict --effects` and `tpjb compare --effects`), report.html, and the identified coefficients.
     """
     settings = _settings(model_tolerance, tolerance or (), workers)
@@ -44,14 +43,14 @@ def diagnose(
         from model.effects.registry import load_library
 
         load_library(c.file(library))
-    start = pivots if pivots == "measured" else pivot_choice(c, pivots)
+    start = pivots if pivots == "measured" else pivot_choice(c)
     from tpjb_ident.compare.static_tests import measure_static
     from tpjb_ident.diagnosis.campaign import Baseline, diagnose_campaign, diagnose_table
     from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
     from tpjb_ident.runtime.executors import background_job, cores, forks
 
-    source, drawing, typed = open_source(c, campaign, coefficients, bearing)
-    baseline = Baseline(start, thermal, model_settings(c, start, thermal, effects, drawing).effects)
+    source, drawing, typed = open_source(c)
+    baseline = Baseline(start, thermal, model_settings(c, start, drawing).effects)
     with c.results():
         is_quicker = coefficients is None and workers != 1 and cores() > 1 and forks()  # in a copy of this process
         job = background_job(measure_static, source, drawing) if is_quicker else nullcontext()

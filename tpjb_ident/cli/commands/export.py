@@ -5,7 +5,6 @@ from typing import Any
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import identified
-from tpjb_ident.cli.options import DEMO
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import FORMATS, check_format
 from tpjb_ident.rounding import counted, listed
@@ -15,7 +14,7 @@ from tpjb_ident.rounding import counted, listed
     "tpjb export tpjb-identify-out --to ross",
     "tpjb export tpjb-predict-out --to excel",
     "tpjb export bearing.toml --to ross",
-    f"tpjb export {DEMO} --to mat",
+    "tpjb export {DEMO} --to mat",
 )
 def export(
     c: Command,
@@ -36,7 +35,7 @@ def export(
     from tpjb_ident.exports.write import export as write_export
 
     check_format(to)
-    coefficients, name = _coefficients(c, source, method, norm)
+    coefficients, name = _coefficients(c, source)
     with c.results(entry=f"export {to}"):
         written = write_export(coefficients, to, c.folder, force=force, name=name, ross=ross)
         c.remarks = written.chosen.doubtful
@@ -54,7 +53,7 @@ def export(
         raise NotTrustedError("\n".join(parts))
 
 
-def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tuple[Any, str]:
+def _coefficients(c: Command, source: Path) -> tuple[Any, str]:
     """What is exported, a file of coefficients, a campaign identified for it or a bearing, and its name."""
     if source.suffix == ".toml" and source.is_file() and b"tpjb-rig/" not in source.read_bytes():
         return c.bearing(source), source.stem
@@ -64,4 +63,4 @@ def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tu
     if path is not None:
         return c.file(path), path.parent.resolve().name
     campaign = c.open(source)
-    return identified(c, campaign, method, norm), campaign.id
+    return identified(c, campaign), campaign.id

@@ -17,7 +17,7 @@ from tpjb_ident.cli.identification import (
     write_identification,
 )
 from tpjb_ident.cli.inputs import parse_value, parse_values
-from tpjb_ident.cli.options import DEMO, refuse_unknown
+from tpjb_ident.cli.options import refuse_unknown
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.executors import cores, forks
 
@@ -35,7 +35,7 @@ _SHORTEST = 1e-6
 KEPT = ".tpjb-finished-runs"
 
 
-@command(f"tpjb identify {DEMO}", f"tpjb identify {DEMO} --method rlm --norm tukey --out rlm")
+@command("tpjb identify {DEMO}", "tpjb identify {DEMO} --method rlm --norm tukey --out rlm")
 def identify(
     c: Command,
     campaign: Path,
@@ -60,7 +60,7 @@ def identify(
         raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
     source = c.open(campaign)
     phasors = _phasor_settings(lines, delay or ())
-    settings = replace(identify_settings(c, source, method, norm), phasors=phasors, keep_weights=False)
+    settings = replace(identify_settings(c, source), phasors=phasors, keep_weights=False)
     from tpjb_ident.identification.identify import identify as run_identification
     from tpjb_ident.runtime.executors import open_workers
 
@@ -80,7 +80,7 @@ def identify(
                 write_r_matrices(c.folder / "r_matrices.h5", points)
         c.remarks = result.remarks()
     show_identification(c, result)
-    if source.bearing_text:
+    if settings.clearance is not None:  # its bearing can be read
         c.next("compare", campaign)
     elif result.points:
         c.next("export", c.target, "--to", "ross")

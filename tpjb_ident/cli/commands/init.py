@@ -14,6 +14,7 @@ import model
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
     if update:
         text, changes = updated_manifest(before, exports, angles)
         channels: list[list[str]] = []
-        count = f"{len(changes)} changes, the former one is {MANIFEST}.bak"
+        count = f"{counted(len(changes), 'value')} changed, remarks renewed, the former file is {MANIFEST}.bak"
     else:
         text, count, channels = _draft(c, folder, bearing, exports, angles)
         changes = []
@@ -72,6 +73,8 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
         c.warn(f"left out: {problem}")
     for change in changes:
         c.print(change)
+    if open_places:
+        c.print("First fill in what is open (??), and look at what is marked (guess).")
     c.next(*(("init", folder, "--update") if open_places else ("check", folder)))
 
 

@@ -3,11 +3,10 @@
 from pathlib import Path
 
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.options import DEMO
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 
-@command(f"tpjb locus {DEMO}")
+@command("tpjb locus {DEMO}")
 def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     """Measure the shaft centre locus and the clearance polygon by pad.
 
@@ -17,7 +16,7 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     source = c.open(campaign)
     if not (source.of_kind("locus") or source.of_kind("clearance")):
         raise BadInputError(f"campaign {source.id}: has neither locus nor clearance runs; there is nothing to measure.")
-    drawing = c.bearing_of(source, bearing)
+    drawing = c.bearing_of(source)
     import numpy as np
     import pandas as pd
 
@@ -44,8 +43,7 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
         c.draw(position_panels(static.clearance, (angles, drawn), static.locus, {}, polygons))
     c.print(f"{source.id}: {' and '.join(f'the {name} is measured' for name in parts)}.")
     if static.clearance is not None:
-        # a table's reader has no other place that says how far the probes' gains are known
-        c.show_table(clearance_table(static.clearance, drawn, calibrated=True), source.id)
+        c.show_table(clearance_table(static.clearance, drawn), source.id)
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
     if static.locus is not None:
         c.print(f"locus: {str(static.locus).partition('; ')[0]}")

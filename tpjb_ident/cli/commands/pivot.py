@@ -3,10 +3,9 @@
 from pathlib import Path
 
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.options import DEMO
 
 
-@command(f"tpjb pivot {DEMO}")
+@command("tpjb pivot {DEMO}")
 def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     """Fit the pivot stiffness curves to the dry tests.
 
@@ -19,7 +18,7 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     from tpjb_ident.report.sections import pivot_panels
 
     source = c.open(campaign)
-    drawing = c.bearing_of(source, bearing)
+    drawing = c.bearing_of(source)
     with c.results("fitting pivot curves"):
         curves = fit_pivots(source, [pad.pivot_angle for pad in drawing.pads], on_refusal="few")
         formula = printed_formula(drawing)

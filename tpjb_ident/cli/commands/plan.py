@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.inputs import operating_points, pivot_choice, rotation_choice
-from tpjb_ident.cli.options import ROCKER
 from tpjb_ident.columns import Column, words
 from tpjb_ident.rounding import counted, signed
 
@@ -18,8 +17,8 @@ if TYPE_CHECKING:
 
 
 @command(
-    f"tpjb plan {ROCKER}",
-    f'tpjb plan {ROCKER} --load "5, 10 kN" --excitation "20..60:10 Hz" --locus 0',
+    "tpjb plan {ROCKER}",
+    'tpjb plan {ROCKER} --load "5, 10 kN" --excitation "20..60:10 Hz" --locus 0',
 )
 def plan(
     c: Command,
@@ -54,11 +53,11 @@ def plan(
     from tpjb_ident.diagnosis.from_python import planned_layout
     from tpjb_ident.report.sections import isolability_panels
 
-    points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, rotation, drawing))
+    points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, drawing))
     tests = planned_layout(drawing, points, (locus, dry, push, temperatures))
     with c.results("planning") as show:
         show("every effect of the library", 0, 1)
-        setup = Setup(drawing, pivot_laws(pivot_choice(c, pivots), drawing))
+        setup = Setup(drawing, pivot_laws(pivot_choice(c), drawing))
         result = planning.plan(setup, tests)
         plans = {"isolability": result}
         if data_sets:

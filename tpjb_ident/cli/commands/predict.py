@@ -10,7 +10,7 @@ from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import DIRECT, POINT
 from tpjb_ident.cli.inputs import model_settings, operating_points, parse_value, pivot_choice, rotation_choice
-from tpjb_ident.cli.options import ROCKER, choices, known_names
+from tpjb_ident.cli.options import choices, known_names
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.executors import background_job, forks
@@ -30,9 +30,9 @@ _COARSE = 0.05
 
 
 @command(
-    f'tpjb predict {ROCKER} --load "2.5..8.75:1.25 kN" --excitation "25 Hz"',
-    f'tpjb predict {ROCKER} --pivots rigid --speed "1000, 2000, 3000 rpm"',
-    f"tpjb predict {ROCKER} --pivots tpjb-pivot-out/pivots.toml --thermal tehd",
+    'tpjb predict {ROCKER} --load "2.5..8.75:1.25 kN" --excitation "25 Hz"',
+    'tpjb predict {ROCKER} --pivots rigid --speed "1000, 2000, 3000 rpm"',
+    "tpjb predict {ROCKER} --pivots tpjb-pivot-out/pivots.toml --thermal tehd",
 )
 def predict(
     c: Command,
@@ -55,9 +55,9 @@ def predict(
     """
     c.options["excitation"] = excitation or "synchronous"
     drawing = c.bearing(bearing)
-    settings = model_settings(c, pivot_choice(c, pivots), thermal, effects, drawing)
+    settings = model_settings(c, pivot_choice(c), drawing)
     settings = replace(settings, options=parse_physics(physics, housing_temperature))
-    points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, rotation, drawing))
+    points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, drawing))
     with c.results():
         frame = _predicted(c, drawing, points, settings)
         c.table("prediction", frame)

@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from tpjb_ident.cli.command import COMMANDS, Command, command
+from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.commands.verify import STATES, files_of, recorded
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
@@ -50,7 +50,7 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
                 raise BadInputError(f"{place} {STATES[known['state']]}. Bring it back to where it was.")
     if not repeated:
         raise BadInputError(f"{record}: names no command that can be repeated ({', '.join(_REPEATABLE)}).")
-    found = []
+    pairs = []
     with tempfile.TemporaryDirectory(prefix="tpjb-rerun-") as scratch:
         for number, (name, entry) in enumerate(repeated.items()):
             again = Path(scratch) / str(number)
@@ -59,28 +59,29 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
             for file in outputs_of(entry):
                 if reason := contradiction(folder / file):
                     c.warn(f"{folder / file}: {reason}")
-                found.append((name, compared(folder, again, file, tolerance)))
-    different = [f"{d.file} {_WORDS[d.state]} {d.where}".strip() for _, d in found if d.matters]
-    count = f"{len(different)} of {len(found)} files differ" if different else f"{len(found)} files: nothing differs"
+                pairs.append((name, compared(folder, again, file, tolerance)))
+    different = [f"{d.file} {_WORDS[d.state]} {d.where}".strip() for _, d in pairs if d.matters]
+    count = f"{len(different)} of {len(pairs)} files differ" if different else f"{len(pairs)} files: nothing differs"
     c.print(f"{folder}: {count} by more than {tolerance:g}.")
     c.next("verify", folder)
-    rows = [[name, d.file, _WORDS[d.state], f"{d.size:.1e}" if d.size else "-"] for name, d in found]
+    rows = [[name, d.file, _WORDS[d.state], f"{d.size:.1e}" if d.size else "-"] for name, d in pairs]
     c.show(f"{folder}: computed again", [*words("command", "file", "state"), "largest difference"], rows)
     if c.out is not None:
-        files = [{"command": name, **vars(difference)} for name, difference in found]
+        files = [{"command": name, **vars(difference)} for name, difference in pairs]
         with c.results():
             c.json("rerun.json", {"schema": "tpjb-rerun/1", "folder": folder.name, "files": files})
     if different:
-        raise NotTrustedError(f"{folder}: {len(different)} of {len(found)} files:\n{listed(different, 8, chr(10))}")
+        raise NotTrustedError(f"{folder}: {len(different)} of {len(pairs)} files:\n{listed(different, 8, chr(10))}")
 
 
 def _run_again(name: str, entry: Mapping[str, Any], folder: Path, out: Path) -> None:
     """Run the command of an entry as if it were typed again, its inputs where they are now."""
     from typer.main import get_command
 
-    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-    app.command()(COMMANDS[name.split(" ")[0]])
-    program = get_command(app)
+    from tpjb_ident.cli.commands.app import app
+
+    program: Any = get_command(app)
+    program = program.commands[name.split(" ")[0]]
     typed = _typed(program.params, entry, folder)
     try:
         code = program.main([f"--out={out}", "--quiet", *typed], prog_name="tpjb", standalone_mode=False)

@@ -8,13 +8,10 @@ from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.options import DEMO
 from tpjb_ident.cli.terminal import PRINTED
-from tpjb_ident.columns import Column, channel_unit, in_us_units, size, symbol, words
+from tpjb_ident.columns import Column, channel_unit, words
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.presentation import UNITS
 from tpjb_ident.rounding import counted
 
 if TYPE_CHECKING:
@@ -35,8 +32,8 @@ _COLUMNS = (
 
 
 @command(
-    f"tpjb show {DEMO}",
-    f"tpjb show {DEMO} --run d-05000-25-01 --picture",
+    "tpjb show {DEMO}",
+    "tpjb show {DEMO} --run d-05000-25-01 --picture",
     "tpjb show exports/run1.csv",
 )
 def show(c: Command, source: Path, run: str | None = None, picture: bool = False) -> None:
@@ -46,7 +43,7 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
     .parquet, and the picture. Values of a campaign are shown in µm, N, m/s^2, degC, Hz (in mil, lbf, degF, rpm with
     --units us) and written in SI; those of a record file have the units of the file.
     """
-    from rigdata.campaign import HDF5_SUFFIXES, campaign_place
+    from rigdata.campaign import HDF5_SUFFIXES, MANIFEST_NAME, campaign_place
     from rigdata.survey.exports import read_export
     from rigdata.survey.spectrum import amplitude_spectrum
 
@@ -66,7 +63,7 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
         with c.progress(f"looking at {source.name}"):
             series, displayed = _run_series(chosen)
     else:
-        c.next("init", source.parent)
+        c.next("check" if (source.parent / MANIFEST_NAME).exists() else "init", source.parent)
         if run is not None:
             raise BadInputError(f"--run: {source.name} is a single record, not a campaign. Leave the option out.")
         title = source.name
@@ -80,7 +77,8 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
     c.show(title, [PRINTED[name] for name in names], map(itemgetter(*names), rows))
     lines = [[name, a[4:].tolist(), f[-1]] for name, (f, a) in spectra.items() if len(f) > 4]
     bars = Column("from 0", lambda *values: sparkline(values), words=True)
-    c.show("spectra, 3 decades", [*words("channel"), bars, "to {frequency}"], lines)
+    if lines:
+        c.show("spectra, 3 decades", [*words("channel"), bars, "to {frequency}"], lines)
     if picture or c.out is not None:
         import pandas as pd
 
@@ -130,21 +128,11 @@ def _run_series(run: Run) -> tuple[list[Series], list[Series]]:
         else:
             unit = SI_UNITS.get(DIMENSIONS.get(channel.quantity, ""), "")
             series.append(Series(name, unit, record.values, record.time))
-            shown, scale, zero = _shown_in(channel.quantity, unit)
-            displayed.append(Series(name, shown, (record.values - zero) / scale, record.time))
+            shown, scale, zero = channel_unit(channel.quantity)
+            displayed.append(Series(name, shown or unit, (record.values - zero) / scale, record.time))
     if not series:
         raise RigDataError(problems)
     return series, displayed
-
-
-def _shown_in(quantity: str, unit: str) -> tuple[str, float, float]:
-    """Symbol, size and zero of the unit in which people read a quantity whose unit in SI is `unit`."""
-    if quantity == "temperature":
-        return UNITS["K"] if in_us_units() else ("degC", 1.0, ZERO_CELSIUS)
-    if quantity == "speed":
-        return symbol("speed"), 2 * math.pi * size("speed"), 0.0
-    shown, scale = channel_unit(quantity)
-    return shown or unit, scale, 0.0
 
 
 def channel_row(series: Series, spectrum: Spectrum) -> dict[str, Any]:

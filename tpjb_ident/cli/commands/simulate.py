@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rigdata.near_names import hint
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.inputs import model_settings, operating_points, pivot_choice, rotation_choice
-from tpjb_ident.cli.options import ROCKER, refuse_unknown
+from tpjb_ident.cli.options import refuse_unknown
 from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -21,8 +21,8 @@ FAULT_KEYS = ("run", "channel", "other", *_NUMBERS)
 
 
 @command(
-    f"tpjb simulate {ROCKER} --plan short --seed 1",
-    f'tpjb simulate {ROCKER} --load "5 kN" --excitation "10..50:10 Hz" --fault "dead run=d-* channel=X1A"',
+    "tpjb simulate {ROCKER} --plan short --seed 1",
+    'tpjb simulate {ROCKER} --load "5 kN" --excitation "10..50:10 Hz" --fault "dead run=d-* channel=X1A"',
 )
 def simulate(
     c: Command,
@@ -51,11 +51,11 @@ def simulate(
     """
     c.options |= {"format": c.options.pop("layout"), "fault": fault or []}
     drawing = c.bearing(bearing)
-    settings = model_settings(c, pivot_choice(c, pivots), thermal, effects, drawing)
+    settings = model_settings(c, pivot_choice(c), drawing)
     from rigdata.virtual_rig import Fault, Instruments, Noise, VirtualRig, write_campaign
     from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 
-    sense = rotation_choice(c, rotation, drawing)
+    sense = rotation_choice(c, drawing)
     tests = replace(_plan(plan, len(drawing.pads), load, excitation, speed), repeats=repeats).turning(sense)
     largest = max(point.static_load for point in tests.dynamic)
     rig = VirtualRig(

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.options import DEMO
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.interrupts import heard
 from tpjb_ident.runtime.output_folder import former_runs
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tpjb_ident.view.server import Session
 
 
-@command(f"tpjb view {DEMO}", "tpjb view tpjb-compare-out")
+@command("tpjb view {DEMO}", "tpjb view tpjb-compare-out")
 def view(
     c: Command,
     source: Path,
@@ -43,7 +43,7 @@ def view(
         session = Session(name=place.resolve().name, tables=_tables(c, place))
         c.next("verify", source)
     else:
-        session = _campaign_session(c, source, bearing)
+        session = _campaign_session(c, source)
         c.next("check", source)
     with contextlib.ExitStack() as links:
 
@@ -61,19 +61,17 @@ def view(
             c.note("closed.")
 
 
-def _campaign_session(c: Command, source: Path, bearing: Path | None) -> Session:
+def _campaign_session(c: Command, source: Path) -> Session:
     from tpjb_ident.view.server import Session
 
     campaign = c.open(source)
     session = Session(name=campaign.id, campaign=campaign)
     if campaign.of_kind("dynamic"):
-        from tpjb_ident.cli.identification import identify_settings
-        from tpjb_ident.identification.identify import identify
+        from tpjb_ident.cli.identification import identified
 
-        settings = identify_settings(c, campaign, "mm-eiv", None)
-        session.identify = lambda: identify(campaign, settings)
-        if bearing is not None or campaign.bearing_text:
-            session.bearing = c.bearing_of(campaign, bearing)
+        session.identify = functools.partial(identified, c, campaign)
+        if c.has_bearing(campaign):
+            session.bearing = c.bearing_of(campaign)
             session.pivots = {"rigid": "rigid", "kirk": "kirk", **_measured_laws(c, campaign, session.bearing)}
     return session
 

@@ -41,7 +41,7 @@ def watch(
     next; writes watch.html (loads itself again), watch.json and coefficients. Ctrl-C ends it, the same command goes on.
     """
     pause, patience = parse_value(every, "time", "--every", 0.0), parse_value(settle, "time", "--settle", 0.0)
-    watcher = _open_watcher(c, folder, bearing, patience, parse_share(within, "--within"))
+    watcher = _open_watcher(c, folder, patience, parse_share(within, "--within"))
     c.next("check", folder)
     c.options = {"folder": folder, "every": every, "settle": settle, "within": within or "-"}
     c.doing(f"watching {folder}; the page: {c.target / 'watch.html'}")
@@ -75,7 +75,7 @@ def watch(
         raise NotTrustedError(f"{counted(len(runs), 'run')} to be repeated: {listed(runs, 8)}")
 
 
-def _open_watcher(c: Command, folder: Path, bearing: Path | None, settle: float, within: float | None) -> Watcher:
+def _open_watcher(c: Command, folder: Path, settle: float, within: float | None) -> Watcher:
     """Make the watcher of a campaign folder, with its bearing."""
     if not (folder / "campaign.toml").is_file():
         raise BadInputError(
@@ -89,9 +89,9 @@ def _open_watcher(c: Command, folder: Path, bearing: Path | None, settle: float,
 
     campaign = c.open(folder)
     drawing = None
-    if bearing is not None or campaign.bearing_text:
+    if c.has_bearing(campaign):
         try:
-            drawing = c.bearing_of(campaign, bearing)
+            drawing = c.bearing_of(campaign)
         except BearingError as error:
             c.warn(f"{error} Until then pivots and clearance wait.")
     return Watcher(folder, NewFiles(settle), drawing, RunStore(c.target / KEPT), within)

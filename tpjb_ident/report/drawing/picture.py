@@ -29,7 +29,7 @@ from matplotlib.transforms import Bbox
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import ROTATIONS
-from tpjb_ident.columns import amount, per, place_of, spinning, symbol
+from tpjb_ident.columns import amount, place_of, size, spinning, symbol
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
@@ -72,6 +72,8 @@ MODEL_LABELS = {
     "kirk": "Kirk pivots",
     "kirk-secant": "Kirk, secant",
     "measured": "measured pivots",
+    "model before": "model as stated",
+    "before": "as stated",
 }
 #: Blue through paper to orange: signs that nobody confuses.
 DIVERGING = LinearSegmentedColormap.from_list("tpjb-diverging", ["#004c7a", "#4f9bcb", "#f6f7f8", "#e8a33d", "#9a4a00"])
@@ -296,7 +298,7 @@ def longest_series(table: pd.DataFrame, over: str) -> pd.DataFrame | None:
     for _, group in table.groupby([name for name in fixed if name in table], sort=True):
         if group[column].nunique() > length:
             best, length = group, group[column].nunique()
-    return None if best is None else best.sort_values(column, kind="stable").assign(at=best[column] * per(quantity))
+    return None if best is None else best.sort_values(column, kind="stable").assign(at=best[column] / size(quantity))
 
 
 def constant_along(series: pd.DataFrame, over: str) -> str:
@@ -318,7 +320,7 @@ def point_labels(table: pd.DataFrame) -> list[str]:
 
 def set_point_ticks(axes: Axes, table: pd.DataFrame) -> None:
     """Name places 0 to n - 1 of a panel by operating points: a line for load, excitation and what else differs."""
-    lines = [[f"{load * per('load'):.4g}", f"{hz:g}", *others] for load, hz, others in _set_points(table)]
+    lines = [[f"{load / size('load'):.4g}", f"{hz:g}", *others] for load, hz, others in _set_points(table)]
     axes.set_xticks(range(len(lines)), ["\n".join(texts) for texts in lines], fontsize=SMALL)
     shrink(axes, bottom=0.09 + _TICKS * (len(lines[0]) - 1 if lines else 0))
 

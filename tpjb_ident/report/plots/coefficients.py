@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.columns import per, size, symbol
+from tpjb_ident.columns import size, symbol
 from tpjb_ident.report.drawing.picture import (
     COEFFICIENTS,
     CURVE,
@@ -95,7 +95,7 @@ def coefficient(comparison: Comparison | pd.DataFrame, name: str, over: str = "l
         from_zero(axes)
     add_legend(axes)
     if apart:
-        label(grid[1, 0], axis_label(over), "off measured, %")
+        label(grid[1, 0], axis_label(over), "deviation, %")
         _draw_deviations(grid[1, 0], series, measured["at"], shares)
     return figure
 
@@ -213,8 +213,8 @@ def frf(
             if model is not None:
                 f = np.linspace(*model.band, 200)
                 h = model.h(2 * np.pi * f)[:, "xy".index(entry[0]), "xy".index(entry[1])]
-                name = model.model if entry == entries[0] else None
-                axes.plot(f, getattr(h, part) * per("stiffness"), color=style["color"], label=name)
+                name = f"{model.model} model" if entry == entries[0] else None
+                axes.plot(f, getattr(h, part) / size("stiffness"), color=style["color"], label=name)
         axes.margins(x=0.05, y=0.1)
     add_legend(grid[0, 0])
     if over_band:

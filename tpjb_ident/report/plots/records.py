@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from rigdata.arrays import FloatArray
 from rigdata.survey.spectrum import amplitude_spectrum
-from tpjb_ident.columns import per, symbol
+from tpjb_ident.columns import size, symbol
 from tpjb_ident.report.drawing.picture import (
     BLUE,
     GREY,
@@ -63,7 +63,7 @@ def orbit(run: Run) -> Figure:
     good = np.isfinite(path).all(axis=1)
     if good.sum() < 2:
         raise ValueError(f"run {run.id} has no displacements to draw")
-    path = per("length") * (path - np.median(path[good], axis=0))
+    path = (path - np.median(path[good], axis=0)) / size("length")
     figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}")
     shown = path[:_MOST_SAMPLES]
     axes.plot(*shown.T, color=GREY, linewidth=0.5, label="as measured")
@@ -84,31 +84,27 @@ def orbit(run: Run) -> Figure:
 #: Quantity, how its amplitude is named, and its display unit in SI.
 _ROWS = (("displacement", "length"), ("force", "force"))
 _AXES = ("horizontal", "vertical")
+#: Spectra end at so many times the excitation; without one at half the rate.
+_TIMES = 4.0
 #: Bins of a window's foot below which there is drift, not vibration.
 _DRIFT = 4
 
 
-def _highest(run: Run, up_to: float | None, rate: float) -> float:
-    """Highest frequency that is drawn [Hz]: as asked, or four times the excitation's, or half the sample rate."""
-    return up_to or 4.0 * run.point.excitation_hz or 0.5 * rate
-
-
-def _mark_excitation(axes: Axes, run: Run) -> None:
-    hz = run.point.excitation_hz
-    if hz:
+def _end_axis(axes: Axes, run: Run, highest: float) -> None:
+    """End the axis at a frequency [Hz], and mark the excitation."""
+    axes.set_xlim(0.0, highest)
+    if hz := run.point.excitation_hz:
         axes.axvline(hz, color=GREY, linewidth=0.9, zorder=0, label=f"excitation, {hz:g} Hz")
 
 
 @plot
-def spectra(run: Run, *, up_to: float | None = None) -> Figure:
+def spectra(run: Run) -> Figure:
     """Draw the amplitudes of displacement and force over frequency (Hann window over the whole record).
 
     Parameters
     ----------
     run : Run
         A dynamic run.
-    up_to : float, optional
-        Highest frequency [Hz]; default: four times the excitation frequency, half the sample rate without one.
 
     Returns
     -------
@@ -121,13 +117,13 @@ def spectra(run: Run, *, up_to: float | None = None) -> Figure:
         When the run is too short, or empty.
     """
     figure, grid = new_pictures(2, 1, height=2.3)
-    top = _highest(run, up_to, run.sample_rate)
+    top = _TIMES * run.point.excitation_hz or 0.5 * run.sample_rate
     for axes, (quantity, unit) in zip(grid[:, 0], _ROWS, strict=True):
         label(axes, "frequency, Hz", f"{quantity}, 0-peak, {symbol(unit)}")
         record = run.vector(quantity)
         largest = 0.0
         for number, axis in enumerate(_AXES):
-            frequency, amplitude = amplitude_spectrum(record.values[:, number] * per(unit), record.rate)
+            frequency, amplitude = amplitude_spectrum(record.values[:, number] / size(unit), record.rate)
             shown = (frequency <= top) & (np.arange(len(frequency)) >= _DRIFT)
             if not shown.any():
                 raise ValueError(f"run {run.id} has no spectrum of {quantity} up to {top:g} Hz")
@@ -135,9 +131,8 @@ def spectra(run: Run, *, up_to: float | None = None) -> Figure:
             axes.plot(frequency[shown], amplitude[shown], **style, label=axis)
             largest = max(largest, float(amplitude[shown].max()))
         logarithmic(axes)
-        axes.set_xlim(0.0, top)
         axes.set_ylim(top=3.0 * largest)
-        _mark_excitation(axes, run)
+        _end_axis(axes, run, top)
     add_legend(grid[0, 0])
     return figure
 
@@ -147,7 +142,7 @@ _LEVEL = 0.95
 
 
 @plot
-def coherence_spectrum(run: Run, *, up_to: float | None = None, segment: float | None = None) -> Figure:
+def coherence_spectrum(run: Run, *, segment: float | None = None) -> Figure:
     """Draw the multiple coherence of each force component with both displacements, over frequency (Welch's method).
 
     It is near one where something drives the bearing, and scatters below the dashed line where nothing does.
@@ -156,8 +151,6 @@ def coherence_spectrum(run: Run, *, up_to: float | None = None, segment: float |
     ----------
     run : Run
         A dynamic run.
-    up_to : float, optional
-        Highest frequency [Hz]; default: four times the excitation frequency, half the sample rate without one.
     segment : float, optional
         Length of the averaged pieces [s]; default: as many pieces as give 16 averages at half overlap.
 
@@ -182,8 +175,8 @@ def coherence_spectrum(run: Run, *, up_to: float | None = None, segment: float |
 
     chance = float(betaincinv(2, max(averages - 2, 1), _LEVEL))
     axes.axhline(chance, color=INK, linestyle=":", linewidth=0.9, label="by chance, 95 %")
-    axes.set(xlim=(0.0, _highest(run, up_to, rate)), ylim=(0.0, 1.02))
-    _mark_excitation(axes, run)
+    axes.set_ylim(0.0, 1.02)
+    _end_axis(axes, run, _TIMES * run.point.excitation_hz or 0.5 * rate)
     add_legend(axes)
     return figure
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.clearance.polygon import corners
-from tpjb_ident.columns import per, symbol
+from tpjb_ident.columns import size, symbol
 from tpjb_ident.report.drawing.picture import (
     GREY,
     INK,
@@ -82,8 +82,8 @@ def load_deflection(
 
 def _draw_steps(axes: Axes, curve: PivotCurve) -> None:
     steps, style = curve.steps, style_of(curve.pad - 1) | {"linestyle": "none"}
-    deflection, load = per("length") * steps.deflection, per("load") * steps.load
-    errors = 1.96 * per("length") * steps.deflection_se
+    deflection, load = steps.deflection / size("length"), steps.load / size("load")
+    errors = 1.96 * steps.deflection_se / size("length")
     used = steps.weight > 0
     for mask, face, name in (
         (used & (steps.branch > 0), style["color"], f"pad #{curve.pad}, {curve.law.name}"),
@@ -100,9 +100,9 @@ def _draw_law(axes: Axes, curve: PivotCurve, top: float) -> None:
     """The law, its band, and the way into contact."""
     colour = style_of(curve.pad - 1)["color"]
     load = np.linspace(0.0, top, _LAW_POINTS)[1:]
-    shown = load * per("load")
-    reading, low, high = (per("length") * part for part in curve.reading_band(load))
-    deflection = per("length") * curve.deflection(load)
+    shown = load / size("load")
+    reading, low, high = (part / size("length") for part in curve.reading_band(load))
+    deflection = curve.deflection(load) / size("length")
     axes.fill_betweenx(shown, low, high, color=colour, alpha=0.25, linewidth=0)
     axes.plot(deflection, shown, ":", color=colour)
     axes.plot(np.where(curve.is_extrapolated(load), np.nan, deflection), shown, color=colour)
@@ -133,8 +133,8 @@ def pad_projection(curves: Sequence[PivotCurve]) -> Figure:
     for curve in _listed(curves):
         steps = curve.steps
         used = steps.weight > 0
-        loads = np.column_stack([steps.load, steps.across_load])[used] * per("load")
-        moves = np.column_stack([steps.deflection, steps.across_deflection])[used] * per("length")
+        loads = np.column_stack([steps.load, steps.across_load])[used] / size("load")
+        moves = np.column_stack([steps.deflection, steps.across_deflection])[used] / size("length")
         _draw_vectors(forces, curve, loads, curve.load_direction.angle)
         _draw_vectors(places, curve, moves, curve.displacement_direction.angle)
     label(forces, f"horizontal load, {symbol('load')}", f"vertical load, {symbol('load')}", "static load")
@@ -197,17 +197,17 @@ def pivot_stiffness(
     top = max(curve.valid_to for curve in curves)
     grid = np.linspace(_LOWEST * top, top, _STIFFNESS_POINTS) if loads is None else np.asarray(loads, dtype=float)
     figure, axes = new_picture(f"load on the pad, {symbol('load')}", f"tangent stiffness, {symbol('stiffness')}")
-    shown = grid * per("load")
+    shown = grid / size("load")
     for curve in curves:
         _draw_stiffness(axes, curve, grid)
     if formula is not None:
-        printed = np.array([formula(curves[0].pad, float(load)) for load in grid]) * per("stiffness")
+        printed = np.array([formula(curves[0].pad, float(load)) for load in grid]) / size("stiffness")
         axes.plot(shown, printed[:, 1], color=INK, label="Kirk, tangent")
         axes.plot(shown, printed[:, 0], "--", color=INK, label="Kirk, printed")
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(0.0, shown[-1])
     if grid[-1] > top:
-        start = top * per("load")
+        start = top / size("load")
         axes.axvspan(start, shown[-1], color=RULE, alpha=0.35, linewidth=0, zorder=0)
         axes.text(start, 0.02, " extrapolated", transform=axes.get_xaxis_transform(), fontsize=SMALL, color=GREY)
     add_legend(axes)
@@ -216,10 +216,10 @@ def pivot_stiffness(
 
 def _draw_stiffness(axes: Axes, curve: PivotCurve, grid: FloatArray) -> None:
     style = style_of(curve.pad - 1) | {"marker": ""}
-    value, band = curve.stiffness(grid) * per("stiffness"), curve.stiffness_band(grid)
+    value, band = curve.stiffness(grid) / size("stiffness"), curve.stiffness_band(grid)
     outside = curve.is_extrapolated(grid)
-    shown, low, high = (np.where(outside, np.nan, part) for part in (value, *(b * per("stiffness") for b in band)))
-    load = grid * per("load")
+    shown, low, high = (np.where(outside, np.nan, part) for part in (value, *(b / size("stiffness") for b in band)))
+    load = grid / size("load")
     axes.fill_between(load, low, high, color=style["color"], alpha=0.2, linewidth=0)
     axes.plot(load, shown, **style, linewidth=1.7, label=f"pad #{curve.pad}")
     # one point of overlap, so that the two lines meet
@@ -233,7 +233,7 @@ _TWO_SIGMA = 2.4477  # radius of the 95 % region of two normal variables, in sta
 @plot
 def clearance_and_locus(
     polygons: ClearancePolygon | Mapping[str, ClearancePolygon] | None = None,
-    locus: Locus | FloatArray | None = None,
+    locus: Locus | None = None,
     predicted: Mapping[str, FloatArray] | None = None,
     *,
     drawing: tuple[FloatArray, FloatArray] | None = None,
@@ -245,8 +245,8 @@ def clearance_and_locus(
     polygons : ClearancePolygon or mapping of str to ClearancePolygon, optional
         Several by name: two bearings, cold and hot, two push loads. The polygon at zero push load is drawn, the one
         as pushed in a thin line.
-    locus : Locus or (n, 2) ndarray, optional
-        Measured positions; from a `Locus` with their 95 % regions [m].
+    locus : Locus, optional
+        Measured positions with their 95 % regions.
     predicted : mapping of str to (n, 2) ndarray, optional
         Predicted positions [m] by name; names of pivot models keep their colours.
     drawing : (n_pads,), (n_pads,) ndarray, optional
@@ -287,7 +287,7 @@ def clearance_and_locus(
 
 def _draw_closed(axes: Axes, points: FloatArray, *form: str, **look: Any) -> None:
     """Draw points (n, 2) [m] with a line that ends where it began."""
-    axes.plot(*(per("length") * np.vstack([points, points[:1]])).T, *form, **look)
+    axes.plot(*(np.vstack([points, points[:1]]) / size("length")).T, *form, **look)
 
 
 def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
@@ -295,18 +295,17 @@ def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
     for k, (angle, clearance) in enumerate(zip(polygon.angles, polygon.clearance, strict=True), 1):
         if np.isfinite(clearance):
             toward = np.array([np.cos(angle), np.sin(angle)])
-            axes.annotate(f"#{k}", tuple(per("length") * clearance * toward), tuple(-10.0 * toward),
+            axes.annotate(f"#{k}", tuple(clearance / size("length") * toward), tuple(-10.0 * toward),
                           textcoords="offset points", ha="center", va="center", fontsize=SMALL)  # fmt: skip
 
 
-def _draw_locus(axes: Axes, locus: Locus | FloatArray) -> None:
-    points = () if isinstance(locus, np.ndarray) else locus.points
-    places = locus if isinstance(locus, np.ndarray) else np.array([p.position for p in points]).reshape(-1, 2)
-    for point in points:
-        variances, directions = np.linalg.eigh(per("length") ** 2 * point.covariance)
+def _draw_locus(axes: Axes, locus: Locus) -> None:
+    for point in locus.points:
+        variances, directions = np.linalg.eigh(point.covariance / size("length") ** 2)
         sides = 2.0 * _TWO_SIGMA * np.sqrt(np.maximum(variances, 0.0))
         turn = np.degrees(np.arctan2(directions[1, 0], directions[0, 0]))
-        place = tuple(per("length") * point.position)
+        place = tuple(point.position / size("length"))
         axes.add_patch(Ellipse(place, *sides, angle=float(turn), color=INK, alpha=0.25, linewidth=0))
-    if len(places):
-        axes.plot(*(per("length") * places).T, "o", markersize=4.0, color=INK, label="locus, measured")
+    if locus.points:
+        places = np.array([point.position for point in locus.points]) / size("length")
+        axes.plot(*places.T, "o", markersize=4.0, color=INK, label="locus, measured")
