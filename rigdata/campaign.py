@@ -15,7 +15,7 @@ from rigdata.calibration import Channel, Channels
 from rigdata.manifest.manifest import MAX_MANIFEST, Description, Manifest, RunDescription, RunEntry, parse_manifest
 from rigdata.near_names import hint
 from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import TEXT, RunReader
+from rigdata.readers.base import TEXT, ReadingCache, RunReader
 from rigdata.run import Run
 from rigdata.safe_path import inside
 
@@ -224,7 +224,7 @@ def _read_text(path: Path, file: str, limit: int) -> str:
 
 
 def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
-    from rigdata.readers.file_reader import FileReader, ReadingCache
+    from rigdata.readers.file_reader import FileReader
 
     text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
     files = {manifest_path.name: manifest_path}

@@ -153,7 +153,7 @@ class Findings:
         if any(place[: len(path)] == path for place in self.open):
             self.errors += severity == "error"
             return
-        place, at = _spell(path), path
+        place, at = _spell(path)[:200], path
         while at and at not in self.lines:
             at = at[:-1]
         if at:

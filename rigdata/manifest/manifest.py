@@ -2,7 +2,6 @@
 
 import codecs
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +22,7 @@ from rigdata.manifest.fields import (
     open_paths,
 )
 from rigdata.operating_point import OperatingPoint
-from rigdata.problem import Problem, RigDataError, refuse, shown
+from rigdata.problem import Problem, RigDataError, parse_toml, refuse, shown
 from rigdata.units import UnitError, parse_quantity
 
 _NEEDED = {
@@ -37,9 +36,6 @@ _ID = re.compile(r"[\w][\w .+=@-]{0,199}")
 _MAX_RUNS = 100_000
 #: Larger manifests are refused before they are parsed [bytes].
 MAX_MANIFEST = 4 * 2**20
-#: Longer lines, and lines with more dots outside quotes, are refused.
-_MAX_LINE, _MAX_DOTS = 40_000, 100
-_QUOTED = re.compile(r'"[^"\\]*"|\'[^\']*\'')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,19 +207,10 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
 def _load_toml(text: str, file: str) -> dict[str, Any]:
     if len(text) > MAX_MANIFEST:
         raise refuse(file, "", f"the manifest is larger than {MAX_MANIFEST >> 20} MB", "Is it the right file?")
-    for number, line in enumerate(text.split("\n"), start=1):
-        # Dotted keys nest as deeply as they are long, and parsing them takes the square of it.
-        if len(line) > _MAX_LINE or (line.count(".") > _MAX_DOTS and _QUOTED.sub("", line).count(".") > _MAX_DOTS):
-            message = "the line is far too long, or nests far too deeply"
-            raise refuse(file, f"line {number}", message, "Shorten or break it")
-    cure = "Repair the TOML at this place"
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise refuse(file, "", f"not valid TOML: {error}", cure) from error
-    except (RecursionError, ValueError) as error:  # deep nesting; integers of thousands of digits
-        message = f"not usable TOML: {type(error).__name__}, nested too deep or a number too long"
-        raise refuse(file, "", message, cure) from error
+        return parse_toml(text)
+    except ValueError as error:
+        raise refuse(file, "", f"not valid TOML: {error}", "Repair the TOML at this place") from error
 
 
 def _read_csv(table: Table) -> CsvSpec:

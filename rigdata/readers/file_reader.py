@@ -7,11 +7,8 @@ that names the file. What was parsed is cached, the last used of a campaign, as 
 from __future__ import annotations
 
 import importlib
-import threading
-from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,41 +22,7 @@ from rigdata.units import TIME_FACTORS
 
 #: Larger files of a logger's format are rejected: they are read whole [bytes].
 LARGEST = 2**31
-#: Parsed columns cached by a campaign before the oldest run is let go [bytes].
-_CACHE_BYTES = 96 * 2**20
 _MOST_TIMES = 1000
-_Value = TypeVar("_Value")
-
-
-class ReadingCache:
-    """Contents of a campaign's files, the last used ones, up to a number of bytes."""
-
-    def __init__(self, limit: int = _CACHE_BYTES) -> None:
-        self._limit = limit
-        self._entries: OrderedDict[tuple[object, ...], Any] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def __reduce__(self) -> tuple[type[ReadingCache], tuple[int]]:
-        return ReadingCache, (self._limit,)  # a worker process starts with an empty one
-
-    def get(self, key: tuple[object, ...], make: Callable[[], _Value]) -> _Value:
-        """Give the value under `key`, made where it is not cached; the longest unused ones go."""
-        with self._lock:
-            if key in self._entries:
-                self._entries.move_to_end(key)
-                cached = self._entries[key]
-                return cached
-        value = make()
-        with self._lock:
-            self._entries[key] = value
-            while self.nbytes > self._limit and len(self._entries) > 1:
-                self._entries.popitem(last=False)
-        return value
-
-    @property
-    def nbytes(self) -> int:
-        """Memory taken by all columns [bytes]."""
-        return sum(int(getattr(value, "nbytes", 0)) for value in self._entries.values())
 
 
 def read_contents(record: RecordFile) -> Contents:
@@ -117,13 +80,8 @@ class _Columns(Layout):
 class FileReader(RunReader):
     """One run's file; it is parsed when something of it is asked for."""
 
-    cache: ReadingCache = field(default_factory=ReadingCache, repr=False, compare=False)
-
-    def _layout(self) -> _Columns:
-        """All channels at their own times; the key changes when the file does, so that no old one is served."""
-        state = self.path.stat() if self.path.is_file() else None
-        key = (self.path, self.run, state and (state.st_size, state.st_mtime_ns))
-        return self.cache.get(key, lambda: self._arranged(read_contents(self)))
+    def _read_layout(self) -> _Columns:
+        return self._arranged(read_contents(self))
 
     def _arranged(self, contents: Contents) -> _Columns:
         series = with_unique_names(contents.series)
@@ -168,7 +126,7 @@ class FileReader(RunReader):
             )
 
     def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
-        return self._layout().times[clock][start:stop].copy()
+        return np.array(self._layout().times[clock][start:stop])
 
     def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         """Raw readings of channels of one device, (stop - start,) each."""

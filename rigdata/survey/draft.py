@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
 from rigdata.manifest.manifest import parse_manifest
-from rigdata.problem import RigDataError, refuse
+from rigdata.problem import RigDataError, parse_toml, refuse
 from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, quantity_of_unit, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
@@ -161,8 +161,8 @@ class _Block:
 def column_names(text: str) -> tuple[str, ...]:
     """Names that a manifest gives to the columns of files that have none."""
     try:
-        names = tomllib.loads(text).get("csv", {}).get("names", ())
-    except (tomllib.TOMLDecodeError, AttributeError):
+        names = parse_toml(text).get("csv", {}).get("names", ())
+    except (ValueError, AttributeError):
         return ()
     return tuple(map(str, names)) if isinstance(names, list) else ()
 
@@ -174,8 +174,8 @@ def updated_manifest(text: str, exports: Sequence[Export], pivots: Sequence[floa
     manifest is never left with errors that it had not: then new records are added and nothing else.
     """
     try:
-        tables = tomllib.loads(text).get("channels", {})
-    except tomllib.TOMLDecodeError as error:
+        tables = parse_toml(text).get("channels", {})
+    except ValueError as error:
         raise refuse("campaign.toml", "", f"not valid TOML: {error}", "Repair it first") from error
     described = {str(name): table for name, table in tables.items() if isinstance(table, dict)}
     for name, table in described.items():  # what is like another has that one's calibration
