@@ -1,7 +1,7 @@
 """A folder of exports as a whole: what its records tell of each other and of the sensors' axes."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -103,20 +103,19 @@ class _Folder:
             if run.kind.value in kinds and all(found):
                 yield run, found
 
-    def _steps(self, names: Pair) -> dict[str, FloatArray]:
-        """By how much two channels change from the first to the last step of every dry test, by the run's file."""
-        steps = {}
-        for run, (series,) in self._with(["dry_pivot"], names):
-            change = _change(series)
-            if np.isfinite(change).all() and change.any():
-                steps[run.file] = change
-        return steps
+    def _dry_tests(self, *names: Pair) -> tuple[FloatArray, FloatArray]:
+        """Directions (n,) [rad] of the pads that dry tests load, NaN where these are not known.
 
-    def _toward(self, steps: Mapping[str, FloatArray]) -> FloatArray:
-        """Directions (n,) [rad] of the pads that dry tests load, NaN where these are not known."""
-        pads = {run.file: run.pad.value or 0 for run in self.runs}
+        And readings of pairs of channels at their first and their last step (2, n_pairs, n, 2).
+        """
         angles = np.append(self.pivots, np.nan)
-        return np.array([angles[min(pads[file], len(angles)) - 1] for file in steps])
+        toward, readings = [], []
+        for run, pairs_of_run in self._with(["dry_pivot"], *names):
+            ends = np.array([part_means(series)[[0, -1]] for series in pairs_of_run])
+            if np.isfinite(ends).all() and (ends[:, 0] != ends[:, 1]).any(axis=1).all():
+                toward.append(angles[min(run.pad.value or 0, len(angles)) - 1])
+                readings.append(ends)
+        return np.array(toward), np.reshape(readings, (-1, len(names), 2, 2)).transpose(2, 1, 0, 3)
 
     def _frame_of_cells(self) -> Frame | None:
         """Frame of the load cells: typed, told by dry steps toward known pads, or as their names hint."""
@@ -126,19 +125,19 @@ class _Folder:
         stated = stated_frame(pair, self.channels)
         if stated is not None and stated.source == "file":
             return stated
-        steps = self._steps(pair)
-        readings, toward = np.array(list(steps.values())), self._toward(steps)
+        toward, (first, last) = self._dry_tests(pair)
+        readings = (last - first)[0]
         known = np.isfinite(toward)
         if len(set(toward[known])) > 1:
             reason = f"{known.sum()} dry steps toward their pads"
             return fitted_frame(pair, readings[known], toward[known], reason) or stated
-        if stated is None or not len(self.pivots) or len(steps) < 2:
+        if stated is None or not len(self.pivots) or len(readings) < 2:
             return stated
         hinted = stated.direction(readings)
         nearest = self.pivots[self._nearest_pad(hinted)]
         if np.abs(np.angle(np.exp(1j * (hinted - nearest)))).max() > math.radians(_ALIKE):
             return stated  # the names' directions lead to no pads
-        return fitted_frame(pair, readings, nearest, f"its name and {len(steps)} dry steps toward pads") or stated
+        return fitted_frame(pair, readings, nearest, f"its name and {len(readings)} dry steps toward pads") or stated
 
     def _nearest_pad(self, angles: FloatArray | float) -> Any:
         """Indices of the pads nearest to directions [rad]."""
@@ -176,7 +175,7 @@ class _Folder:
         if cells is None:
             return
         for pair in pairs(self.channels, "displacement"):
-            frames = [fitted_frame(pair, *evidence) for evidence in self._of_dry_steps(pair, cells)]
+            frames = [fitted_frame(pair, *evidence) for evidence in self._of_dry_tests(pair, cells)]
             for _, (probes, forces) in self._with(["clearance"], pair, cells.names):
                 # a small load goes around, and the shaft follows it from corner to corner
                 around = [part_means(channels, _SWEPT) for channels in (probes, forces)]
@@ -190,18 +189,17 @@ class _Folder:
             if frame is not None:
                 with_axes(self.channels, frame, cells.source)
 
-    def _of_dry_steps(self, pair: Pair, cells: Frame) -> Iterator[_Evidence]:
+    def _of_dry_tests(self, pair: Pair, cells: Frame) -> Iterator[_Evidence]:
         """How two probes move in dry tests, and where the shaft then lies on the pads."""
-        forces = self._steps(cells.names)
-        steps = {file: step for file, step in self._steps(pair).items() if file in forces}
-        directions = self._toward(steps)
+        directions, (first, last) = self._dry_tests(pair, cells.names)
+        steps, forces = last - first
         if not np.isfinite(directions).all():
-            directions = np.array([float(cells.direction(forces[file])) for file in steps])
-        yield np.array(list(steps.values())), directions, f"{len(steps)} dry steps"
+            directions = cells.direction(forces)
+        yield steps, directions, f"{len(steps)} dry steps"
         if len(steps) > 2:
-            places = np.array([part_means(_pair(run, pair))[-1] for run in self.runs if run.file in steps])
-            apart = np.exp(1j * directions) - np.exp(1j * directions).mean()
-            yield places - places.mean(axis=0), np.angle(apart), f"where {len(steps)} dry steps end"
+            towards = np.exp(1j * directions)
+            apart = np.angle(towards - towards.mean())
+            yield last[0] - last[0].mean(axis=0), apart, f"where {len(steps)} dry steps end"
 
     def _of_excitation(self, pair: Pair, cells: Frame) -> _Evidence:
         """How two accelerometers move: the housing gives way to the force on its cells along the excitation."""
