@@ -215,10 +215,12 @@ class RunReader(RecordFile):
         readings[np.abs(time - within) > 1.0 / grid.rate] = np.nan
         return readings
 
-    def _planned(self, timings: Mapping[str, Grid], run_rate: float | None, member: str, remedy: str) -> Layout:
+    def _planned(
+        self, timings: Mapping[str, Grid], run_rate: float | None, member: str, remedy: str
+    ) -> tuple[tuple[Grid, ...], dict[str, RigDataError]]:
         """Put together what is sampled together; what has no usable times is a fault of that channel."""
         grids, texts = planned(timings, self.channels, run_rate)
-        return Layout(grids, {name: self.refuse(f"{member} {name}", text, remedy) for name, text in texts.items()})
+        return grids, {name: self.refuse(f"{member} {name}", text, remedy) for name, text in texts.items()}
 
     def unit_problems(self, units: Mapping[str, str]) -> list[Problem]:
         """An error for every channel whose unit in the file is another than its unit in the manifest."""
@@ -268,12 +270,11 @@ def _meaning(unit: str, dimension: str) -> tuple[object, float]:
 
 def _differ(stated: str, channel: Channel) -> bool:
     """Whether the unit that a file states makes another number of a reading than the manifest's."""
-    if channel.quantity not in DIMENSIONS:
+    dimension = DIMENSIONS.get(channel.quantity)
+    if dimension is None:
         return False
     try:
-        (kind, factor), (other_kind, other) = (
-            _meaning(unit, DIMENSIONS[channel.quantity]) for unit in (stated, channel.unit)
-        )
+        (kind, factor), (other_kind, other) = _meaning(stated, dimension), _meaning(channel.unit, dimension)
     except UnitError:
         return False
     return kind != other_kind or not math.isclose(factor, other, rel_tol=_SAME)

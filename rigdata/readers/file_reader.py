@@ -106,13 +106,13 @@ class FileReader(RunReader):
                 label = grid.label if is_time(grid.label) else f"{grid.rate:.6g} Hz"
                 timings[channel.name] = replace(grid, label=label)
         remedy = "Export it with its times, or correct sample_rate"
-        layout = self._planned(timings, self.stated_rate, "channel", remedy)
-        faults |= layout.faults
-        if not layout.grids:
+        grids, untimed = self._planned(timings, self.stated_rate, "channel", remedy)
+        faults |= untimed
+        if not grids:
             raise RigDataError([problem for error in faults.values() for problem in error.problems])
         values = {channel.name: channel.values for channel in series}
         units = {channel.name: channel.unit for channel in series}
-        return _Columns(layout.grids, faults, values, times, units, contents.unread, contents.problems)
+        return _Columns(grids, faults, values, times, units, contents.unread, contents.problems)
 
     def _refuse_other_unit(self, clocks: Mapping[str, str], rate: float) -> None:
         """Refuse times of no stated unit that miss the stated rate by what another unit differs from a second."""

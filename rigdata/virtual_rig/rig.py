@@ -122,7 +122,7 @@ def felt_direction(sensor: Sensor, instruments: Instruments) -> FloatArray:
     direction = sensor.direction()
     if sensor.error.cross:
         pairs = instruments.of(sensor.quantity)
-        partner = pairs[[s.name for s in pairs].index(sensor.name) ^ 1]
+        partner = pairs[pairs.index(sensor) ^ 1]
         direction = direction + sensor.error.cross * partner.direction()
     return direction
 

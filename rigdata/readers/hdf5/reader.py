@@ -203,9 +203,9 @@ class Hdf5Reader(RunReader):
                 same = [clock for clock in (names[i], *timed) if lengths[clock] == lengths[name]]
                 timings[name] = timed[same[0]] if same else Grid(lengths[name], times=lengths[names[i]])
         remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
-        layout = self._planned(timings, run_rate, "dataset", remedy)
+        grids, faults = self._planned(timings, run_rate, "dataset", remedy)
         unserved = Grid(max(lengths.values()), "", run_rate or np.nan)
-        return _Members(layout.grids or (unserved,), layout.faults, members, largest)
+        return _Members(grids or (unserved,), faults, members, largest)
 
     def _seconds(self, group: Any, clock: str, start: int, stop: int) -> FloatArray:
         """Some times of a time dataset [s]; one that is not described tells its unit itself."""
