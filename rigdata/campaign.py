@@ -228,14 +228,13 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
 
     text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
     files = {manifest_path.name: manifest_path}
-    manifest = parse_manifest(text, manifest_path.name, _named_file(folder, manifest_path.name, files))
+    text_of = _named_file(folder, manifest_path.name, files)
+    manifest = parse_manifest(text, manifest_path.name, text_of)
     problems = []
     bearing, name = "", manifest.bearing_name
     try:
-        path = inside(folder, name, manifest_path.name, "bearing")
-        if os.path.isfile(path):
-            files[name] = path
-            bearing = _read_text(path, name, _MAX_BEARING)
+        if os.path.isfile(inside(folder, name, manifest_path.name, "bearing")):
+            bearing = text_of(name, "bearing")
         else:
             fault = f"the bearing file {name!r} is not in the folder"
             remedy = "Add it, or give --bearing where one is needed"

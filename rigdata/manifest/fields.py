@@ -13,7 +13,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from rigdata.near_names import hint
-from rigdata.problem import Problem, Severity, shown
+from rigdata.problem import Problem, RigDataError, Severity, shown
 from rigdata.units import UnitError, parse_quantity
 
 _MAX_FINDINGS = 1000
@@ -214,11 +214,14 @@ class Table:
 
     @contextmanager
     def noted(self, key: str, remedy: str) -> Iterator[None]:
-        """Note a UnitError of the block as an error of `key`."""
+        """Note a UnitError of the block as an error of `key`, and what another file is refused for."""
         try:
             yield
         except UnitError as error:
             self.error(key, str(error), remedy)
+        except RigDataError as error:
+            for problem in error.problems:
+                self.findings.append(problem)
 
 
 def key_lines(text: str) -> dict[Path, int]:

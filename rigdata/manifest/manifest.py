@@ -23,7 +23,7 @@ from rigdata.manifest.fields import (
 )
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError, parse_toml, refuse, shown
-from rigdata.units import UnitError, parse_quantity
+from rigdata.units import UnitError, parse_quantity, split_quantity
 
 _NEEDED = {
     "dynamic": ("shaft_speed", "static_load", "static_load_direction", "excitation_frequency"),
@@ -116,9 +116,9 @@ def _band(table: Table, text: str | None) -> tuple[float, float] | None:
     if text is None:
         return None
     low, _, high = text.partition("..")
-    unit = high.strip().lstrip("0123456789.,+-eE").strip()
     with table.noted("excitation_band", 'Give e.g. "5..120 Hz", lowest first'):
-        first, last = (parse_quantity(value, "frequency") for value in (f"{low.strip()} {unit}", high))
+        _, unit = split_quantity(high, "frequency")
+        first, last = (parse_quantity(value, "frequency") for value in (f"{low} {unit}", high))
         if 0 < first < last < 1e12:
             return first, last
         raise UnitError(f"{shown(text)} is no band")

@@ -10,6 +10,7 @@ import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
@@ -112,9 +113,8 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
 
 def run_lines(run: RunGuess) -> list[str]:
     """Lines of a run's table."""
-    stem = run.file.rpartition("/")[2].rpartition(".")[0]
     kind = run.kind.value
-    lines = ["[[runs]]", f"id = {_toml_string(stem)}", f"file = {_toml_string(run.file)}"]
+    lines = ["[[runs]]", f"id = {_toml_string(Path(run.file).stem)}", f"file = {_toml_string(run.file)}"]
     lines.append(_line("kind", run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
     if kind in ("dynamic", "locus", None):
         lines += [_line("shaft_speed", run.speed, RUN, "Hz"), _line("static_load", run.load, RUN, "kN")]
@@ -217,11 +217,12 @@ def _blocks(text: str) -> list[_Block]:
     for lines in parts:
         key, place = ("", ""), ""
         with contextlib.suppress(tomllib.TOMLDecodeError):  # a text over several lines that begins one with a bracket
-            data = tomllib.loads("\n".join(lines))
-            if lines and lines[0].replace(" ", "").startswith("[[runs]]"):
-                file = str(data["runs"][0].get("file", ""))
-                key, place = ("runs", file), f"run {data['runs'][0].get('id', file)}"
-            elif lines and lines[0].replace(" ", "").startswith("[channels."):
+            data, head = tomllib.loads("\n".join(lines)), "".join(lines[:1]).replace(" ", "")
+            if head.startswith("[[runs]]"):
+                (run,) = data["runs"]
+                file = str(run.get("file", ""))
+                key, place = ("runs", file), f"run {run.get('id', file)}"
+            elif head.startswith("[channels."):
                 (name,) = data["channels"]
                 key, place = ("channels", name), f"channel {name}"
         blocks.append(_Block(key, place, lines))

@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -50,7 +51,7 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
     forces = of_quantity(export, channels, "force")
     moves = of_quantity(export, channels, "displacement")
     lines = strongest_lines(forces) or strongest_lines(moves)
-    stem = export.name.rpartition("/")[2].rpartition(".")[0]
+    stem = Path(export.name).stem
     named = next((kind for kind, pattern in WORDS["kinds"].items() if re.search(pattern, stem, re.IGNORECASE)), "")
     kind = Entry(named, "guess", "the file's name") if named else OPEN
     # movement beats a misleading name, but a name tells a constant load from none

@@ -299,7 +299,7 @@ def _table(title: str, entries: dict[str, object]) -> str:
 
 
 def _channel(sensor: Sensor) -> str:
-    entries: dict[str, object] = {
+    entries = {
         "quantity": sensor.quantity,
         "axis": None if sensor.axis is None else _degrees(sensor.axis),
         "pad": sensor.pad,
@@ -337,10 +337,8 @@ def _run(run: PlannedRun, suffix: str, rate: float, rotation: str) -> str:
 
 def _as_noted(run: PlannedRun, rig: VirtualRig) -> PlannedRun:
     """Give the run as somebody noted it, with that person's mistakes."""
-    for fault in rig.faults:
+    for fault in filter(lambda fault: fault.affects(run.id), rig.faults):
         point, value = run.point, fault.size(0.0)
-        if not fault.affects(run.id):
-            continue
         if fault.kind == "wrong_pad" and isinstance(run.test, DryTest):
             run = replace(run, test=replace(run.test, pad=int(value)))
         elif fault.kind == "wrong_direction":
