@@ -307,16 +307,11 @@ def pulse_times(readings: FloatArray, time: FloatArray) -> FloatArray:
         return np.empty(0)
     low, high = np.quantile(finite, (0.001, 0.999)).tolist()
     level = 0.5 * (low + high)
-    above = np.nan_to_num(readings, nan=low) > level
     # short dips in a pulse are none: the reading must have been low again
-    armed = np.nan_to_num(readings, nan=low) < low + 0.25 * (high - low)
-    rising = np.flatnonzero(above[1:] & ~above[:-1])
-    edges, after_last = [], -1
-    for edge in rising:
-        if after_last < 0 or armed[after_last : edge + 1].any():
-            edges.append(int(edge))
-            after_last = int(edge) + 1
-    at = np.array(edges, dtype=int)
+    filled = np.nan_to_num(readings, nan=low)
+    side = (filled > level).astype(int) - (filled < low + 0.25 * (high - low))
+    side = side[np.maximum.accumulate(np.where(side, np.arange(len(side)), 0))]
+    at = np.flatnonzero((side[1:] > 0) & (side[:-1] <= 0))
     share = (level - readings[at]) / (readings[at + 1] - readings[at])
     return time[at] + share * (time[at + 1] - time[at])
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigdata.readers.series import Series
-from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, Guesses, usable_unit
+from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, Guesses, part_means, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.spectrum import Peaks, amplitude_spectrum, strongest
 from rigdata.units import UnitError, unit_factor
@@ -19,6 +19,8 @@ from rigdata.units import UnitError, unit_factor
 _SLOW, _STRAIGHT = 0.9, 0.97
 #: Above this share too, where no line carries that much of the movement: steps that follow each other quickly.
 _MOSTLY, _DRIVEN = 0.5, 0.05
+#: Variance of equal readings, as a share of their square.
+_ROUNDING = 1e-20
 #: Blocks of which the means are the slow movement [s].
 _BLOCK = 0.25
 #: How far a line may lie from a frequency that is stated or known, as a share.
@@ -119,20 +121,17 @@ def _by_movement(forces: list[Series], moves: list[Series], lines: Peaks) -> tup
     pair = [s for s in forces if s.rate > 0][:2] or [s for s in moves if s.rate > 0][:2]
     if not pair:
         return "", ""
-    slow = []
-    for series in pair:  # means over blocks
-        step = max(1, round(_BLOCK * series.rate))
-        count = len(series) // step
-        blocks = np.reshape(series.values[: count * step], (count, step))
-        slow.append(np.nanmean(blocks[np.isfinite(blocks).any(axis=1)], axis=1))
     total = sum(float(np.nanvar(s.values)) for s in pair)
     if total <= 0:
         return "", ""
-    share = sum(float(np.var(b)) for b in slow if len(b)) / total
+    slow = part_means(pair, max(1, int(len(pair[0]) / (_BLOCK * pair[0].rate))))
+    slow = slow[np.isfinite(slow).all(axis=1)]
+    moved = float(slow.var(axis=0).sum()) if len(slow) else 0.0
+    share = moved / total if moved > _ROUNDING * np.mean(slow**2) else 0.0
     driven = bool(lines) and 0.5 * lines[0].amplitude ** 2 > _DRIVEN * total  # mains pick-up drives nothing
     if share > _SLOW or (share > _MOSTLY and not driven):
-        if len(slow) == 2 and len(slow[0]) == len(slow[1]) > 3:
-            spread = np.linalg.eigvalsh(np.cov(np.stack(slow)))
+        if len(pair) == 2 and len(slow) > 3:
+            spread = np.linalg.eigvalsh(np.cov(slow.T))
             if spread[-1] < _STRAIGHT * spread.sum():
                 return "clearance", "the force goes around"
         return "dry_pivot", "the force climbs slowly along one line"

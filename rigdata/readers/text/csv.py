@@ -239,7 +239,6 @@ def _is_cut_inside_last_cell(head: Head) -> bool:
     for line in [line for line in tail.decode(head.encoding, "replace").splitlines() if line.strip()][-6:]:
         cells = split_line(line, head.delimiter)
         _, mark, digits = cells[-1].partition(head.decimal)
-        if len(cells) == len(head.names):
-            decimals.append(len(digits) if mark else -1)
+        decimals.append(len(digits) if mark else -1)
     *usual, last = decimals or [0]
     return len(usual) >= 2 and len(set(usual)) == 1 and last < usual[0]
