@@ -189,9 +189,7 @@ def stated_frame(pair: Pair, channels: Guesses) -> Frame | None:
     return Frame(pair, math.radians(angles[0]), 1 if turn > 0 else -1, source, reason)
 
 
-def fitted_frame(
-    pair: Pair, readings: FloatArray, directions: FloatArray, reason: str, most: float = _MOST_OFF
-) -> Frame | None:
+def fitted_frame(pair: Pair, readings: FloatArray, directions: FloatArray, reason: str) -> Frame | None:
     """Fit the frame of two sensors to readings (n, 2) of known directions (n,) [rad]; None where they contradict."""
     if len(readings) < 2:
         return None
@@ -203,7 +201,7 @@ def fitted_frame(
         residual = math.degrees(float(np.sqrt(np.mean(np.angle(offsets * np.conj(mean)) ** 2))))
         fits.append((residual, sense, float(np.angle(mean))))
     (residual, sense, angle), (mirrored, _, _) = sorted(fits)
-    if residual > most or mirrored < _MIRROR * max(residual, 1.0):
+    if residual > _MOST_OFF or mirrored < _MIRROR * max(residual, 1.0):
         return None
     reason = f"{reason}, residual {residual:.1f} deg"
     return Frame(pair, angle, sense, "records", reason, residual / math.sqrt(len(readings)))

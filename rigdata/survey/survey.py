@@ -35,10 +35,6 @@ from rigdata.survey.runs import NEAR, RunGuess, guess_run, of_quantity, stronges
 #: Directions [deg] no farther apart than this lead to one pad; a dry test so near a pad's is toward that pad.
 _ALIKE, _TOWARD = 3.0, 15.0
 _MAINS_NEAR = 0.005
-#: In a clearance sweep the shaft lies in the corners, up to half a pad from where it is pushed [deg].
-_CORNERS = 25.0
-#: Shares that a sweep is looked at in.
-_SWEPT = 120
 #: Spread of values that are one set point, absolute and as a share.
 _SPREADS = {"direction": (5.0, 0.0), "speed": (0.0, 0.015), "excitation": (0.0, 0.015), "load": (0.0, 0.03)}
 #: Share of the running records in which the shaft speed must show.
@@ -170,17 +166,12 @@ class _Folder:
         return run if is_dry or not np.isfinite(newtons).all() else _with_load(run, float(np.hypot(*newtons)))
 
     def find_other_axes(self) -> None:
-        """Axes of probes by dry steps or the sweep, of accelerometers by the excitation; hints where these fail."""
+        """Axes of probes by dry steps, of accelerometers by the excitation; hints where that fails."""
         cells = self.cells
         if cells is None:
             return
         for pair in pairs(self.channels, "displacement"):
             frames = [fitted_frame(pair, *evidence) for evidence in self._of_dry_tests(pair, cells)]
-            for _, (probes, forces) in self._with(["clearance"], pair, cells.names):
-                # a small load goes around, and the shaft follows it from corner to corner
-                around = [part_means(channels, _SWEPT) for channels in (probes, forces)]
-                readings, pushes = (means - 0.5 * (means.max(axis=0) + means.min(axis=0)) for means in around)
-                frames.append(fitted_frame(pair, readings, cells.direction(pushes), "the clearance sweep", _CORNERS))
             proposals = [frame for frame in frames if frame is not None]
             if proposals:
                 with_axes(self.channels, min(proposals, key=lambda frame: frame.error), cells.source)
@@ -237,18 +228,16 @@ class _Folder:
             return OPEN
         frequencies = np.sort(np.concatenate(running))
 
-        def near(frequency: float, order: int = 1) -> FloatArray:
-            return frequencies[np.abs(order * frequencies - frequency) < NEAR * frequency]
+        def near(frequency: float) -> FloatArray:
+            return frequencies[np.abs(frequencies - frequency) < NEAR * frequency]
 
         # the mains are in every record as well, and so may one excitation: the shaft shows twice its speed too
         order = sorted(set(frequencies.tolist()), key=lambda f: (is_mains(f), -len(near(2 * f)), f))
         least = _MOST_OF * len(running)
         for candidate in order:
-            speeds, half = near(candidate), near(candidate, 2)
+            speeds = near(candidate)
             if len(speeds) < least:
                 continue
-            if 2 * len(half) >= len(speeds):  # an oval shaft shows twice its speed more often
-                speeds = half
             speed = float(speeds[len(speeds) // 2])
             once, twice = len(near(speed)), len(near(2 * speed))
             text = f"this line is in {once} of {len(running)} records"
