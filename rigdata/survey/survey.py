@@ -285,7 +285,7 @@ def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
     turns = run.speed.number
     lines = [p for p in run.lines if not any(abs(p.frequency - n * turns) <= NEAR * n * turns for n in (1, 2))]
     if not lines:
-        return replace(run, excitation=Entry(None, "", "its only line is the shaft's"))
+        return run
     beside = " beside the shaft's" if len(lines) < len(run.lines) else ""
     return replace(run, excitation=Entry(lines[0].frequency, "records", f"strongest line{beside}"))
 

@@ -96,12 +96,9 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
     steady = replace(actual, excitation=0.0)
     lines, line_facts = [], []
     for frequency, force in forces:
-        line = answer(frequency, force, truth.stiffness(replace(actual, excitation=frequency)), instruments)
-        lines.append(line)
-        fact = {"frequency_Hz": round(frequency / (2 * np.pi), 9)}
-        for name, phasor in (("oil_force_N", line.oil_force), ("displacement_m", line.displacement)):
-            fact[name] = np.stack([phasor.real, phasor.imag], axis=1).tolist()
-        line_facts.append(fact)
+        h = truth.stiffness(replace(actual, excitation=frequency))
+        lines.append(answer(frequency, force, h, instruments))
+        line_facts.append({"frequency_Hz": round(frequency / (2 * np.pi), 9)})
     position = truth.position(steady)
     return Motion(
         time=np.arange(round(run.seconds * run.rate)) / run.rate,
@@ -168,9 +165,7 @@ def dry_motion(run: PlannedRun, test: DryTest, truth: RigTruth, noise: Noise, se
     facts = {
         "load_direction_error_deg": float(np.degrees(off)),
         "side_share": side,
-        "side_start_m": side_start,
         "contact_gap_m": gap,
-        "friction": flaws.friction,
     }
     return Motion(time, position, np.outer(load, directions(run.direction + off)), truth.cold_temperatures, facts)
 
