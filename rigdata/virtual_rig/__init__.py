@@ -7,12 +7,14 @@
 """
 
 from rigdata.virtual_rig.campaign import CampaignTruth, CsvLayout, write_campaign
-from rigdata.virtual_rig.instruments import Instruments, Sensor, SensorError
-from rigdata.virtual_rig.noise import (
+from rigdata.virtual_rig.instruments import (
     ChannelNoise,
     DryImperfections,
     Glitches,
+    Instruments,
     Noise,
+    Sensor,
+    SensorError,
 )
 from rigdata.virtual_rig.plan import (
     ClearanceSweep,

@@ -11,8 +11,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import directions
-from rigdata.virtual_rig.instruments import Instruments
-from rigdata.virtual_rig.noise import Noise, stream
+from rigdata.virtual_rig.instruments import Instruments, Noise, stream
 from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, PlannedRun
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, load_vector, point_facts
 

@@ -15,9 +15,8 @@ from scipy.fft import irfft, next_fast_len
 
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.near_names import unknown_name
-from rigdata.virtual_rig.instruments import Instruments, Sensor
+from rigdata.virtual_rig.instruments import Instruments, Noise, Sensor, stream
 from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
-from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import DryTest, PlannedRun, RigPlan
 from rigdata.virtual_rig.truth import PAPER_RIG, RigTruth, VirtualRigError
 
