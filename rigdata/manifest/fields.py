@@ -52,6 +52,9 @@ class Field:
     above: float = -math.inf
     below: float = math.inf
     remedy: str = ""  #: what to do about a wrong value, where kind and bounds alone do not say it
+    needed_by: Sequence[str] = ()  #: kinds of runs
+    guess: str = ""  #: field of `rigdata.survey.runs.RunGuess`
+    unit: str = ""  #: of a draft
 
     def holds(self, value: float) -> bool:
         """Whether a number is within the bounds."""

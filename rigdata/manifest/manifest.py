@@ -25,13 +25,6 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError, parse_toml, refuse, shown
 from rigdata.units import UnitError, parse_quantity, split_quantity
 
-_NEEDED = {
-    "dynamic": ("shaft_speed", "static_load", "static_load_direction", "excitation_frequency"),
-    "locus": ("shaft_speed", "static_load", "static_load_direction"),
-    "dry_pivot": ("pad",),
-    "clearance": (),
-    "baseline": ("excitation_frequency",),
-}
 _ID = re.compile(r"[\w][\w .+=@-]{0,199}")
 _MAX_RUNS = 100_000
 #: Larger manifests are refused before they are parsed [bytes].
@@ -89,9 +82,9 @@ def _read_runs(top: Table, rotation: str) -> tuple[RunEntry, ...]:
 
 
 def _read_run(table: Table, index: int, rotation: str) -> RunEntry | None:
-    needed = _NEEDED.get(str(table.data.get("kind")), ())
+    needed = [field.key for field in RUN if table.data.get("kind") in field.needed_by]
     if table.data.get("excitation", "sine") != "sine":
-        needed = tuple(key.replace("excitation_frequency", "excitation_band") for key in needed)
+        needed = [key.replace("excitation_frequency", "excitation_band") for key in needed]
     values = table.read(RUN, needed)
     name, kind = values["id"], values["kind"]
     if name is not None and not _ID.fullmatch(name):
@@ -183,20 +176,17 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     described = channels_by_run(tables, channels, [run.id for run in runs])
     excited = any(run.kind in {"dynamic", "baseline"} for run in runs)
     housing = top.subtable("housing").read(HOUSING, ["mass"] if excited else [])
-    acquisition = top.subtable("acquisition").read(ACQUISITION)
     manifest = Manifest(
         **{key: header[key] for key in ("id", "description", "date", "by")},
+        **{key: housing[key] for key in ("mass_uncertainty", "mount")},
+        **top.subtable("acquisition").read(ACQUISITION),
         bearing_name=header["bearing"],
         housing_mass=housing["mass"],
-        sample_rate=acquisition["sample_rate"],
         csv=_read_csv(top.subtable("csv")),
         channels=channels,
         runs=runs,
         notes=tuple(p for p in findings.problems if p.severity != "error"),
-        mass_uncertainty=housing["mass_uncertainty"],
-        mains=acquisition["mains"],
         rotation=rotation,
-        mount=housing["mount"],
         described=described,
     )
     if findings.errors:

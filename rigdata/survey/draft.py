@@ -116,14 +116,9 @@ def run_lines(run: RunGuess) -> list[str]:
     kind = run.kind.value
     lines = ["[[runs]]", f"id = {_toml_string(Path(run.file).stem)}", f"file = {_toml_string(run.file)}"]
     lines.append(_line("kind", run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
-    if kind in ("dynamic", "locus", None):
-        lines += [_line("shaft_speed", run.speed, RUN, "Hz"), _line("static_load", run.load, RUN, "kN")]
-    if kind == "dry_pivot":
-        lines.append(_line("pad", run.pad, RUN))
-    if kind != "clearance":
-        lines.append(_line("static_load_direction", run.direction, RUN, "deg"))
-    if kind in ("dynamic", None):
-        lines.append(_line("excitation_frequency", run.excitation, RUN, "Hz"))
+    for field in RUN:
+        if (kind or "dynamic") in field.needed_by or (kind == "dry_pivot" and field.guess == "direction"):
+            lines.append(_line(field.key, getattr(run, field.guess), RUN, field.unit))
     return lines
 
 

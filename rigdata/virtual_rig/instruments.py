@@ -85,15 +85,13 @@ class Instruments:
         With a `seed`, gap voltages and the zeros of accelerometers and Pt100s are random; without, the probes
         are at 8 V and everything else is at zero.
         """
-        pads = [f"T{number}" for number in range(1, n_pads + 1)]
-        rows = [("probe", "X1A", 45.0), ("probe", "X1B", 135.0), ("cell", "L1H", 0.0), ("cell", "L1V", 90.0)]
-        rows += [("accelerometer", "A1H", 0.0), ("accelerometer", "A1V", 90.0)]
-        scatter = [0.2, 0.2, 1.5, 1.5, *[0.2] * n_pads]  # of gap voltages, and of zeros
+        rig = PAPER_RIG["rig"]
+        sensors = [Sensor.of_type(kind, name, axis=radians(degrees)) for kind, name, degrees in rig["sensors"]]
+        sensors += [Sensor.of_type("thermometer", f"T{number}", pad=number) for number in range(1, n_pads + 1)]
+        drawn = {s.name: rig["scatter"][s.quantity] for s in sensors if s.quantity != "force"}
         share = 0.0 if seed is None else 1.0
-        zeros = share * np.random.default_rng([seed or 0, 0]).normal(0.0, scatter) + 0.0
-        drawn = dict(zip(("X1A", "X1B", "A1H", "A1V", *pads), zeros.tolist(), strict=True))
-        sensors = [Sensor.of_type(kind, name, axis=radians(degrees)) for kind, name, degrees in rows]
-        sensors += [Sensor.of_type("thermometer", name, pad=number) for number, name in enumerate(pads, 1)]
+        zeros = share * np.random.default_rng([seed or 0, 0]).normal(0.0, [*drawn.values()]) + 0.0
+        drawn = dict(zip(drawn, zeros.tolist(), strict=True))
         full_scale = next((size for size in _CELL_SIZES if size >= 1.5 * load), 1.5 * load)
         stated = {"sensitivity": "2.0 mV/V", "full_scale": f"{full_scale / 1e3:g} kN", "excitation": "5 V"}
         for place, sensor in enumerate(sensors):

@@ -9,7 +9,7 @@ from math import pi, radians
 from typing import Literal
 
 from rigdata.operating_point import OperatingPoint
-from rigdata.virtual_rig.truth import VirtualRigError, hz
+from rigdata.virtual_rig.truth import PAPER_RIG, VirtualRigError, hz
 
 Branch = Literal["up", "down", "cycle"]
 _DOWNWARD = -pi / 2
@@ -79,10 +79,8 @@ class RigPlan:
     @classmethod
     def like_paper(cls, pads: int = 5) -> RigPlan:
         """Six loads at 25 Hz, six frequencies at 5 kN, 20 locus directions, a dry test a pad, one sweep."""
-        loads = (2500.0, 3750.0, 5000.0, 6250.0, 7500.0, 8750.0)
-        points = {(load, 25.0) for load in loads} | {(5000.0, f) for f in (10.0, 20.0, 30.0, 40.0, 50.0)}
         return cls(
-            dynamic=operating_points(sorted(points)),
+            dynamic=operating_points(PAPER_RIG["plan"]["points"]),
             locus=locus_points(20),
             dry=tuple(DryTest(pad) for pad in range(1, pads + 1)),
             clearance=(ClearanceSweep(),),
@@ -91,8 +89,9 @@ class RigPlan:
     @classmethod
     def short(cls, pads: int = 5) -> RigPlan:
         """Three loads at 25 Hz, ten locus directions, a dry test a pad, one sweep: a campaign for a demo."""
-        dynamic = operating_points([(2500.0, 25.0), (5000.0, 25.0), (8750.0, 25.0)])
-        return replace(cls.like_paper(pads), dynamic=dynamic, locus=locus_points(10))
+        return replace(
+            cls.like_paper(pads), dynamic=operating_points(PAPER_RIG["plan"]["short"]), locus=locus_points(10)
+        )
 
     def turning(self, rotation: str) -> RigPlan:
         """The same tests with the shaft turning ``"counter-clockwise"`` or ``"clockwise"``."""
