@@ -168,27 +168,18 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     findings = Findings(file, key_lines(text), files)
     findings.note_open(open_paths(data))
     top = Table(data, (), findings)
-    header = top.read(TOP)
-    tables = top.subtable("channels")
+    values, tables = top.read(TOP), top.subtable("channels")
     channels = read_channels(tables)
-    rotation = top.subtable("shaft").read(SHAFT)["rotation"]
-    runs = _read_runs(top, rotation)
+    values |= top.subtable("shaft").read(SHAFT)
+    runs = _read_runs(top, values["rotation"])
     described = channels_by_run(tables, channels, [run.id for run in runs])
     excited = any(run.kind in {"dynamic", "baseline"} for run in runs)
-    housing = top.subtable("housing").read(HOUSING, ["mass"] if excited else [])
-    manifest = Manifest(
-        **{key: header[key] for key in ("id", "description", "date", "by")},
-        **{key: housing[key] for key in ("mass_uncertainty", "mount")},
-        **top.subtable("acquisition").read(ACQUISITION),
-        bearing_name=header["bearing"],
-        housing_mass=housing["mass"],
-        csv=_read_csv(top.subtable("csv")),
-        channels=channels,
-        runs=runs,
-        notes=tuple(p for p in findings.problems if p.severity != "error"),
-        rotation=rotation,
-        described=described,
-    )
+    values |= top.subtable("housing").read(HOUSING, ["mass"] if excited else [])
+    values |= top.subtable("acquisition").read(ACQUISITION)
+    values |= {"bearing_name": values["bearing"], "housing_mass": values["mass"], "csv": _read_csv(top.subtable("csv"))}
+    values |= {"channels": channels, "runs": runs, "described": described}
+    values["notes"] = tuple(problem for problem in findings.problems if problem.severity != "error")
+    manifest = Manifest(**{name: values[name] for name in Manifest.__dataclass_fields__})
     if findings.errors:
         raise RigDataError(findings.problems)
     return manifest

@@ -276,8 +276,6 @@ def _with_load(run: RunGuess, load: float) -> RunGuess:
 
 def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
     """A run with its speed and excitation: what turns with the shaft is not the excitation."""
-    if run.kind.value not in (*_RUNNING, None):
-        return run
     if run.speed.value is None:
         run = replace(run, speed=speed)
     if run.excitation.value is not None or run.kind.value == "locus" or not run.lines:
