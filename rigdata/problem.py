@@ -6,6 +6,7 @@ import re
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal, Self
 
 Severity = Literal["error", "warning", "note"]
@@ -123,6 +124,11 @@ def shown(value: object) -> str:
     else:
         text = ascii(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def tables_beside(module: str, name: str) -> dict[str, Any]:
+    """Tables of a TOML file of ours, next to the module whose file is given."""
+    return tomllib.loads(Path(module).with_name(name).read_text(encoding="utf-8"))
 
 
 def parse_toml(text: str) -> dict[str, Any]:

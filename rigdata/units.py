@@ -10,13 +10,11 @@ from __future__ import annotations
 import functools
 import math
 import re
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from rigdata.problem import RigError, shown
+from rigdata.problem import RigError, shown, tables_beside
 
 #: Characters of a quantity; more are a slip or a bomb.
 LONGEST = 200
@@ -24,7 +22,7 @@ ZERO_CELSIUS = 273.15
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?(?![0-9.,])")
 _TOKEN = re.compile(r"\s*(?:([A-Za-z_Ω%]{1,24})(?:(?:\^|\*\*)?([+-]?[1-6]))?(?![0-9])|([*/()])|(1)(?![0-9]))")
 _MAX_UNIT = 48
-LISTED: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
+LISTED: dict[str, dict[str, Any]] = tables_beside(__file__, "units.toml")
 #: SI unit of every dimension.
 SI_UNITS: dict[str, str] = LISTED["si"]
 #: Seconds of what loggers count times in.

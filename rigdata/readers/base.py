@@ -2,7 +2,6 @@
 
 import math
 import threading
-import tomllib
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -17,7 +16,7 @@ from rigdata.calibration import DIMENSIONS, Channel, Channels
 from rigdata.device import Device, Grid, by_clock, planned
 from rigdata.manifest.manifest import CsvSpec
 from rigdata.near_names import nearest_name
-from rigdata.problem import Problem, RigDataError, Severity, refuse
+from rigdata.problem import Problem, RigDataError, Severity, refuse, tables_beside
 from rigdata.units import UnitError, is_signal, parse_unit, temperature_offset, unit_factor
 
 #: A channel longer than this is rejected: slices of it would be asked for by mistake [samples].
@@ -34,7 +33,7 @@ LEAST_RATE, MOST_RATE = 1e-6, 1e12
 #: Text in any national spelling.
 TEXT = (".csv", ".txt", ".asc", ".dat", ".tsv")
 #: Module of `rigdata.readers`, its function, and the extra that brings its library, by suffix.
-FORMATS: dict[str, list[str]] = tomllib.loads(Path(__file__).with_name("formats.toml").read_text(encoding="utf-8"))
+FORMATS: dict[str, list[str]] = tables_beside(__file__, "formats.toml")
 #: Columns cached by a campaign before the run that was not asked for longest is let go [bytes].
 _CACHE_BYTES = 96 * 2**20
 #: Factors that differ by less are rounded ones of one unit.

@@ -4,8 +4,6 @@ The libraries are extras: ``pip install "tpjb-ident[tdms]"``. What they raise on
 that names the file. What was parsed is cached, the last used of a campaign, as much as memory allows.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

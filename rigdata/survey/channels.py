@@ -8,10 +8,8 @@ and signs with them.
 import contextlib
 import math
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,11 +17,12 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import DIMENSIONS, VECTOR_QUANTITIES, reading_gain
 from rigdata.manifest.fields import MARK
+from rigdata.problem import tables_beside
 from rigdata.readers.series import Series, is_time
 from rigdata.units import UnitError, is_signal, parse_quantity, parse_unit
 
 #: Tables of `words.toml`.
-WORDS: dict[str, dict[str, str]] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+WORDS: dict[str, dict[str, str]] = tables_beside(__file__, "words.toml")
 _SPELLINGS = str.maketrans(WORDS["spellings"])
 #: Units that a name may end with after an underscore; V, H and A there are directions and numbers of sensors.
 _SUFFIXES = "um|mm|mils?|k?N|lbf|m_s2|m/s2|mps2|g|deg[CF]|rpm|Hz|mV|bar|k?Pa|MPa|psi"
@@ -89,10 +88,14 @@ def guess_channel(name: str, unit: str) -> ChannelGuess:
     if quantity := quantity_of_unit(usable):
         gain = reading_gain(quantity, usable, None)
         return ChannelGuess(Entry(quantity, "file"), usable, gain=gain, hint=_hint(bare, quantity))
-    for quantity, pattern in WORDS["quantities"].items():
-        if re.search(pattern, bare, re.IGNORECASE):
-            return ChannelGuess(Entry(quantity, "guess", "its name"), usable, hint=_hint(bare, quantity))
+    if quantity := named("quantities", bare):
+        return ChannelGuess(Entry(quantity, "guess", "its name"), usable, hint=_hint(bare, quantity))
     return ChannelGuess(Entry(), usable)
+
+
+def named(table: str, text: str) -> str:
+    """Key of the first pattern in a table of `words.toml` that is in a text; "" where none is."""
+    return next((key for key, pattern in WORDS[table].items() if re.search(pattern, text, re.IGNORECASE)), "")
 
 
 def usable_unit(unit: str) -> str:
@@ -121,10 +124,7 @@ def quantity_of_unit(unit: str) -> str:
 
 def _hint(name: str, quantity: str) -> float:
     """Direction [deg] that the end of a name hints at, for quantities that have one."""
-    if quantity not in VECTOR_QUANTITIES:
-        return math.nan
-    hints = WORDS["directions"].items()
-    return next((float(angle) for angle, end in hints if re.search(end, name, re.IGNORECASE)), math.nan)
+    return float((quantity in VECTOR_QUANTITIES and named("directions", name)) or "nan")
 
 
 def as_described(guess: ChannelGuess, table: Mapping[str, Any]) -> ChannelGuess:

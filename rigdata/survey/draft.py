@@ -116,10 +116,8 @@ def run_lines(run: RunGuess) -> list[str]:
     kind = run.kind.value
     lines = ["[[runs]]", f"id = {_toml_string(Path(run.file).stem)}", f"file = {_toml_string(run.file)}"]
     lines.append(_line("kind", run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
-    for field in RUN:
-        if (kind or "dynamic") in field.needed_by or (kind == "dry_pivot" and field.guess == "direction"):
-            lines.append(_line(field.key, getattr(run, field.guess), RUN, field.unit))
-    return lines
+    fields = [field for field in RUN if (kind or "dynamic") in (*field.needed_by, *field.drafted_for)]
+    return lines + [_line(field.key, getattr(run, field.guess), RUN, field.unit) for field in fields]
 
 
 def _line(key: str, entry: Entry, fields: tuple[Field, ...] = (), unit: str = "", digits: str = ".4g") -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigdata.readers.series import Series
-from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, Guesses, part_means, usable_unit
+from rigdata.survey.channels import OPEN, PAD, Entry, Guesses, named, part_means, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.spectrum import Peaks, amplitude_spectrum, strongest
 from rigdata.units import UnitError, unit_factor
@@ -54,14 +54,14 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
     moves = of_quantity(export, channels, "displacement")
     lines = strongest_lines(forces) or strongest_lines(moves)
     stem = Path(export.name).stem
-    named = next((kind for kind, pattern in WORDS["kinds"].items() if re.search(pattern, stem, re.IGNORECASE)), "")
-    kind = Entry(named, "guess", "the file's name") if named else OPEN
+    by_name = named("kinds", stem)
+    kind = Entry(by_name, "guess", "the file's name") if by_name else OPEN
     # movement beats a misleading name, but a name tells a constant load from none
     movement, why = _by_movement(forces, moves, lines)
-    if movement and movement == (named or movement):
+    if movement and movement == (by_name or movement):
         kind = Entry(movement, "records", why)
-    elif movement and {movement, named} != {"dynamic", "locus"}:
-        kind = Entry(movement, "records", f"{why} (its name says {named})")
+    elif movement and {movement, by_name} != {"dynamic", "locus"}:
+        kind = Entry(movement, "records", f"{why} (its name says {by_name})")
     pad = re.search(rf"(?:^p|{PAD})[-_ #]?(\d{{1,2}})(?!\d)", stem, re.IGNORECASE)
     angles = _numbers_before(stem, r"deg(?:ree)?s?|°|grad")
     # a frequency that the name states counts where one of the record's lines confirms it

@@ -1,12 +1,10 @@
 """The test plan: which runs a campaign consists of, at which set points, how long."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import pi, radians
-from typing import Literal
+from typing import Literal, Self
 
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig.truth import PAPER_RIG, VirtualRigError, hz
@@ -77,7 +75,7 @@ class RigPlan:
     dry_rate: float = 500.0
 
     @classmethod
-    def like_paper(cls, pads: int = 5) -> RigPlan:
+    def like_paper(cls, pads: int = 5) -> Self:
         """Six loads at 25 Hz, six frequencies at 5 kN, 20 locus directions, a dry test a pad, one sweep."""
         return cls(
             dynamic=operating_points(PAPER_RIG["plan"]["points"]),
@@ -87,13 +85,13 @@ class RigPlan:
         )
 
     @classmethod
-    def short(cls, pads: int = 5) -> RigPlan:
+    def short(cls, pads: int = 5) -> Self:
         """Three loads at 25 Hz, ten locus directions, a dry test a pad, one sweep: a campaign for a demo."""
         return replace(
             cls.like_paper(pads), dynamic=operating_points(PAPER_RIG["plan"]["short"]), locus=locus_points(10)
         )
 
-    def turning(self, rotation: str) -> RigPlan:
+    def turning(self, rotation: str) -> Self:
         """The same tests with the shaft turning ``"counter-clockwise"`` or ``"clockwise"``."""
         dynamic, locus = (tuple(replace(p, rotation=rotation) for p in points) for points in (self.dynamic, self.locus))
         return replace(self, dynamic=dynamic, locus=locus)

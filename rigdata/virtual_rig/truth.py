@@ -4,20 +4,16 @@ The generator never asks a bearing model (`rigdata` may not import one): whoever
 stiffness, the mean position, the temperatures and the pivot law, from a model or from thin air.
 """
 
-from __future__ import annotations
-
-import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import pi
-from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
-from rigdata.problem import RigError
+from rigdata.problem import RigError, tables_beside
 from rigdata.vector import directions
 
 PointLaw = Callable[[OperatingPoint], Any]
@@ -37,9 +33,7 @@ def _with_tuples(entry: Any) -> Any:
 
 
 #: Tables of `paper_rig.toml`.
-PAPER_RIG: dict[str, dict[str, Any]] = _with_tuples(
-    tomllib.loads(Path(__file__).with_name("paper_rig.toml").read_text(encoding="utf-8"))
-)
+PAPER_RIG: dict[str, dict[str, Any]] = _with_tuples(tables_beside(__file__, "paper_rig.toml"))
 
 
 @dataclass(frozen=True, repr=False)
@@ -57,7 +51,7 @@ class RigTruth:
     cold_temperature: float = 24.0
 
     @classmethod
-    def constant(cls, k: Any, c: Any, pivot_stiffness: float | Sequence[float] = 6e8, **fields: Any) -> RigTruth:
+    def constant(cls, k: Any, c: Any, pivot_stiffness: float | Sequence[float] = 6e8, **fields: Any) -> Self:
         """Make a truth with one K and C at all points: a linear bearing."""
         stiffness = np.array(k, dtype=float)
         damping = np.array(c, dtype=float)
