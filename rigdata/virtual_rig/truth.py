@@ -5,7 +5,7 @@ stiffness, the mean position, the temperatures and the pivot law, from a model o
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import pi
 from typing import Any, Self
 
@@ -57,16 +57,15 @@ class RigTruth:
         damping = np.array(c, dtype=float)
         angles = fields.get("pivot_angles", _FIVE_PADS)
         pivots = np.broadcast_to(np.asarray(pivot_stiffness, dtype=float), (len(angles),))
-        base = cls(
-            stiffness=lambda point: stiffness + 1j * point.excitation * damping,
-            position=lambda point: np.linalg.solve(stiffness, load_vector(point)),
-            temperature=lambda point: np.full(len(angles), 45.0 + point.static_load / 2e3),
-            pivot_deflection=lambda pad, load: load / pivots[pad - 1],
-            pivot_angles=angles,
-            clearance=fields.get("clearance", (80e-6,) * len(angles)),
-            bearing_text='schema = "tpjb-bearing/1"\nname = "linear test bearing"\n',
-        )
-        return replace(base, **fields)
+        linear: dict[str, Any] = {
+            "stiffness": lambda point: stiffness + 1j * point.excitation * damping,
+            "position": lambda point: np.linalg.solve(stiffness, load_vector(point)),
+            "temperature": lambda point: np.full(len(angles), 45.0 + point.static_load / 2e3),
+            "pivot_deflection": lambda pad, load: load / pivots[pad - 1],
+            "clearance": (80e-6,) * len(angles),
+            "bearing_text": 'schema = "tpjb-bearing/1"\nname = "linear test bearing"\n',
+        }
+        return cls(**linear | fields)
 
     @property
     def cold_temperatures(self) -> FloatArray:
