@@ -17,8 +17,6 @@ from rigdata.units import UnitError, unit_factor
 
 #: Share of slow movement above which a record is a quasi-static test, and of one direction for load steps.
 _SLOW, _STRAIGHT = 0.9, 0.97
-#: Above this share too, where no line carries that much of the movement: steps that follow each other quickly.
-_MOSTLY, _DRIVEN = 0.5, 0.05
 #: Variance of equal readings, as a share of their square.
 _ROUNDING = 1e-20
 #: Blocks of which the means are the slow movement [s].
@@ -128,8 +126,7 @@ def _by_movement(forces: list[Series], moves: list[Series], lines: Peaks) -> tup
     slow = slow[np.isfinite(slow).all(axis=1)]
     moved = float(slow.var(axis=0).sum()) if len(slow) else 0.0
     share = moved / total if moved > _ROUNDING * np.mean(slow**2) else 0.0
-    driven = bool(lines) and 0.5 * lines[0].amplitude ** 2 > _DRIVEN * total  # mains pick-up drives nothing
-    if share > _SLOW or (share > _MOSTLY and not driven):
+    if share > _SLOW:
         if len(pair) == 2 and len(slow) > 3:
             spread = np.linalg.eigvalsh(np.cov(slow.T))
             if spread[-1] < _STRAIGHT * spread.sum():
