@@ -143,7 +143,8 @@ class _Folder:
         series, is_dry = _pair(run, cells.names), run.kind.value == "dry_pivot"
         if not series or run.kind.value == "clearance":
             return run
-        force = _change(series) if is_dry else part_means(series, 1)[0]
+        means = part_means(series, 10 if is_dry else 1)
+        force = means[-1] - is_dry * means[0]
         if not force.any() or not np.isfinite(force).all():
             return run
         angle = float(cells.direction(force))
@@ -253,12 +254,6 @@ def _pair(run: RunGuess, names: Pair) -> list[Series]:
     series = {s.name: s for s in run.export.series}
     chosen = [series[name] for name in names if name in series]
     return chosen if len(chosen) == 2 and any(np.isfinite(s.values).any() for s in chosen) else []
-
-
-def _change(series: Sequence[Series]) -> FloatArray:
-    """Difference of two channels (2,) between the last and the first tenth of a record."""
-    tenths = part_means(series)
-    return tenths[-1] - tenths[0]
 
 
 def _with_load(run: RunGuess, load: float) -> RunGuess:
