@@ -4,11 +4,12 @@ import hashlib
 import html
 import itertools
 import os
+import re
 import stat
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from rigdata.calibration import Channel, Channels
@@ -17,11 +18,12 @@ from rigdata.near_names import hint
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import TEXT, ReadingCache, RunReader
 from rigdata.run import Run
-from rigdata.safe_path import inside
 
 MANIFEST_NAME = "campaign.toml"
 HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
 _MAX_BEARING = 2**20
+_DRIVE = re.compile(r"^[A-Za-z]:|^[\\/]{2}")
+_MAX_NAME = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,6 +223,31 @@ def _read_text(path: Path, file: str, limit: int) -> str:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise refuse(file, f"line {line}", "is not UTF-8 text", "Save the file as UTF-8") from error
+
+
+def inside(folder: Path, name: str, file: str, place: str, run: str | None = None) -> Path:
+    r"""Resolve a file name of a manifest, which a stranger may have written, below its folder."""
+    target = folder
+    fault = ""
+    parts = name.replace("\\", "/").split("/")
+    if not name.strip() or len(name) > _MAX_NAME or not name.isprintable():
+        fault = "is empty, too long or holds control characters"
+    elif _DRIVE.match(name) or name.startswith(("/", "\\", "~")) or PureWindowsPath(name).drive:
+        fault = "is not relative"
+    elif ".." in parts:
+        fault = "leaves the campaign folder by '..'"
+    else:
+        root = folder.resolve()
+        try:
+            target = root.joinpath(*parts).resolve()
+        except (OSError, RuntimeError) as error:  # a loop of symlinks
+            fault = f"cannot be resolved ({type(error).__name__})"
+        else:
+            fault = "" if target.is_relative_to(root) else "leaves the campaign folder by a symlink"
+    if fault:
+        cure = "Give a path relative to the campaign folder, inside it"
+        raise refuse(file, place, f"file {name[:120]!a} {fault}", cure, run)
+    return target
 
 
 def _load_folder(folder: Path, manifest_path: Path) -> Campaign:

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from rigdata.campaign import inside
 from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import FORMATS, TEXT, RecordFile
 from rigdata.readers.file_reader import read_contents
 from rigdata.readers.series import Series, with_unique_names
 from rigdata.readers.text.head import find_head
-from rigdata.safe_path import inside
 from rigdata.survey.channels import Entry, Tables
 from rigdata.units import TIME_FACTORS
 

@@ -16,12 +16,13 @@ from rigdata.virtual_rig.instruments import (
     Sensor,
     SensorError,
 )
-from rigdata.virtual_rig.plan import (
+from rigdata.virtual_rig.rig import Fault, SimulatedRun, VirtualRig
+from rigdata.virtual_rig.truth import (
     ClearanceSweep,
     DryTest,
     RigPlan,
+    RigTruth,
+    VirtualRigError,
     locus_points,
     operating_points,
 )
-from rigdata.virtual_rig.rig import Fault, SimulatedRun, VirtualRig
-from rigdata.virtual_rig.truth import RigTruth, VirtualRigError

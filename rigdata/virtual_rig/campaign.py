@@ -16,9 +16,8 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import ROTATIONS
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import answer
-from rigdata.virtual_rig.plan import DryTest, PlannedRun
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig, converter_step, felt_direction
-from rigdata.virtual_rig.truth import PAPER_RIG, RigTruth, VirtualRigError, hz, point_facts
+from rigdata.virtual_rig.truth import PAPER_RIG, DryTest, PlannedRun, RigTruth, VirtualRigError, hz, point_facts
 
 Progress = Callable[[int, int, str], None]
 #: Names and readings of a file's columns.

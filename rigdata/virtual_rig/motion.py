@@ -12,8 +12,15 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import directions
 from rigdata.virtual_rig.instruments import Instruments, Noise, stream
-from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, PlannedRun
-from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, load_vector, point_facts
+from rigdata.virtual_rig.truth import (
+    ClearanceSweep,
+    DryTest,
+    PlannedRun,
+    RigTruth,
+    VirtualRigError,
+    load_vector,
+    point_facts,
+)
 
 _SETTLING = 0.1  # time constant of an overshoot [s]
 #: How far the load passes a pad before the shaft slides along it, and over which angle it does [rad].

@@ -17,8 +17,7 @@ from rigdata.arrays import BoolArray, FloatArray
 from rigdata.near_names import unknown_name
 from rigdata.virtual_rig.instruments import Instruments, Noise, Sensor, stream
 from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
-from rigdata.virtual_rig.plan import DryTest, PlannedRun, RigPlan
-from rigdata.virtual_rig.truth import PAPER_RIG, RigTruth, VirtualRigError
+from rigdata.virtual_rig.truth import PAPER_RIG, DryTest, PlannedRun, RigPlan, RigTruth, VirtualRigError
 
 #: Where each kind of fault sits ("sensor", "record", "run" or "file"), what it needs (fields, a layout, times in the
 #: files), and what it does.
