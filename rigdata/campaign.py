@@ -106,10 +106,10 @@ class Campaign(Description):
         >>> print(load_campaign(demo).run("d-02500-25-01").point)
         2500 N at -90 deg, shaft 22 Hz, excited at 25 Hz
         """
-        for run in self.runs:
-            if run.id == run_id:
-                return run
-        cure = hint(run_id, [run.id for run in self.runs], "There are")[:200]
+        runs = {run.id: run for run in self.runs}
+        if run_id in runs:
+            return runs[run_id]
+        cure = hint(run_id, runs, "There are")[:200]
         raise refuse(self.path.name, "", f"no run has the id {run_id!r}", cure)
 
     def of_kind(self, kind: str) -> tuple[Run, ...]:

@@ -48,10 +48,10 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     """Write the text of a draft."""
     lines = [*_HEAD, 'schema = "tpjb-rig/1"', f"id = {_toml_string(name)}"]
     lines.append(f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # file in this folder')
-    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _line("mass", OPEN, HOUSING, "kg"), _MOUNT, ""]
+    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _line("mass", OPEN, HOUSING), _MOUNT, ""]
     exports = [run.export for run in surveyed.runs]
     if not all(export.rate > 0 for export in exports):
-        lines += ["[acquisition]", _line("sample_rate", OPEN, ACQUISITION, "Hz"), ""]
+        lines += ["[acquisition]", _line("sample_rate", OPEN, ACQUISITION), ""]
     if nameless := max((export.nameless for export in exports), default=0):
         names = ", ".join(_toml_string(f"column{i + 1}") for i in range(nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
@@ -93,7 +93,7 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
     if quantity in VECTOR_QUANTITIES:
         is_hinted = guess.axis.value is None and math.isfinite(guess.hint)
         axis = Entry(reason=f"its name hints at {guess.hint:g} deg") if is_hinted else guess.axis
-        lines.append(_line("axis", axis, CHANNEL, "deg", "g"))
+        lines.append(_line("axis", axis, CHANNEL))
     if is_like:
         lines.append(f"like = {_toml_string(model)}   # (guess) same type; or its own unit, sensitivity, ..")
     else:
@@ -117,16 +117,16 @@ def run_lines(run: RunGuess) -> list[str]:
     lines = ["[[runs]]", f"id = {_toml_string(Path(run.file).stem)}", f"file = {_toml_string(run.file)}"]
     lines.append(_line("kind", run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
     fields = [field for field in RUN if (kind or "dynamic") in (*field.needed_by, *field.drafted_for)]
-    return lines + [_line(field.key, getattr(run, field.guess), RUN, field.unit) for field in fields]
+    return lines + [_line(field.key, getattr(run, field.guess), RUN) for field in fields]
 
 
-def _line(key: str, entry: Entry, fields: tuple[Field, ...] = (), unit: str = "", digits: str = ".4g") -> str:
+def _line(key: str, entry: Entry, fields: tuple[Field, ...] = ()) -> str:
     """One entry with its source (what is read from a file needs none); or an open one with what it means."""
+    field = next((field for field in fields if field.key == key), Field(key, "text"))
     if entry.value is None:
-        meaning = next(field.meaning for field in fields if field.key == key)
-        text = f'{key} = "{f"{MARK} {unit}".strip()}"   # {meaning}'
+        text = f'{key} = "{f"{MARK} {field.unit}".strip()}"   # {field.meaning}'
         return f"{text}; {entry.reason}" if entry.reason else text
-    number = f"{entry.number:{digits}} {unit}" if unit and isinstance(entry.value, float) else entry.value
+    number = f"{entry.number:.4g} {field.unit}" if field.unit and isinstance(entry.value, float) else entry.value
     value = json.dumps(entry.text or number)
     mark = _SOURCES.get(entry.source)
     return f"{key} = {value}   # {mark}{entry.reason}" if mark else f"{key} = {value}"

@@ -178,11 +178,9 @@ def dry_motion(run: PlannedRun, test: DryTest, truth: RigTruth, noise: Noise, se
 
 def load_history(test: DryTest, rate: float) -> tuple[FloatArray, FloatArray]:
     """Time (n,) [s] and load (n,) [N] of a dry test: ramps and holds."""
-    knots, level, held = [0.0], [test.start], []
+    knots, level, held = [0.0], [test.levels[-1] if test.branch == "down" else test.start], []
     rising = list(zip(test.levels, test.holds))
     order = {"up": rising, "down": rising[::-1], "cycle": rising + rising[-2::-1]}[test.branch]
-    if test.branch == "down":
-        level = [test.levels[-1]]
     for target, hold in order:
         arrival = knots[-1] + (test.ramp if target != level[-1] else 0.0)
         held.append((arrival, arrival + hold, target - level[-1], target))

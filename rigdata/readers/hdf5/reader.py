@@ -13,6 +13,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.device import Grid, timed_grid
+from rigdata.near_names import hint
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, Layout, RunReader
 from rigdata.readers.hdf5.guards import (
@@ -141,8 +142,8 @@ class Hdf5Reader(RunReader):
             return self.opened_members[name]
         dataset = resolve(group, name, self.file, self.run)
         if dataset is None:
-            names = ", ".join(str(member)[:40] for member in itertools.islice(group, 20))
-            raise self.refuse(f"dataset {name}", "channel is missing in the file", f"It holds: {names or 'nothing'}")
+            held = hint(name, itertools.islice(group, 20), "It holds:")[:220]
+            raise self.refuse(f"dataset {name}", "channel is missing in the file", held)
         fault = ""
         if not isinstance(dataset, h5py.Dataset):
             fault = "is not a dataset"
