@@ -21,19 +21,6 @@ from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
 from rigdata.survey.survey import Survey, survey
 
-_HEAD = (
-    "# Draft by `tpjb init`. No mark: read from the files. (records): concluded from them, with the figure.",
-    f"# (guess): confirm or correct. {MARK}: open. After changes `tpjb init --update` fills in what follows from them.",
-    "# Signs and frame: docs/guide/mounting.md",
-)
-#: What no record tells, and what it is where nobody says more.
-_TOLD = (
-    'description = ""   # what was tested: reports begin with it, the date and by whom',
-    'date = ""   # when it was measured',
-    'by = ""   # laboratory and person',
-)
-_TURNS = 'rotation = "counter-clockwise"   # (guess) with X to the right and Y up; or "clockwise"'
-_MOUNT = '# mount = "floating"   # hung on stingers, or "cells": on its load cells; else found in the records'
 _SOURCES = {"records": "(records) ", "guess": "(guess) "}
 #: What a line of `tpjb init` bears that was no person's.
 _OWN = re.compile(r"#\s*\((?:guess|records)\)")
@@ -46,9 +33,9 @@ _Tables = dict[tuple[str, str], list[str]]
 
 def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     """Write the text of a draft."""
-    lines = [*_HEAD, 'schema = "tpjb-rig/1"', f"id = {_toml_string(name)}"]
-    lines.append(f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # file in this folder')
-    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _line("mass", OPEN, HOUSING), _MOUNT, ""]
+    file = _toml_string(bearing) if bearing else f'"{MARK}"   # file in this folder'
+    mass = _line("mass", OPEN, HOUSING)
+    lines = WORDS["draft"]["head"].format(name=_toml_string(name), bearing=file, mass=mass).split("\n")
     exports = [run.export for run in surveyed.runs]
     if not all(export.rate > 0 for export in exports):
         lines += ["[acquisition]", _line("sample_rate", OPEN, ACQUISITION), ""]
