@@ -212,7 +212,7 @@ def with_axes(channels: Guesses, frame: Frame, source: str = "") -> None:
     for number, name in enumerate(frame.names):
         if channels[name].typed:
             continue
-        angle = math.degrees(frame.angle) + (90.0 * frame.sense if number else 0.0)
+        angle = math.degrees(frame.angle) + 90.0 * frame.sense * number
         mounted = _MOUNTED * round(angle / _MOUNTED)
         if abs(mounted - angle) > max(_NEAR, 2.0 * frame.error):
             mounted = angle

@@ -156,7 +156,7 @@ class _Folder:
         if is_dry and len(self.pivots):
             nearest = int(self._nearest_pad(angle))
             pivot = math.degrees(self.pivots[nearest])
-            off = abs(math.remainder(pivot - math.degrees(angle), 360.0))
+            off = abs(folded(pivot - degrees))
             if off <= _TOWARD and run.pad.value in (None, nearest + 1):
                 pad = replace(concluded, value=nearest + 1, reason=f"{reason}, {off:.1f} deg from it")
                 direction = replace(run.direction, value=folded(pivot))
