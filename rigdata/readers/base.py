@@ -38,8 +38,6 @@ FORMATS: dict[str, list[str]] = tables_beside(__file__, "formats.toml")
 _CACHE_BYTES = 96 * 2**20
 #: Factors that differ by less are rounded ones of one unit.
 _SAME = 1e-3
-#: Longer texts are remarks.
-_LONGEST = 20
 
 
 @dataclass(frozen=True)
@@ -226,7 +224,7 @@ class RunReader(RecordFile):
         problems = []
         for name, unit in units.items():
             channel, stated = self.channels.get(name), unit.strip()
-            if channel is not None and len(unit) <= _LONGEST and stated and _differ(stated, channel):
+            if channel is not None and stated and _differ(stated, channel):
                 fault = f"the file states {stated!r}, the manifest unit = {channel.unit!r}"
                 remedy = "Correct unit in the manifest, or the units of the file if those are wrong"
                 problems.append(self.problem("error", f"channel {name}", fault, remedy))
@@ -241,7 +239,7 @@ class RunReader(RecordFile):
             problems.append(self.problem("note", "channels", text, "Nothing, if that is meant"))
         extra = [name for name in names if name not in self.channels]
         if extra:
-            listed = ", ".join(ascii(name)[1:-1][:40] for name in extra[:6])
+            listed = ", ".join(name[:40] for name in extra[:6])
             listed += f", ... ({len(extra)} in all)" if len(extra) > 6 else ""
             text, remedy = f"{members} without a description: {listed}", "Nothing, or describe them in the manifest"
             problems.append(self.problem("note", members, text, remedy))
