@@ -87,9 +87,9 @@ def guess_channel(name: str, unit: str) -> ChannelGuess:
         return ChannelGuess(Entry("time", "file"), usable or "s")
     if quantity := quantity_of_unit(usable):
         gain = reading_gain(quantity, usable, None)
-        return ChannelGuess(Entry(quantity, "file"), usable, gain=gain, hint=_hint(bare, quantity))
+        return ChannelGuess(Entry(quantity, "file"), usable, gain=gain, **_hinted(bare, quantity))
     if quantity := named("quantities", bare):
-        return ChannelGuess(Entry(quantity, "guess", "its name"), usable, hint=_hint(bare, quantity))
+        return ChannelGuess(Entry(quantity, "guess", "its name"), usable, **_hinted(bare, quantity))
     return ChannelGuess(Entry(), usable)
 
 
@@ -122,9 +122,12 @@ def quantity_of_unit(unit: str) -> str:
     return ""
 
 
-def _hint(name: str, quantity: str) -> float:
-    """Direction [deg] that the end of a name hints at, for quantities that have one."""
-    return float((quantity in VECTOR_QUANTITIES and named("directions", name)) or "nan")
+def _hinted(name: str, quantity: str) -> dict[str, Any]:
+    """Direction [deg] that the end of a name hints at, for quantities that have one, and an open axis that says so."""
+    angle = named("directions", name)
+    if not angle or quantity not in VECTOR_QUANTITIES:
+        return {}
+    return {"hint": float(angle), "axis": Entry(reason=f"its name hints at {angle} deg")}
 
 
 def as_described(guess: ChannelGuess, table: Mapping[str, Any]) -> ChannelGuess:

@@ -5,7 +5,6 @@ Carried on, open places and guesses are filled in; what was typed stays.
 
 import contextlib
 import json
-import math
 import re
 import tomllib
 from collections.abc import Sequence
@@ -78,9 +77,7 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
     # what it is like bears the mark for both
     lines = [head, _line("quantity", Entry(quantity) if is_like else guess.quantity)]
     if quantity in VECTOR_QUANTITIES:
-        is_hinted = guess.axis.value is None and math.isfinite(guess.hint)
-        axis = Entry(reason=f"its name hints at {guess.hint:g} deg") if is_hinted else guess.axis
-        lines.append(_line("axis", axis, CHANNEL))
+        lines.append(_line("axis", guess.axis, CHANNEL))
     if is_like:
         lines.append(f"like = {_toml_string(model)}   # (guess) same type; or its own unit, sensitivity, ..")
     else:
