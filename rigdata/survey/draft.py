@@ -82,11 +82,11 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
         lines.append(f"like = {_toml_string(model)}   # (guess) same type; or its own unit, sensitivity, ..")
     else:
         lines.append(f'unit = "{guess.unit or MARK}"')
-    if guess.sensitivity.value and not is_like:
-        lines.append(_line("sensitivity", guess.sensitivity))
-    elif not is_like and quantity_of_unit(guess.unit) == "":
-        lines.append(f'sensitivity = "{MARK}"   # such as {WORDS["sensitivities"].get(quantity, "1 V per unit")}')
-    usual = surveyed.channels[model].polarity if is_like else 1
+        if guess.sensitivity.value:
+            lines.append(_line("sensitivity", guess.sensitivity))
+        elif quantity_of_unit(guess.unit) == "":
+            lines.append(f'sensitivity = "{MARK}"   # such as {WORDS["sensitivities"].get(quantity, "1 V per unit")}')
+    usual = surveyed.channels[model].polarity
     if guess.axis.value is not None and (guess.polarity < 0 or guess.polarity != usual):
         lines.append(f"polarity = {guess.polarity}")
     if quantity == "temperature":
