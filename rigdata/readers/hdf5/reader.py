@@ -125,10 +125,14 @@ class Hdf5Reader(RunReader):
         if _GROUP in self.opened_members:  # by whoever called
             yield
             return
-        cache = min(max(2 * self._layout().largest_chunk, _LEAST_CACHE), _MOST_CACHE)
         stack = ExitStack()
         try:
-            self.opened_members[_GROUP] = stack.enter_context(self._group(cache))
+            self.opened_members[_GROUP] = stack.enter_context(self._group(_LEAST_CACHE))
+            needed = min(2 * self._layout().largest_chunk, _MOST_CACHE)
+            if needed > _LEAST_CACHE:  # the cache is given when a file is opened
+                self.opened_members.clear()
+                stack.close()
+                self.opened_members[_GROUP] = stack.enter_context(self._group(needed))
             yield
         finally:  # closed without the block's own errors, which are no faults of the file
             self.opened_members.clear()
