@@ -3,7 +3,6 @@
 A phasor that was recorded through a filter and late by a delay is divided by `ChannelResponse.at` of its frequency.
 """
 
-import io
 import math
 import re
 from collections.abc import Hashable, Mapping
@@ -28,11 +27,10 @@ from rigdata.units import (
     unit_factor,
 )
 
-_FILTER = re.compile(r"(bessel|butterworth)\s+([0-9]{1,2})\s+(low|high)\s+(.+)", re.IGNORECASE)
-_MAX_ORDER = 12
+_FILTER = re.compile(r"(bessel|butterworth)\s+([1-9]|1[0-2])\s+(low|high)\s+(.+)", re.IGNORECASE)
 _SAY = (
     'Write for instance "bessel 4 low 800 Hz": bessel or butterworth, '
-    f"order as a whole number from 1 to {_MAX_ORDER}, low or high, corner frequency"
+    "order as a whole number from 1 to 12, low or high, corner frequency"
 )
 
 
@@ -58,7 +56,7 @@ class AnalogFilter:
 def parse_filter(text: str) -> AnalogFilter:
     """Read ``"bessel 4 low 800 Hz"``."""
     parts = _FILTER.fullmatch(text.strip())
-    if parts is None or not 1 <= int(parts[2]) <= _MAX_ORDER:
+    if parts is None:
         raise UnitError(f"{text[:60]!r} is no filter. {_SAY}")
     corner = parse_quantity(parts[4], "frequency")
     if not 0 < corner < 1e12:
@@ -81,12 +79,9 @@ class ResponseTable:
 
 def parse_response_table(text: str) -> ResponseTable:
     """Read a table of frequency_Hz, gain, phase_deg, one line each, separated by commas or semicolons."""
-    lines = text.replace(";", ",").splitlines()
-    titled = bool(lines) and lines[0].strip().lower().startswith("freq")
+    lines = text.replace(";", ",").lower().splitlines()
     try:
-        rows = np.loadtxt(
-            io.StringIO("\n".join(lines)), delimiter=",", skiprows=int(titled), usecols=(0, 1, 2), ndmin=2
-        )
+        rows = np.loadtxt(lines, delimiter=",", comments=("#", "freq"), usecols=(0, 1, 2), ndmin=2)
     except ValueError as error:
         raise UnitError(f"the table does not hold frequency_Hz, gain, phase_deg in every line: {error}") from error
     frequency, gain, phase = rows.T
@@ -265,8 +260,8 @@ def reading_gain(
 
 def reading_zero(quantity: str, unit: str, zero: object) -> float:
     """SI value at reading zero."""
-    if quantity != "temperature":
-        return 0.0 if zero is None else parse_quantity(zero, DIMENSIONS[quantity])
     if zero is not None:
-        return parse_quantity(zero, "temperature")
+        return parse_quantity(zero, quantity if quantity == "temperature" else DIMENSIONS[quantity])
+    if quantity != "temperature":
+        return 0.0
     return ZERO_CELSIUS if is_signal(unit) else temperature_offset(unit)

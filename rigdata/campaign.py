@@ -4,24 +4,26 @@ import hashlib
 import html
 import itertools
 import os
+import re
 import stat
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from rigdata.calibration import Channel, Channels
 from rigdata.manifest.manifest import MAX_MANIFEST, Description, Manifest, RunDescription, RunEntry, parse_manifest
 from rigdata.near_names import hint
 from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import TEXT, RunReader
+from rigdata.readers.base import TEXT, ReadingCache, RunReader
 from rigdata.run import Run
-from rigdata.safe_path import inside
 
 MANIFEST_NAME = "campaign.toml"
 HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
 _MAX_BEARING = 2**20
+_DRIVE = re.compile(r"^[A-Za-z]:|^[\\/]{2}")
+_MAX_NAME = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,10 +106,10 @@ class Campaign(Description):
         >>> print(load_campaign(demo).run("d-02500-25-01").point)
         2500 N at -90 deg, shaft 22 Hz, excited at 25 Hz
         """
-        for run in self.runs:
-            if run.id == run_id:
-                return run
-        cure = hint(run_id, [run.id for run in self.runs], "There are")[:200]
+        runs = {run.id: run for run in self.runs}
+        if run_id in runs:
+            return runs[run_id]
+        cure = hint(run_id, runs, "There are")[:200]
         raise refuse(self.path.name, "", f"no run has the id {run_id!r}", cure)
 
     def of_kind(self, kind: str) -> tuple[Run, ...]:
@@ -223,19 +225,43 @@ def _read_text(path: Path, file: str, limit: int) -> str:
         raise refuse(file, f"line {line}", "is not UTF-8 text", "Save the file as UTF-8") from error
 
 
+def inside(folder: Path, name: str, file: str, place: str, run: str | None = None) -> Path:
+    r"""Resolve a file name of a manifest, which a stranger may have written, below its folder."""
+    target = folder
+    fault = ""
+    parts = name.replace("\\", "/").split("/")
+    if not name.strip() or len(name) > _MAX_NAME or not name.isprintable():
+        fault = "is empty, too long or holds control characters"
+    elif _DRIVE.match(name) or name.startswith(("/", "\\", "~")) or PureWindowsPath(name).drive:
+        fault = "is not relative"
+    elif ".." in parts:
+        fault = "leaves the campaign folder by '..'"
+    else:
+        root = folder.resolve()
+        try:
+            target = root.joinpath(*parts).resolve()
+        except (OSError, RuntimeError) as error:  # a loop of symlinks
+            fault = f"cannot be resolved ({type(error).__name__})"
+        else:
+            fault = "" if target.is_relative_to(root) else "leaves the campaign folder by a symlink"
+    if fault:
+        cure = "Give a path relative to the campaign folder, inside it"
+        raise refuse(file, place, f"file {name[:120]!a} {fault}", cure, run)
+    return target
+
+
 def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
-    from rigdata.readers.file_reader import FileReader, ReadingCache
+    from rigdata.readers.file_reader import FileReader
 
     text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
     files = {manifest_path.name: manifest_path}
-    manifest = parse_manifest(text, manifest_path.name, _named_file(folder, manifest_path.name, files))
+    text_of = _named_file(folder, manifest_path.name, files)
+    manifest = parse_manifest(text, manifest_path.name, text_of)
     problems = []
     bearing, name = "", manifest.bearing_name
     try:
-        path = inside(folder, name, manifest_path.name, "bearing")
-        if os.path.isfile(path):
-            files[name] = path
-            bearing = _read_text(path, name, _MAX_BEARING)
+        if os.path.isfile(inside(folder, name, manifest_path.name, "bearing")):
+            bearing = text_of(name, "bearing")
         else:
             fault = f"the bearing file {name!r} is not in the folder"
             remedy = "Add it, or give --bearing where one is needed"

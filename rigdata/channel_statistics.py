@@ -42,15 +42,12 @@ class ChannelStatistics:
         repeated = present == np.concatenate([[self._last], present[:-1]])
         self.repeats += int(np.count_nonzero(repeated))
         breaks = np.flatnonzero(~repeated)
-        starts = np.concatenate([[0], breaks]) if repeated[0] else breaks
-        ends = np.append(starts[1:], len(present))
-        lengths = ends - starts
-        if repeated[0]:
-            lengths[0] += self._flat
+        starts = np.concatenate([[-self._flat], breaks]) if repeated[0] else breaks
+        lengths = np.diff(starts, append=len(present))
         best = int(np.argmax(lengths))
         if len(values) and int(lengths[best]) > self.longest_flat:
             self.longest_flat = int(lengths[best])
-            self.flat_start = self.samples + int(ends[best]) - self.longest_flat
+            self.flat_start = self.samples + int(starts[best])
         self._last, self._flat = float(present[-1]), int(lengths[-1])
         self.samples += len(readings)
 

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -161,24 +161,19 @@ def _own_first(grids: Iterable[Grid], channels: Channels) -> list[Grid]:
 
 def by_clock(grids: Iterable[Grid], channels: Channels) -> tuple[Device, ...]:
     """Devices of a run: grids split by clock, that of the first probe first."""
-    order = first_probe_first(channels)
-    parts = []
-    for grid in grids:
-        letters: dict[str, list[str]] = {}
-        held = set(grid.channels)
-        for name in order:
-            if name in held:
-                letters.setdefault(channels[name].clock, []).append(name)
-        counted = not grid.clock and grid.begin == 0.0
-        for letter, names in letters.items():
-            parts.append((letter, Device(grid.label, tuple(names), grid.rate, grid.length, counted)))
-    parts.sort(key=lambda part: order.index(part[1].channels[0]))
+    grid_of = {name: grid for grid in grids for name in grid.channels}
+    groups: dict[tuple[int, str], list[str]] = {}
+    for name in first_probe_first(channels):
+        if name in grid_of:
+            groups.setdefault((id(grid_of[name]), channels[name].clock), []).append(name)
     devices: dict[str, Device] = {}
-    for letter, device in parts:
-        name = letter or (device.name if devices else "")
+    for (_, letter), names in groups.items():
+        grid = grid_of[names[0]]
+        name = letter or (grid.label if devices else "")
         if name in devices:
-            name = f"{name}, {device.rate:.6g} Hz" if name else f"{device.rate:.6g} Hz"
+            name = f"{name}, {grid.rate:.6g} Hz" if name else f"{grid.rate:.6g} Hz"
         while name in devices:
             name += "'"
-        devices[name] = replace(device, name=name)
+        counted = not grid.clock and grid.begin == 0.0
+        devices[name] = Device(name, tuple(names), grid.rate, grid.length, counted)
     return tuple(devices.values())

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal, Self
 
 Severity = Literal["error", "warning", "note"]
+#: Keys with more dots than this nest deeper than any file of ours; parsing them takes the square of their length.
+MAX_DEPTH = 64
+#: A step of a dotted key: a bare or quoted piece and its dot.
+_STEP = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_BOMB = re.compile(rf"(?<![\w.-])(?:(?:{_STEP}){{{MAX_DEPTH + 1}}}|[0-9]\w{{4000}})")
 
 
 class RigError(ValueError):
@@ -116,3 +124,20 @@ def shown(value: object) -> str:
     else:
         text = ascii(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def tables_beside(module: str, name: str) -> dict[str, Any]:
+    """Tables of a TOML file of ours, next to the module whose file is given."""
+    return tomllib.loads(Path(module).with_name(name).read_text(encoding="utf-8"))
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Parse TOML from a stranger; a `RigError`, or tomllib's own, before it can take long."""
+    bomb = _BOMB.search(text)
+    if bomb is not None:
+        line = text.count("\n", 0, bomb.start()) + 1
+        raise RigError(f"line {line} nests far too deeply, or holds a whole number of thousands of digits")
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise RigError("nested far too deeply") from error

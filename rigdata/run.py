@@ -11,7 +11,7 @@ from rigdata.calibration import Channel, Channels
 from rigdata.device import Device
 from rigdata.manifest.manifest import RunDescription
 from rigdata.problem import RigDataError, refuse
-from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
+from rigdata.readers.base import RunReader
 from rigdata.record import Record, VectorRecord
 from rigdata.vector import inverse_directions, vector_rows
 
@@ -146,11 +146,7 @@ class Run(RunDescription):
     @property
     def sample_rate(self) -> float:
         """Nominal sample rate [Hz]: time column or HDF5 attribute, else the run's, else the campaign's."""
-        rate = self.reader.rate()
-        if not LEAST_RATE <= rate <= MOST_RATE:
-            remedy = "Check the time column, and sample_rate in the manifest"
-            raise self._refuse("sample rate", f"is {rate:g} Hz", remedy)
-        return rate
+        return self.reader.rate()
 
     def time(self, start: int | None = None, stop: int | None = None) -> FloatArray:
         """Read or count the times of some samples [s].
@@ -162,9 +158,7 @@ class Run(RunDescription):
         stop : int or None, optional
             Sample after the last; default the end.
         """
-        first, last = _limits(start, stop, self.length)
-        self.sample_rate  # noqa: B018 (rejects a rate that times cannot be counted from)
-        return self.reader.time(first, last)
+        return self.reader.time(*_limits(start, stop, self.length))
 
     def record(self, name: str, start: int | None = None, stop: int | None = None) -> Record:
         """One channel, calibrated.
@@ -207,9 +201,7 @@ class Run(RunDescription):
         """Readings (n,) of channels that are sampled together, their times (n,) and their rate."""
         if not self._apart(names):
             first, last = _limits(start, stop, self.length)
-            readings = self.reader.read(names, first, last)
-            rate = self.sample_rate  # rejected before times are counted from it
-            return readings, self.reader.time(first, last), rate
+            return self.reader.read(names, first, last), self.reader.time(first, last), self.sample_rate
         reader = self.reader
         device = next(device for device in self.devices if names[0] in device.channels)
         first, last = _limits(start, stop, device.length)
@@ -315,16 +307,11 @@ def pulse_times(readings: FloatArray, time: FloatArray) -> FloatArray:
         return np.empty(0)
     low, high = np.quantile(finite, (0.001, 0.999)).tolist()
     level = 0.5 * (low + high)
-    above = np.nan_to_num(readings, nan=low) > level
     # short dips in a pulse are none: the reading must have been low again
-    armed = np.nan_to_num(readings, nan=low) < low + 0.25 * (high - low)
-    rising = np.flatnonzero(above[1:] & ~above[:-1])
-    edges, after_last = [], -1
-    for edge in rising:
-        if after_last < 0 or armed[after_last : edge + 1].any():
-            edges.append(int(edge))
-            after_last = int(edge) + 1
-    at = np.array(edges, dtype=int)
+    filled = np.nan_to_num(readings, nan=low)
+    side = (filled > level).astype(int) - (filled < low + 0.25 * (high - low))
+    side = side[np.maximum.accumulate(np.where(side, np.arange(len(side)), 0))]
+    at = np.flatnonzero((side[1:] > 0) & (side[:-1] <= 0))
     share = (level - readings[at]) / (readings[at + 1] - readings[at])
     return time[at] + share * (time[at + 1] - time[at])
 

@@ -10,13 +10,11 @@ from __future__ import annotations
 import functools
 import math
 import re
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from rigdata.problem import RigError, shown
+from rigdata.problem import RigError, shown, tables_beside
 
 #: Characters of a quantity; more are a slip or a bomb.
 LONGEST = 200
@@ -24,7 +22,7 @@ ZERO_CELSIUS = 273.15
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?(?![0-9.,])")
 _TOKEN = re.compile(r"\s*(?:([A-Za-z_Ω%]{1,24})(?:(?:\^|\*\*)?([+-]?[1-6]))?(?![0-9])|([*/()])|(1)(?![0-9]))")
 _MAX_UNIT = 48
-LISTED: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
+LISTED: dict[str, Any] = tables_beside(__file__, "units.toml")
 #: SI unit of every dimension.
 SI_UNITS: dict[str, str] = LISTED["si"]
 #: Seconds of what loggers count times in.
@@ -58,13 +56,10 @@ class Unit:
 def common_units() -> dict[str, Unit]:
     """Units that need no pint, by name."""
     units = {}
-    for dimension, factors in LISTED["common"].items():
-        powers = []
-        for base in dimension.split():
-            name, _, power = base.partition("^")
-            powers.append((name, int(power or 1)))
-        for name, factor in factors.items():
-            units[name] = Unit(factor, tuple(powers))
+    for entry in LISTED["common"]:
+        powers = tuple(entry["of"].items())
+        for name, factor in entry["factors"].items():
+            units[name] = Unit(factor, powers)
     return units
 
 
@@ -99,8 +94,8 @@ def parse_unit(text: str, dimension: str = "") -> Unit:
     if len(text) > _MAX_UNIT:
         raise UnitError(f"unit {text[:_MAX_UNIT]!r}... is too long to be one")
     plain = text.strip().translate(_SPELLINGS)
-    if dimension == "speed" and plain in {"1/s", "s^-1", "s-1", "1/min", "min^-1", "min-1"}:
-        plain = "revolution/min" if "min" in plain else "revolution/s"
+    if dimension == "speed":
+        plain = LISTED["turns"].get(plain, plain)
     if not plain:
         return Unit(1.0)
     pieces = list(_TOKEN.finditer(plain))
@@ -220,10 +215,7 @@ def to_si(value: Any, dimension: str, name: str) -> Any:
 
 def temperature_offset(unit: str) -> float:
     """Kelvin at 0 of the temperature `unit`."""
-    plain = unit.strip().translate(_SPELLINGS)
-    if plain in {"degC", "C", "celsius"}:
-        return ZERO_CELSIUS
-    return ZERO_CELSIUS - 32 / 1.8 if plain == "degF" else 0.0
+    return float(LISTED["offsets"].get(unit.strip().translate(_SPELLINGS), 0.0))
 
 
 def is_signal(unit: str) -> bool:

@@ -19,7 +19,7 @@ from rigdata.calibration import (
     reading_zero,
 )
 from rigdata.manifest.fields import CHANNEL, RUNS_OF, SCHEMA, Findings, Table, nearest
-from rigdata.problem import RigDataError, shown
+from rigdata.problem import shown
 from rigdata.units import UnitError, is_signal
 
 _FIELD = {field.key: field for field in CHANNEL}
@@ -100,20 +100,16 @@ def read_channel(name: str, table: Table) -> Channel | None:
 
 def _response(table: Table, values: dict[str, Any]) -> ChannelResponse:
     """Filter and delay; what is wrong is noted and left out."""
-    findings, responses = table.findings, list[Any]()
+    responses, text_of = list[Any](), table.findings.files
     if values["filter"] is not None:
         with table.noted("filter", "Or give filter_table, a measured response"):
             responses.append(parse_filter(values["filter"]))
     file = values["filter_table"]
-    if file is not None and findings.files is None:
+    if file is not None and text_of is None:
         table.error("filter_table", "a table cannot be read here", "Give filter, or a campaign in a folder")
-    elif file is not None and findings.files is not None:
-        try:
-            with table.noted("filter_table", f"Give lines of frequency_Hz, gain, phase_deg in {shown(file)}"):
-                responses.append(parse_response_table(findings.files(file, ".".join(map(str, table.path)))))
-        except RigDataError as error:
-            for problem in error.problems:
-                findings.append(problem)
+    elif text_of is not None and file is not None:
+        with table.noted("filter_table", f"Give lines of frequency_Hz, gain, phase_deg in {shown(file)}"):
+            responses.append(parse_response_table(text_of(file, ".".join(map(str, table.path)))))
     return ChannelResponse(tuple(responses), values["delay"])
 
 

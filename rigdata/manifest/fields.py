@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 from typing import Any
 
 from rigdata.near_names import hint
-from rigdata.problem import Problem, Severity, shown
+from rigdata.problem import Problem, RigDataError, Severity, shown, tables_beside
 from rigdata.units import UnitError, parse_quantity
 
 _MAX_FINDINGS = 1000
@@ -52,6 +50,10 @@ class Field:
     above: float = -math.inf
     below: float = math.inf
     remedy: str = ""  #: what to do about a wrong value, where kind and bounds alone do not say it
+    needed_by: Sequence[str] = ()  #: kinds of runs; `drafted_for` these besides
+    drafted_for: Sequence[str] = ()
+    guess: str = ""  #: field of `rigdata.survey.runs.RunGuess`
+    unit: str = ""  #: of a draft
 
     def holds(self, value: float) -> bool:
         """Whether a number is within the bounds."""
@@ -94,8 +96,8 @@ class Field:
         return f"Write it like {self.key} = {self.example}{bound}"
 
 
-_LISTED = tomllib.loads(FilePath(__file__).with_name("keys.toml").read_text(encoding="utf-8"))
-_TABLES = [tuple(Field(key, **entry) for key, entry in keys.items()) for keys in _LISTED.values()]
+_KEYS = tables_beside(__file__, "keys.toml").values()
+_TABLES = [tuple(Field(key, **entry) for key, entry in keys.items()) for keys in _KEYS]
 #: `RUNS_OF` is of one entry of `for`, besides all keys of a channel that it changes.
 TOP, SHAFT, HOUSING, ACQUISITION, CSV, CHANNEL, (RUNS_OF,), RUN = _TABLES
 KINDS = next(tuple(field.choices) for field in RUN if field.key == "kind")
@@ -153,7 +155,7 @@ class Findings:
         if any(place[: len(path)] == path for place in self.open):
             self.errors += severity == "error"
             return
-        place, at = _spell(path), path
+        place, at = _spell(path)[:200], path
         while at and at not in self.lines:
             at = at[:-1]
         if at:
@@ -214,11 +216,14 @@ class Table:
 
     @contextmanager
     def noted(self, key: str, remedy: str) -> Iterator[None]:
-        """Note a UnitError of the block as an error of `key`."""
+        """Note a UnitError of the block as an error of `key`, and what another file is refused for."""
         try:
             yield
         except UnitError as error:
             self.error(key, str(error), remedy)
+        except RigDataError as error:
+            for problem in error.problems:
+                self.findings.append(problem)
 
 
 def key_lines(text: str) -> dict[Path, int]:

@@ -1,11 +1,13 @@
 """What every reader of one run's record offers to `rigdata.campaign.Run`, and which file names which reader takes."""
 
 import math
-import tomllib
-from collections.abc import Mapping, Sequence
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from rigdata.calibration import DIMENSIONS, Channel, Channels
 from rigdata.device import Device, Grid, by_clock, planned
 from rigdata.manifest.manifest import CsvSpec
 from rigdata.near_names import nearest_name
-from rigdata.problem import Problem, RigDataError, Severity, refuse
+from rigdata.problem import Problem, RigDataError, Severity, refuse, tables_beside
 from rigdata.units import UnitError, is_signal, parse_unit, temperature_offset, unit_factor
 
 #: A channel longer than this is rejected: slices of it would be asked for by mistake [samples].
@@ -31,11 +33,11 @@ LEAST_RATE, MOST_RATE = 1e-6, 1e12
 #: Text in any national spelling.
 TEXT = (".csv", ".txt", ".asc", ".dat", ".tsv")
 #: Module of `rigdata.readers`, its function, and the extra that brings its library, by suffix.
-FORMATS: dict[str, list[str]] = tomllib.loads(Path(__file__).with_name("formats.toml").read_text(encoding="utf-8"))
+FORMATS: dict[str, list[str]] = tables_beside(__file__, "formats.toml")
+#: Columns cached by a campaign before the run that was not asked for longest is let go [bytes].
+_CACHE_BYTES = 96 * 2**20
 #: Factors that differ by less are rounded ones of one unit.
 _SAME = 1e-3
-#: Longer texts are remarks.
-_LONGEST = 20
 
 
 @dataclass(frozen=True)
@@ -74,11 +76,50 @@ class Layout:
     faults: dict[str, RigDataError]  #: of channels without usable times
 
 
+class ReadingCache:
+    """What is known of a campaign's runs, the last used ones, up to a number of bytes."""
+
+    def __init__(self, limit: int = _CACHE_BYTES) -> None:
+        self._limit = limit
+        self._entries: OrderedDict[tuple[object, ...], Any] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ReadingCache, (self._limit,)  # a worker process starts with an empty one
+
+    def get(self, key: tuple[object, ...], make: Callable[[], Any]) -> Any:
+        """Give the value under `key`, made where it is not cached; the longest unused ones go."""
+        with self._lock:
+            if key in self._entries:
+                self._entries.move_to_end(key)
+                return self._entries[key]
+        value = make()
+        with self._lock:
+            self._entries[key] = value
+            while self.nbytes > self._limit and len(self._entries) > 1:
+                self._entries.popitem(last=False)
+        return value
+
+    @property
+    def nbytes(self) -> int:
+        """Memory taken by all columns [bytes]."""
+        return sum(int(getattr(value, "nbytes", 0)) for value in self._entries.values())
+
+
+@dataclass(frozen=True)
 class RunReader(RecordFile):
     """Lazy access to one run's record: channels of several devices, each at its own times."""
 
-    def _layout(self) -> Layout:
-        """What is sampled together."""
+    cache: ReadingCache = field(default_factory=ReadingCache, repr=False, compare=False)
+
+    def _layout(self) -> Any:
+        """What is sampled together; the key changes when the file does, so that no old one is served."""
+        state = self.path.stat() if self.path.is_file() else None
+        key = (self.path, self.run, state and (state.st_size, state.st_mtime_ns))
+        return self.cache.get(key, self._read_layout)
+
+    def _read_layout(self) -> Layout:
+        """What is sampled together, from the file."""
         raise NotImplementedError
 
     def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
@@ -116,14 +157,17 @@ class RunReader(RecordFile):
 
     def rate(self) -> float:
         """Give the sample rate [Hz]: of the file's times, else what the file or the manifest states."""
-        rate = self._layout().grids[0].rate
-        if not rate > 0:
-            clocks = [channel.name for channel in self.channels.values() if channel.quantity == "time"]
-            self.read_device(clocks, 0, 0)  # names a time column that the file lacks
-            fault = "there are neither usable times nor a sample rate"
-            remedy = 'Add sample_rate to the run or to [acquisition], a channel with quantity = "time", or in HDF5 the '
-            raise self.refuse("", fault, f"{remedy}group's attribute sample_rate_hz")
-        return rate
+        rate = float(self._layout().grids[0].rate)
+        if LEAST_RATE <= rate <= MOST_RATE:
+            return rate
+        if rate > 0:
+            remedy = "Check the time column, and sample_rate in the manifest"
+            raise self.refuse("sample rate", f"is {rate:g} Hz", remedy)
+        clocks = [channel.name for channel in self.channels.values() if channel.quantity == "time"]
+        self.read_device(clocks, 0, 0)  # names a time column that the file lacks
+        fault = "there are neither usable times nor a sample rate"
+        remedy = 'Add sample_rate to the run or to [acquisition], a channel with quantity = "time", or in HDF5 the '
+        raise self.refuse("", fault, f"{remedy}group's attribute sample_rate_hz")
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         """Raw readings of `names` along the run's own times, (stop - start,) each."""
@@ -139,12 +183,14 @@ class RunReader(RecordFile):
 
     def time(self, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,): the file's, else counted from the rate."""
-        clock = self._layout().grids[0].clock
-        return self._clock_times(clock, start, stop) if clock else np.arange(start, stop) / self.rate()
+        self.rate()  # rejects one that times cannot be counted from
+        return self._times(self._layout().grids[0], start, stop)
 
     def device_time(self, name: str, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,) of a channel's samples: the file's, else counted from its device's rate."""
-        grid = self._grid(name)
+        return self._times(self._grid(name), start, stop)
+
+    def _times(self, grid: Grid, start: int, stop: int) -> FloatArray:
         if grid.clock:
             return self._clock_times(grid.clock, start, stop)
         return grid.begin + np.arange(start, stop) / grid.rate
@@ -166,17 +212,19 @@ class RunReader(RecordFile):
         readings[np.abs(time - within) > 1.0 / grid.rate] = np.nan
         return readings
 
-    def _planned(self, timings: Mapping[str, Grid], run_rate: float | None, member: str, remedy: str) -> Layout:
+    def _planned(
+        self, timings: Mapping[str, Grid], run_rate: float | None, member: str, remedy: str
+    ) -> tuple[tuple[Grid, ...], dict[str, RigDataError]]:
         """Put together what is sampled together; what has no usable times is a fault of that channel."""
         grids, texts = planned(timings, self.channels, run_rate)
-        return Layout(grids, {name: self.refuse(f"{member} {name}", text, remedy) for name, text in texts.items()})
+        return grids, {name: self.refuse(f"{member} {name}", text, remedy) for name, text in texts.items()}
 
     def unit_problems(self, units: Mapping[str, str]) -> list[Problem]:
         """An error for every channel whose unit in the file is another than its unit in the manifest."""
         problems = []
         for name, unit in units.items():
             channel, stated = self.channels.get(name), unit.strip()
-            if channel is not None and len(unit) <= _LONGEST and stated and _differ(stated, channel):
+            if channel is not None and stated and _differ(stated, channel):
                 fault = f"the file states {stated!r}, the manifest unit = {channel.unit!r}"
                 remedy = "Correct unit in the manifest, or the units of the file if those are wrong"
                 problems.append(self.problem("error", f"channel {name}", fault, remedy))
@@ -191,7 +239,7 @@ class RunReader(RecordFile):
             problems.append(self.problem("note", "channels", text, "Nothing, if that is meant"))
         extra = [name for name in names if name not in self.channels]
         if extra:
-            listed = ", ".join(ascii(name)[1:-1][:40] for name in extra[:6])
+            listed = ", ".join(name[:40] for name in extra[:6])
             listed += f", ... ({len(extra)} in all)" if len(extra) > 6 else ""
             text, remedy = f"{members} without a description: {listed}", "Nothing, or describe them in the manifest"
             problems.append(self.problem("note", members, text, remedy))
@@ -219,12 +267,11 @@ def _meaning(unit: str, dimension: str) -> tuple[object, float]:
 
 def _differ(stated: str, channel: Channel) -> bool:
     """Whether the unit that a file states makes another number of a reading than the manifest's."""
-    if channel.quantity not in DIMENSIONS:
+    dimension = DIMENSIONS.get(channel.quantity)
+    if dimension is None:
         return False
     try:
-        (kind, factor), (other_kind, other) = (
-            _meaning(unit, DIMENSIONS[channel.quantity]) for unit in (stated, channel.unit)
-        )
+        (kind, factor), (other_kind, other) = _meaning(stated, dimension), _meaning(channel.unit, dimension)
     except UnitError:
         return False
     return kind != other_kind or not math.isclose(factor, other, rel_tol=_SAME)

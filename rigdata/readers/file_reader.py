@@ -4,14 +4,9 @@ The libraries are extras: ``pip install "tpjb-ident[tdms]"``. What they raise on
 that names the file. What was parsed is cached, the last used of a campaign, as much as memory allows.
 """
 
-from __future__ import annotations
-
 import importlib
-import threading
-from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,41 +20,7 @@ from rigdata.units import TIME_FACTORS
 
 #: Larger files of a logger's format are rejected: they are read whole [bytes].
 LARGEST = 2**31
-#: Parsed columns cached by a campaign before the oldest run is let go [bytes].
-_CACHE_BYTES = 96 * 2**20
 _MOST_TIMES = 1000
-_Value = TypeVar("_Value")
-
-
-class ReadingCache:
-    """Contents of a campaign's files, the last used ones, up to a number of bytes."""
-
-    def __init__(self, limit: int = _CACHE_BYTES) -> None:
-        self._limit = limit
-        self._entries: OrderedDict[tuple[object, ...], Any] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def __reduce__(self) -> tuple[type[ReadingCache], tuple[int]]:
-        return ReadingCache, (self._limit,)  # a worker process starts with an empty one
-
-    def get(self, key: tuple[object, ...], make: Callable[[], _Value]) -> _Value:
-        """Give the value under `key`, made where it is not cached; the longest unused ones go."""
-        with self._lock:
-            if key in self._entries:
-                self._entries.move_to_end(key)
-                cached = self._entries[key]
-                return cached
-        value = make()
-        with self._lock:
-            self._entries[key] = value
-            while self.nbytes > self._limit and len(self._entries) > 1:
-                self._entries.popitem(last=False)
-        return value
-
-    @property
-    def nbytes(self) -> int:
-        """Memory taken by all columns [bytes]."""
-        return sum(int(getattr(value, "nbytes", 0)) for value in self._entries.values())
 
 
 def read_contents(record: RecordFile) -> Contents:
@@ -117,13 +78,8 @@ class _Columns(Layout):
 class FileReader(RunReader):
     """One run's file; it is parsed when something of it is asked for."""
 
-    cache: ReadingCache = field(default_factory=ReadingCache, repr=False, compare=False)
-
-    def _layout(self) -> _Columns:
-        """All channels at their own times; the key changes when the file does, so that no old one is served."""
-        state = self.path.stat() if self.path.is_file() else None
-        key = (self.path, self.run, state and (state.st_size, state.st_mtime_ns))
-        return self.cache.get(key, lambda: self._arranged(read_contents(self)))
+    def _read_layout(self) -> _Columns:
+        return self._arranged(read_contents(self))
 
     def _arranged(self, contents: Contents) -> _Columns:
         series = with_unique_names(contents.series)
@@ -148,13 +104,13 @@ class FileReader(RunReader):
                 label = grid.label if is_time(grid.label) else f"{grid.rate:.6g} Hz"
                 timings[channel.name] = replace(grid, label=label)
         remedy = "Export it with its times, or correct sample_rate"
-        layout = self._planned(timings, self.stated_rate, "channel", remedy)
-        faults |= layout.faults
-        if not layout.grids:
+        grids, untimed = self._planned(timings, self.stated_rate, "channel", remedy)
+        faults |= untimed
+        if not grids:
             raise RigDataError([problem for error in faults.values() for problem in error.problems])
         values = {channel.name: channel.values for channel in series}
         units = {channel.name: channel.unit for channel in series}
-        return _Columns(layout.grids, faults, values, times, units, contents.unread, contents.problems)
+        return _Columns(grids, faults, values, times, units, contents.unread, contents.problems)
 
     def _refuse_other_unit(self, clocks: Mapping[str, str], rate: float) -> None:
         """Refuse times of no stated unit that miss the stated rate by what another unit differs from a second."""
@@ -168,7 +124,7 @@ class FileReader(RunReader):
             )
 
     def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
-        return self._layout().times[clock][start:stop].copy()
+        return np.array(self._layout().times[clock][start:stop])
 
     def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         """Raw readings of channels of one device, (stop - start,) each."""

@@ -191,7 +191,6 @@ def table(contents: Contents, record: RecordFile) -> Contents:
         groups[clock if series[i].time is None else None].append(i)
     lengths = {len(series[i]) for i in groups.pop(None) if series[i].time is None}
     is_shared = len(clocks) == 1 and len(series[clocks[0]]) not in lengths
-    dropped = set(clocks)
     for clock, members in groups.items():
         column = series[clock or 0]
         known = channels.get(column.name)
@@ -204,8 +203,7 @@ def table(contents: Contents, record: RecordFile) -> Contents:
         for i in members:
             values, group = to_temporary_file(series[i].values[rows]), series[i].group
             series[i] = replace(series[i], values=values, time=time, group=group if is_shared else column.name or group)
-        dropped -= set(members)
-    ordered = [column for i, column in enumerate(series) if i not in dropped]
+    ordered = [column for i, column in enumerate(series) if i not in clocks or names[i] in channels]
     if is_shared or not clocks:
         ordered = _slow_columns(ordered, record)
     return replace(contents, series=ordered, clocks={names[i]: series[i].unit for i in clocks})

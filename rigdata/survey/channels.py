@@ -8,10 +8,8 @@ and signs with them.
 import contextlib
 import math
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,11 +17,12 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import DIMENSIONS, VECTOR_QUANTITIES, reading_gain
 from rigdata.manifest.fields import MARK
+from rigdata.problem import tables_beside
 from rigdata.readers.series import Series, is_time
 from rigdata.units import UnitError, is_signal, parse_quantity, parse_unit
 
 #: Tables of `words.toml`.
-WORDS: dict[str, dict[str, str]] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+WORDS: dict[str, dict[str, str]] = tables_beside(__file__, "words.toml")
 _SPELLINGS = str.maketrans(WORDS["spellings"])
 #: Units that a name may end with after an underscore; V, H and A there are directions and numbers of sensors.
 _SUFFIXES = "um|mm|mils?|k?N|lbf|m_s2|m/s2|mps2|g|deg[CF]|rpm|Hz|mV|bar|k?Pa|MPa|psi"
@@ -88,11 +87,15 @@ def guess_channel(name: str, unit: str) -> ChannelGuess:
         return ChannelGuess(Entry("time", "file"), usable or "s")
     if quantity := quantity_of_unit(usable):
         gain = reading_gain(quantity, usable, None)
-        return ChannelGuess(Entry(quantity, "file"), usable, gain=gain, hint=_hint(bare, quantity))
-    for quantity, pattern in WORDS["quantities"].items():
-        if re.search(pattern, bare, re.IGNORECASE):
-            return ChannelGuess(Entry(quantity, "guess", "its name"), usable, hint=_hint(bare, quantity))
+        return ChannelGuess(Entry(quantity, "file"), usable, gain=gain, **_hinted(bare, quantity))
+    if quantity := named("quantities", bare):
+        return ChannelGuess(Entry(quantity, "guess", "its name"), usable, **_hinted(bare, quantity))
     return ChannelGuess(Entry(), usable)
+
+
+def named(table: str, text: str) -> str:
+    """Key of the first pattern in a table of `words.toml` that is in a text; "" where none is."""
+    return next((key for key, pattern in WORDS[table].items() if re.search(pattern, text, re.IGNORECASE)), "")
 
 
 def usable_unit(unit: str) -> str:
@@ -119,12 +122,12 @@ def quantity_of_unit(unit: str) -> str:
     return ""
 
 
-def _hint(name: str, quantity: str) -> float:
-    """Direction [deg] that the end of a name hints at, for quantities that have one."""
-    if quantity not in VECTOR_QUANTITIES:
-        return math.nan
-    hints = WORDS["directions"].items()
-    return next((float(angle) for angle, end in hints if re.search(end, name, re.IGNORECASE)), math.nan)
+def _hinted(name: str, quantity: str) -> dict[str, Any]:
+    """Direction [deg] that the end of a name hints at, for quantities that have one, and an open axis that says so."""
+    angle = named("directions", name)
+    if not angle or quantity not in VECTOR_QUANTITIES:
+        return {}
+    return {"hint": float(angle), "axis": Entry(reason=f"its name hints at {angle} deg")}
 
 
 def as_described(guess: ChannelGuess, table: Mapping[str, Any]) -> ChannelGuess:
@@ -189,9 +192,7 @@ def stated_frame(pair: Pair, channels: Guesses) -> Frame | None:
     return Frame(pair, math.radians(angles[0]), 1 if turn > 0 else -1, source, reason)
 
 
-def fitted_frame(
-    pair: Pair, readings: FloatArray, directions: FloatArray, reason: str, most: float = _MOST_OFF
-) -> Frame | None:
+def fitted_frame(pair: Pair, readings: FloatArray, directions: FloatArray, reason: str) -> Frame | None:
     """Fit the frame of two sensors to readings (n, 2) of known directions (n,) [rad]; None where they contradict."""
     if len(readings) < 2:
         return None
@@ -203,7 +204,7 @@ def fitted_frame(
         residual = math.degrees(float(np.sqrt(np.mean(np.angle(offsets * np.conj(mean)) ** 2))))
         fits.append((residual, sense, float(np.angle(mean))))
     (residual, sense, angle), (mirrored, _, _) = sorted(fits)
-    if residual > most or mirrored < _MIRROR * max(residual, 1.0):
+    if residual > _MOST_OFF or mirrored < _MIRROR * max(residual, 1.0):
         return None
     reason = f"{reason}, residual {residual:.1f} deg"
     return Frame(pair, angle, sense, "records", reason, residual / math.sqrt(len(readings)))
@@ -214,7 +215,7 @@ def with_axes(channels: Guesses, frame: Frame, source: str = "") -> None:
     for number, name in enumerate(frame.names):
         if channels[name].typed:
             continue
-        angle = math.degrees(frame.angle) + (90.0 * frame.sense if number else 0.0)
+        angle = math.degrees(frame.angle) + 90.0 * frame.sense * number
         mounted = _MOUNTED * round(angle / _MOUNTED)
         if abs(mounted - angle) > max(_NEAR, 2.0 * frame.error):
             mounted = angle

@@ -5,34 +5,21 @@ Carried on, open places and guesses are filled in; what was typed stays.
 
 import contextlib
 import json
-import math
 import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
 from rigdata.manifest.manifest import parse_manifest
-from rigdata.problem import RigDataError, refuse
+from rigdata.problem import RigDataError, parse_toml, refuse
 from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, quantity_of_unit, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
 from rigdata.survey.survey import Survey, survey
 
-_HEAD = (
-    "# Draft by `tpjb init`. No mark: read from the files. (records): concluded from them, with the figure.",
-    f"# (guess): confirm or correct. {MARK}: open. After changes `tpjb init --update` fills in what follows from them.",
-    "# Signs and frame: docs/guide/mounting.md",
-)
-#: What no record tells, and what it is where nobody says more.
-_TOLD = (
-    'description = ""   # what was tested: reports begin with it, the date and by whom',
-    'date = ""   # when it was measured',
-    'by = ""   # laboratory and person',
-)
-_TURNS = 'rotation = "counter-clockwise"   # (guess) with X to the right and Y up; or "clockwise"'
-_MOUNT = '# mount = "floating"   # hung on stingers, or "cells": on its load cells; else found in the records'
 _SOURCES = {"records": "(records) ", "guess": "(guess) "}
 #: What a line of `tpjb init` bears that was no person's.
 _OWN = re.compile(r"#\s*\((?:guess|records)\)")
@@ -45,12 +32,12 @@ _Tables = dict[tuple[str, str], list[str]]
 
 def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     """Write the text of a draft."""
-    lines = [*_HEAD, 'schema = "tpjb-rig/1"', f"id = {_toml_string(name)}"]
-    lines.append(f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # file in this folder')
-    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _line("mass", OPEN, HOUSING, "kg"), _MOUNT, ""]
+    file = _toml_string(bearing) if bearing else f'"{MARK}"   # file in this folder'
+    mass = _line("mass", OPEN, HOUSING)
+    lines = WORDS["draft"]["head"].format(name=_toml_string(name), bearing=file, mass=mass).split("\n")
     exports = [run.export for run in surveyed.runs]
     if not all(export.rate > 0 for export in exports):
-        lines += ["[acquisition]", _line("sample_rate", OPEN, ACQUISITION, "Hz"), ""]
+        lines += ["[acquisition]", _line("sample_rate", OPEN, ACQUISITION), ""]
     if nameless := max((export.nameless for export in exports), default=0):
         names = ", ".join(_toml_string(f"column{i + 1}") for i in range(nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
@@ -90,18 +77,16 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
     # what it is like bears the mark for both
     lines = [head, _line("quantity", Entry(quantity) if is_like else guess.quantity)]
     if quantity in VECTOR_QUANTITIES:
-        is_hinted = guess.axis.value is None and math.isfinite(guess.hint)
-        axis = Entry(reason=f"its name hints at {guess.hint:g} deg") if is_hinted else guess.axis
-        lines.append(_line("axis", axis, CHANNEL, "deg", "g"))
+        lines.append(_line("axis", guess.axis, CHANNEL))
     if is_like:
         lines.append(f"like = {_toml_string(model)}   # (guess) same type; or its own unit, sensitivity, ..")
     else:
         lines.append(f'unit = "{guess.unit or MARK}"')
-    if guess.sensitivity.value and not is_like:
-        lines.append(_line("sensitivity", guess.sensitivity))
-    elif not is_like and quantity_of_unit(guess.unit) == "":
-        lines.append(f'sensitivity = "{MARK}"   # such as {WORDS["sensitivities"].get(quantity, "1 V per unit")}')
-    usual = surveyed.channels[model].polarity if is_like else 1
+        if guess.sensitivity.value:
+            lines.append(_line("sensitivity", guess.sensitivity))
+        elif quantity_of_unit(guess.unit) == "":
+            lines.append(f'sensitivity = "{MARK}"   # such as {WORDS["sensitivities"].get(quantity, "1 V per unit")}')
+    usual = surveyed.channels[model].polarity
     if guess.axis.value is not None and (guess.polarity < 0 or guess.polarity != usual):
         lines.append(f"polarity = {guess.polarity}")
     if quantity == "temperature":
@@ -112,28 +97,20 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
 
 def run_lines(run: RunGuess) -> list[str]:
     """Lines of a run's table."""
-    stem = run.file.rpartition("/")[2].rpartition(".")[0]
     kind = run.kind.value
-    lines = ["[[runs]]", f"id = {_toml_string(stem)}", f"file = {_toml_string(run.file)}"]
+    lines = ["[[runs]]", f"id = {_toml_string(Path(run.file).stem)}", f"file = {_toml_string(run.file)}"]
     lines.append(_line("kind", run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
-    if kind in ("dynamic", "locus", None):
-        lines += [_line("shaft_speed", run.speed, RUN, "Hz"), _line("static_load", run.load, RUN, "kN")]
-    if kind == "dry_pivot":
-        lines.append(_line("pad", run.pad, RUN))
-    if kind != "clearance":
-        lines.append(_line("static_load_direction", run.direction, RUN, "deg"))
-    if kind in ("dynamic", None):
-        lines.append(_line("excitation_frequency", run.excitation, RUN, "Hz"))
-    return lines
+    fields = [field for field in RUN if (kind or "dynamic") in (*field.needed_by, *field.drafted_for)]
+    return lines + [_line(field.key, getattr(run, field.guess), RUN) for field in fields]
 
 
-def _line(key: str, entry: Entry, fields: tuple[Field, ...] = (), unit: str = "", digits: str = ".4g") -> str:
+def _line(key: str, entry: Entry, fields: tuple[Field, ...] = ()) -> str:
     """One entry with its source (what is read from a file needs none); or an open one with what it means."""
+    field = next((field for field in fields if field.key == key), Field(key, "text"))
     if entry.value is None:
-        meaning = next(field.meaning for field in fields if field.key == key)
-        text = f'{key} = "{f"{MARK} {unit}".strip()}"   # {meaning}'
+        text = f'{key} = "{f"{MARK} {field.unit}".strip()}"   # {field.meaning}'
         return f"{text}; {entry.reason}" if entry.reason else text
-    number = f"{entry.number:{digits}} {unit}" if unit and isinstance(entry.value, float) else entry.value
+    number = f"{entry.number:.4g} {field.unit}" if field.unit and isinstance(entry.value, float) else entry.value
     value = json.dumps(entry.text or number)
     mark = _SOURCES.get(entry.source)
     return f"{key} = {value}   # {mark}{entry.reason}" if mark else f"{key} = {value}"
@@ -161,8 +138,8 @@ class _Block:
 def column_names(text: str) -> tuple[str, ...]:
     """Names that a manifest gives to the columns of files that have none."""
     try:
-        names = tomllib.loads(text).get("csv", {}).get("names", ())
-    except (tomllib.TOMLDecodeError, AttributeError):
+        names = parse_toml(text).get("csv", {}).get("names", ())
+    except (ValueError, AttributeError):
         return ()
     return tuple(map(str, names)) if isinstance(names, list) else ()
 
@@ -174,8 +151,8 @@ def updated_manifest(text: str, exports: Sequence[Export], pivots: Sequence[floa
     manifest is never left with errors that it had not: then new records are added and nothing else.
     """
     try:
-        tables = tomllib.loads(text).get("channels", {})
-    except tomllib.TOMLDecodeError as error:
+        tables = parse_toml(text).get("channels", {})
+    except ValueError as error:
         raise refuse("campaign.toml", "", f"not valid TOML: {error}", "Repair it first") from error
     described = {str(name): table for name, table in tables.items() if isinstance(table, dict)}
     for name, table in described.items():  # what is like another has that one's calibration
@@ -217,11 +194,12 @@ def _blocks(text: str) -> list[_Block]:
     for lines in parts:
         key, place = ("", ""), ""
         with contextlib.suppress(tomllib.TOMLDecodeError):  # a text over several lines that begins one with a bracket
-            data = tomllib.loads("\n".join(lines))
-            if lines and lines[0].replace(" ", "").startswith("[[runs]]"):
-                file = str(data["runs"][0].get("file", ""))
-                key, place = ("runs", file), f"run {data['runs'][0].get('id', file)}"
-            elif lines and lines[0].replace(" ", "").startswith("[channels."):
+            data, head = tomllib.loads("\n".join(lines)), "".join(lines[:1]).replace(" ", "")
+            if head.startswith("[[runs]]"):
+                (run,) = data["runs"]
+                file = str(run.get("file", ""))
+                key, place = ("runs", file), f"run {run.get('id', file)}"
+            elif head.startswith("[channels."):
                 (name,) = data["channels"]
                 key, place = ("channels", name), f"channel {name}"
         blocks.append(_Block(key, place, lines))

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from rigdata.campaign import inside
 from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import FORMATS, TEXT, RecordFile, suffix_hint
+from rigdata.readers.base import FORMATS, TEXT, RecordFile
 from rigdata.readers.file_reader import read_contents
 from rigdata.readers.series import Series, with_unique_names
 from rigdata.readers.text.head import find_head
-from rigdata.safe_path import inside
 from rigdata.survey.channels import Entry, Tables
 from rigdata.units import TIME_FACTORS
 
@@ -43,13 +43,10 @@ class Export:
 
 def record_files(folder: Path) -> list[Path]:
     """List files below `folder` that may be records, by suffix, in order of name."""
-    if records := records_below(folder):
-        return records
-    unlisted = next((p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.startswith(".")), None)
-    remedy = f"Known are {', '.join((*TEXT, *FORMATS))}"
-    if unlisted is not None:
-        remedy = f"{unlisted.name}: {suffix_hint(unlisted)}"
-    raise refuse(str(folder), "", "holds no records", remedy)
+    records = records_below(folder)
+    if not records:
+        raise refuse(str(folder), "", "holds no records", f"Known are {', '.join((*TEXT, *FORMATS))}")
+    return records
 
 
 def records_below(folder: Path) -> list[Path]:

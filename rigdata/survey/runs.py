@@ -5,19 +5,20 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from rigdata.readers.series import Series
-from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, Guesses, usable_unit
+from rigdata.survey.channels import OPEN, PAD, Entry, Guesses, named, part_means, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.spectrum import Peaks, amplitude_spectrum, strongest
 from rigdata.units import UnitError, unit_factor
 
 #: Share of slow movement above which a record is a quasi-static test, and of one direction for load steps.
 _SLOW, _STRAIGHT = 0.9, 0.97
-#: Above this share too, where no line carries that much of the movement: steps that follow each other quickly.
-_MOSTLY, _DRIVEN = 0.5, 0.05
+#: Variance of equal readings, as a share of their square.
+_ROUNDING = 1e-20
 #: Blocks of which the means are the slow movement [s].
 _BLOCK = 0.25
 #: How far a line may lie from a frequency that is stated or known, as a share.
@@ -50,15 +51,15 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
     forces = of_quantity(export, channels, "force")
     moves = of_quantity(export, channels, "displacement")
     lines = strongest_lines(forces) or strongest_lines(moves)
-    stem = export.name.rpartition("/")[2].rpartition(".")[0]
-    named = next((kind for kind, pattern in WORDS["kinds"].items() if re.search(pattern, stem, re.IGNORECASE)), "")
-    kind = Entry(named, "guess", "the file's name") if named else OPEN
+    stem = Path(export.name).stem
+    by_name = named("kinds", stem)
+    kind = Entry(by_name, "guess", "the file's name") if by_name else OPEN
     # movement beats a misleading name, but a name tells a constant load from none
     movement, why = _by_movement(forces, moves, lines)
-    if movement and movement == (named or movement):
+    if movement and movement == (by_name or movement):
         kind = Entry(movement, "records", why)
-    elif movement and {movement, named} != {"dynamic", "locus"}:
-        kind = Entry(movement, "records", f"{why} (its name says {named})")
+    elif movement and {movement, by_name} != {"dynamic", "locus"}:
+        kind = Entry(movement, "records", f"{why} (its name says {by_name})")
     pad = re.search(rf"(?:^p|{PAD})[-_ #]?(\d{{1,2}})(?!\d)", stem, re.IGNORECASE)
     angles = _numbers_before(stem, r"deg(?:ree)?s?|°|grad")
     # a frequency that the name states counts where one of the record's lines confirms it
@@ -118,20 +119,16 @@ def _by_movement(forces: list[Series], moves: list[Series], lines: Peaks) -> tup
     pair = [s for s in forces if s.rate > 0][:2] or [s for s in moves if s.rate > 0][:2]
     if not pair:
         return "", ""
-    slow = []
-    for series in pair:  # means over blocks
-        step = max(1, round(_BLOCK * series.rate))
-        count = len(series) // step
-        blocks = np.reshape(series.values[: count * step], (count, step))
-        slow.append(np.nanmean(blocks[np.isfinite(blocks).any(axis=1)], axis=1))
     total = sum(float(np.nanvar(s.values)) for s in pair)
     if total <= 0:
         return "", ""
-    share = sum(float(np.var(b)) for b in slow if len(b)) / total
-    driven = bool(lines) and 0.5 * lines[0].amplitude ** 2 > _DRIVEN * total  # mains pick-up drives nothing
-    if share > _SLOW or (share > _MOSTLY and not driven):
-        if len(slow) == 2 and len(slow[0]) == len(slow[1]) > 3:
-            spread = np.linalg.eigvalsh(np.cov(np.stack(slow)))
+    slow = part_means(pair, max(1, int(len(pair[0]) / (_BLOCK * pair[0].rate))))
+    slow = slow[np.isfinite(slow).all(axis=1)]
+    moved = float(slow.var(axis=0).sum()) if len(slow) else 0.0
+    share = moved / total if moved > _ROUNDING * np.mean(slow**2) else 0.0
+    if share > _SLOW:
+        if len(pair) == 2 and len(slow) > 3:
+            spread = np.linalg.eigvalsh(np.cov(slow.T))
             if spread[-1] < _STRAIGHT * spread.sum():
                 return "clearance", "the force goes around"
         return "dry_pivot", "the force climbs slowly along one line"

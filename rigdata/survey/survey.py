@@ -1,7 +1,7 @@
 """A folder of exports as a whole: what its records tell of each other and of the sensors' axes."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,10 +35,6 @@ from rigdata.survey.runs import NEAR, RunGuess, guess_run, of_quantity, stronges
 #: Directions [deg] no farther apart than this lead to one pad; a dry test so near a pad's is toward that pad.
 _ALIKE, _TOWARD = 3.0, 15.0
 _MAINS_NEAR = 0.005
-#: In a clearance sweep the shaft lies in the corners, up to half a pad from where it is pushed [deg].
-_CORNERS = 25.0
-#: Shares that a sweep is looked at in.
-_SWEPT = 120
 #: Spread of values that are one set point, absolute and as a share.
 _SPREADS = {"direction": (5.0, 0.0), "speed": (0.0, 0.015), "excitation": (0.0, 0.015), "load": (0.0, 0.03)}
 #: Share of the running records in which the shaft speed must show.
@@ -103,20 +99,19 @@ class _Folder:
             if run.kind.value in kinds and all(found):
                 yield run, found
 
-    def _steps(self, names: Pair) -> dict[str, FloatArray]:
-        """By how much two channels change from the first to the last step of every dry test, by the run's file."""
-        steps = {}
-        for run, (series,) in self._with(["dry_pivot"], names):
-            change = _change(series)
-            if np.isfinite(change).all() and change.any():
-                steps[run.file] = change
-        return steps
+    def _dry_tests(self, *names: Pair) -> tuple[FloatArray, FloatArray]:
+        """Directions (n,) [rad] of the pads that dry tests load, NaN where these are not known.
 
-    def _toward(self, steps: Mapping[str, FloatArray]) -> FloatArray:
-        """Directions (n,) [rad] of the pads that dry tests load, NaN where these are not known."""
-        pads = {run.file: run.pad.value or 0 for run in self.runs}
+        And readings of pairs of channels at their first and their last step (2, n_pairs, n, 2).
+        """
         angles = np.append(self.pivots, np.nan)
-        return np.array([angles[min(pads[file], len(angles)) - 1] for file in steps])
+        toward, readings = [], []
+        for run, pairs_of_run in self._with(["dry_pivot"], *names):
+            ends = np.array([part_means(series)[[0, -1]] for series in pairs_of_run])
+            if np.isfinite(ends).all() and (ends[:, 0] != ends[:, 1]).any(axis=1).all():
+                toward.append(angles[min(run.pad.value or 0, len(angles)) - 1])
+                readings.append(ends)
+        return np.array(toward), np.reshape(readings, (-1, len(names), 2, 2)).transpose(2, 1, 0, 3)
 
     def _frame_of_cells(self) -> Frame | None:
         """Frame of the load cells: typed, told by dry steps toward known pads, or as their names hint."""
@@ -126,19 +121,19 @@ class _Folder:
         stated = stated_frame(pair, self.channels)
         if stated is not None and stated.source == "file":
             return stated
-        steps = self._steps(pair)
-        readings, toward = np.array(list(steps.values())), self._toward(steps)
+        toward, (first, last) = self._dry_tests(pair)
+        readings = (last - first)[0]
         known = np.isfinite(toward)
         if len(set(toward[known])) > 1:
             reason = f"{known.sum()} dry steps toward their pads"
             return fitted_frame(pair, readings[known], toward[known], reason) or stated
-        if stated is None or not len(self.pivots) or len(steps) < 2:
+        if stated is None or not len(self.pivots) or len(readings) < 2:
             return stated
         hinted = stated.direction(readings)
         nearest = self.pivots[self._nearest_pad(hinted)]
         if np.abs(np.angle(np.exp(1j * (hinted - nearest)))).max() > math.radians(_ALIKE):
             return stated  # the names' directions lead to no pads
-        return fitted_frame(pair, readings, nearest, f"its name and {len(steps)} dry steps toward pads") or stated
+        return fitted_frame(pair, readings, nearest, f"its name and {len(readings)} dry steps toward pads") or stated
 
     def _nearest_pad(self, angles: FloatArray | float) -> Any:
         """Indices of the pads nearest to directions [rad]."""
@@ -148,7 +143,8 @@ class _Folder:
         series, is_dry = _pair(run, cells.names), run.kind.value == "dry_pivot"
         if not series or run.kind.value == "clearance":
             return run
-        force = _change(series) if is_dry else part_means(series, 1)[0]
+        means = part_means(series, 10 if is_dry else 1)
+        force = means[-1] - is_dry * means[0]
         if not force.any() or not np.isfinite(force).all():
             return run
         angle = float(cells.direction(force))
@@ -160,7 +156,7 @@ class _Folder:
         if is_dry and len(self.pivots):
             nearest = int(self._nearest_pad(angle))
             pivot = math.degrees(self.pivots[nearest])
-            off = abs(math.remainder(pivot - math.degrees(angle), 360.0))
+            off = abs(folded(pivot - degrees))
             if off <= _TOWARD and run.pad.value in (None, nearest + 1):
                 pad = replace(concluded, value=nearest + 1, reason=f"{reason}, {off:.1f} deg from it")
                 direction = replace(run.direction, value=folded(pivot))
@@ -171,17 +167,12 @@ class _Folder:
         return run if is_dry or not np.isfinite(newtons).all() else _with_load(run, float(np.hypot(*newtons)))
 
     def find_other_axes(self) -> None:
-        """Axes of probes by dry steps or the sweep, of accelerometers by the excitation; hints where these fail."""
+        """Axes of probes by dry steps, of accelerometers by the excitation; hints where that fails."""
         cells = self.cells
         if cells is None:
             return
         for pair in pairs(self.channels, "displacement"):
-            frames = [fitted_frame(pair, *evidence) for evidence in self._of_dry_steps(pair, cells)]
-            for _, (probes, forces) in self._with(["clearance"], pair, cells.names):
-                # a small load goes around, and the shaft follows it from corner to corner
-                around = [part_means(channels, _SWEPT) for channels in (probes, forces)]
-                readings, pushes = (means - 0.5 * (means.max(axis=0) + means.min(axis=0)) for means in around)
-                frames.append(fitted_frame(pair, readings, cells.direction(pushes), "the clearance sweep", _CORNERS))
+            frames = [fitted_frame(pair, *evidence) for evidence in self._of_dry_tests(pair, cells)]
             proposals = [frame for frame in frames if frame is not None]
             if proposals:
                 with_axes(self.channels, min(proposals, key=lambda frame: frame.error), cells.source)
@@ -190,18 +181,17 @@ class _Folder:
             if frame is not None:
                 with_axes(self.channels, frame, cells.source)
 
-    def _of_dry_steps(self, pair: Pair, cells: Frame) -> Iterator[_Evidence]:
+    def _of_dry_tests(self, pair: Pair, cells: Frame) -> Iterator[_Evidence]:
         """How two probes move in dry tests, and where the shaft then lies on the pads."""
-        forces = self._steps(cells.names)
-        steps = {file: step for file, step in self._steps(pair).items() if file in forces}
-        directions = self._toward(steps)
+        directions, (first, last) = self._dry_tests(pair, cells.names)
+        steps, forces = last - first
         if not np.isfinite(directions).all():
-            directions = np.array([float(cells.direction(forces[file])) for file in steps])
-        yield np.array(list(steps.values())), directions, f"{len(steps)} dry steps"
+            directions = cells.direction(forces)
+        yield steps, directions, f"{len(steps)} dry steps"
         if len(steps) > 2:
-            places = np.array([part_means(_pair(run, pair))[-1] for run in self.runs if run.file in steps])
-            apart = np.exp(1j * directions) - np.exp(1j * directions).mean()
-            yield places - places.mean(axis=0), np.angle(apart), f"where {len(steps)} dry steps end"
+            towards = np.exp(1j * directions)
+            apart = np.angle(towards - towards.mean())
+            yield last[0] - last[0].mean(axis=0), apart, f"where {len(steps)} dry steps end"
 
     def _of_excitation(self, pair: Pair, cells: Frame) -> _Evidence:
         """How two accelerometers move: the housing gives way to the force on its cells along the excitation."""
@@ -239,18 +229,16 @@ class _Folder:
             return OPEN
         frequencies = np.sort(np.concatenate(running))
 
-        def near(frequency: float, order: int = 1) -> FloatArray:
-            return frequencies[np.abs(order * frequencies - frequency) < NEAR * frequency]
+        def near(frequency: float) -> FloatArray:
+            return frequencies[np.abs(frequencies - frequency) < NEAR * frequency]
 
         # the mains are in every record as well, and so may one excitation: the shaft shows twice its speed too
         order = sorted(set(frequencies.tolist()), key=lambda f: (is_mains(f), -len(near(2 * f)), f))
         least = _MOST_OF * len(running)
         for candidate in order:
-            speeds, half = near(candidate), near(candidate, 2)
+            speeds = near(candidate)
             if len(speeds) < least:
                 continue
-            if 2 * len(half) >= len(speeds):  # an oval shaft shows twice its speed more often
-                speeds = half
             speed = float(speeds[len(speeds) // 2])
             once, twice = len(near(speed)), len(near(2 * speed))
             text = f"this line is in {once} of {len(running)} records"
@@ -268,12 +256,6 @@ def _pair(run: RunGuess, names: Pair) -> list[Series]:
     return chosen if len(chosen) == 2 and any(np.isfinite(s.values).any() for s in chosen) else []
 
 
-def _change(series: Sequence[Series]) -> FloatArray:
-    """Difference of two channels (2,) between the last and the first tenth of a record."""
-    tenths = part_means(series)
-    return tenths[-1] - tenths[0]
-
-
 def _with_load(run: RunGuess, load: float) -> RunGuess:
     """A run with its load [N] by calibrated cells, in their unit; what a name states stands if they agree."""
     reason, stated = f"cells {load / 1e3:.3g} kN", run.load
@@ -289,8 +271,6 @@ def _with_load(run: RunGuess, load: float) -> RunGuess:
 
 def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
     """A run with its speed and excitation: what turns with the shaft is not the excitation."""
-    if run.kind.value not in (*_RUNNING, None):
-        return run
     if run.speed.value is None:
         run = replace(run, speed=speed)
     if run.excitation.value is not None or run.kind.value == "locus" or not run.lines:
@@ -298,7 +278,7 @@ def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
     turns = run.speed.number
     lines = [p for p in run.lines if not any(abs(p.frequency - n * turns) <= NEAR * n * turns for n in (1, 2))]
     if not lines:
-        return replace(run, excitation=Entry(None, "", "its only line is the shaft's"))
+        return run
     beside = " beside the shaft's" if len(lines) < len(run.lines) else ""
     return replace(run, excitation=Entry(lines[0].frequency, "records", f"strongest line{beside}"))
 

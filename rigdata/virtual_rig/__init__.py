@@ -7,19 +7,22 @@
 """
 
 from rigdata.virtual_rig.campaign import CampaignTruth, CsvLayout, write_campaign
-from rigdata.virtual_rig.instruments import Instruments, Sensor, SensorError
-from rigdata.virtual_rig.noise import (
+from rigdata.virtual_rig.instruments import (
     ChannelNoise,
     DryImperfections,
     Glitches,
+    Instruments,
     Noise,
+    Sensor,
+    SensorError,
 )
-from rigdata.virtual_rig.plan import (
+from rigdata.virtual_rig.rig import Fault, SimulatedRun, VirtualRig
+from rigdata.virtual_rig.truth import (
     ClearanceSweep,
     DryTest,
     RigPlan,
+    RigTruth,
+    VirtualRigError,
     locus_points,
     operating_points,
 )
-from rigdata.virtual_rig.rig import Fault, SimulatedRun, VirtualRig
-from rigdata.virtual_rig.truth import RigTruth, VirtualRigError

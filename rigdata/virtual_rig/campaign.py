@@ -16,9 +16,8 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import ROTATIONS
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import answer
-from rigdata.virtual_rig.plan import DryTest, PlannedRun
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig, converter_step, felt_direction
-from rigdata.virtual_rig.truth import PAPER_RIG, RigTruth, VirtualRigError, hz, point_facts
+from rigdata.virtual_rig.truth import PAPER_RIG, DryTest, PlannedRun, RigTruth, VirtualRigError, hz, point_facts
 
 Progress = Callable[[int, int, str], None]
 #: Names and readings of a file's columns.
@@ -269,24 +268,24 @@ def manifest_text(rig: VirtualRig, layout: CsvLayout | None = None) -> str:
     rates = [run.rate for run in rig.runs]
     rate, rotation = max(set(rates), key=rates.count), rig.runs[0].point.rotation
     header = {"schema": "tpjb-rig/1", "id": rig.campaign, "bearing": rig.truth.bearing_name}
-    blocks = [
-        _table("", {**header, "description": rig.description}),
-        _table("[housing]", {"mass": f"{rig.instruments.housing_mass:.10g} kg"}),
-        _table("[acquisition]", {"sample_rate": _rate(rate)}),
-    ]
+    tables: dict[str, dict[str, object]] = {
+        "": {**header, "description": rig.description},
+        "[housing]": {"mass": f"{rig.instruments.housing_mass:.10g} kg"},
+        "[acquisition]": {"sample_rate": _rate(rate)},
+    }
     if layout is not None and layout.declared:
         line = len(layout.preamble) + 1
         dialect = {key: getattr(layout, key) for key in ("delimiter", "decimal", "encoding")}
         lines = {"header_line": line, "units_line": line + 1 if layout.units_line else None}
-        blocks.append(_table("[csv]", dialect | lines))
+        tables["[csv]"] = dialect | lines
     if layout is not None and layout.time_name:
-        blocks.append(_table(f"[channels.{layout.time_name}]", {"quantity": "time", "unit": "s"}))
-    blocks += [_channel(sensor) for sensor in rig.instruments.sensors]
+        tables[f"[channels.{layout.time_name}]"] = {"quantity": "time", "unit": "s"}
+    tables |= {f"[channels.{sensor.name}]": _channel(sensor) for sensor in rig.instruments.sensors}
     if rotation != ROTATIONS[0]:
-        blocks.append(_table("[shaft]", {"rotation": rotation}))
+        tables["[shaft]"] = {"rotation": rotation}
     suffix = "" if layout is None else ".csv"
-    blocks += [_run(_as_noted(run, rig), suffix, rate, rotation) for run in rig.runs]
-    return "\n".join(blocks)
+    runs = [("[[runs]]", _run(_as_noted(run, rig), suffix, rate, rotation)) for run in rig.runs]
+    return "\n".join(_table(title, entries) for title, entries in (*tables.items(), *runs))
 
 
 def _table(title: str, entries: dict[str, object]) -> str:
@@ -298,8 +297,8 @@ def _table(title: str, entries: dict[str, object]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _channel(sensor: Sensor) -> str:
-    entries: dict[str, object] = {
+def _channel(sensor: Sensor) -> dict[str, object]:
+    return {
         "quantity": sensor.quantity,
         "axis": None if sensor.axis is None else _degrees(sensor.axis),
         "pad": sensor.pad,
@@ -309,10 +308,9 @@ def _channel(sensor: Sensor) -> str:
         "polarity": sensor.polarity if sensor.polarity < 0 else None,
         "uncertainty": f"{100 * sensor.uncertainty:g} %" if sensor.uncertainty else None,
     }
-    return _table(f"[channels.{sensor.name}]", entries)
 
 
-def _run(run: PlannedRun, suffix: str, rate: float, rotation: str) -> str:
+def _run(run: PlannedRun, suffix: str, rate: float, rotation: str) -> dict[str, object]:
     test, point = run.test, run.point
     entries: dict[str, object] = {
         "id": run.id,
@@ -332,15 +330,13 @@ def _run(run: PlannedRun, suffix: str, rate: float, rotation: str) -> str:
         entries["excitation_frequency"] = f"{point.excitation_hz:.10g} Hz"
         entries["excitation_direction"] = _degrees(run.direction)
     entries["sample_rate"] = _rate(run.rate) if run.rate != rate else None
-    return _table("[[runs]]", entries)
+    return entries
 
 
 def _as_noted(run: PlannedRun, rig: VirtualRig) -> PlannedRun:
     """Give the run as somebody noted it, with that person's mistakes."""
-    for fault in rig.faults:
+    for fault in filter(lambda fault: fault.affects(run.id), rig.faults):
         point, value = run.point, fault.size(0.0)
-        if not fault.affects(run.id):
-            continue
         if fault.kind == "wrong_pad" and isinstance(run.test, DryTest):
             run = replace(run, test=replace(run.test, pad=int(value)))
         elif fault.kind == "wrong_direction":

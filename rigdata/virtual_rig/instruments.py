@@ -1,14 +1,17 @@
-"""The instruments: what the manifest says of them, and what they really do.
+"""The instruments, what the manifest says of them and what they really do; and all that is in a record besides.
 
-Every sensor carries both: its stated calibration (in the manifest) and its `SensorError` (in the readings alone).
+Every sensor carries both: its stated calibration (in the manifest) and its `SensorError` (in the readings alone). The
+amounts of `Noise.like_samples` were measured on the sample campaigns, in SI units of the quantity, so that they do not
+change with a sensor's sensitivity.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from math import radians
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -82,15 +85,13 @@ class Instruments:
         With a `seed`, gap voltages and the zeros of accelerometers and Pt100s are random; without, the probes
         are at 8 V and everything else is at zero.
         """
-        pads = [f"T{number}" for number in range(1, n_pads + 1)]
-        rows = [("probe", "X1A", 45.0), ("probe", "X1B", 135.0), ("cell", "L1H", 0.0), ("cell", "L1V", 90.0)]
-        rows += [("accelerometer", "A1H", 0.0), ("accelerometer", "A1V", 90.0)]
-        scatter = [0.2, 0.2, 1.5, 1.5, *[0.2] * n_pads]  # of gap voltages, and of zeros
+        rig = PAPER_RIG["rig"]
+        sensors = [Sensor.of_type(kind, name, axis=radians(degrees)) for kind, name, degrees in rig["sensors"]]
+        sensors += [Sensor.of_type("thermometer", f"T{number}", pad=number) for number in range(1, n_pads + 1)]
+        drawn = {s.name: rig["scatter"][s.quantity] for s in sensors if s.quantity != "force"}
         share = 0.0 if seed is None else 1.0
-        zeros = share * np.random.default_rng([seed or 0, 0]).normal(0.0, scatter) + 0.0
-        drawn = dict(zip(("X1A", "X1B", "A1H", "A1V", *pads), zeros.tolist(), strict=True))
-        sensors = [Sensor.of_type(kind, name, axis=radians(degrees)) for kind, name, degrees in rows]
-        sensors += [Sensor.of_type("thermometer", name, pad=number) for number, name in enumerate(pads, 1)]
+        zeros = share * np.random.default_rng([seed or 0, 0]).normal(0.0, [*drawn.values()]) + 0.0
+        drawn = dict(zip(drawn, zeros.tolist(), strict=True))
         full_scale = next((size for size in _CELL_SIZES if size >= 1.5 * load), 1.5 * load)
         stated = {"sensitivity": "2.0 mV/V", "full_scale": f"{full_scale / 1e3:g} kN", "excitation": "5 V"}
         for place, sensor in enumerate(sensors):
@@ -128,3 +129,93 @@ class Instruments:
             for place in places if number is None else places[number - 1 : number]:
                 sensors[place] = sensors[place].with_error(**{entry: value})
         return replace(self, sensors=tuple(sensors), housing_mass_error=self.housing_mass_error + housing_mass)
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """Noise of one quantity, in its SI unit (K for temperatures)."""
+
+    white: float = 0.0
+    flicker: float = 0.0
+    mains: float = 0.0
+    drift: float = 0.0
+
+    def scaled(self, factor: float) -> ChannelNoise:
+        """Return the same noise, `factor` times as strong."""
+        return ChannelNoise(*(amount * factor for amount in astuple(self)))
+
+
+@dataclass(frozen=True)
+class Glitches:
+    """Bursts in which a displacement or force channel is off by a constant."""
+
+    share: float = 0.0
+    shortest: int = 3
+    longest: int = 50
+    displacement: float = 65e-6
+    force: float = 4000.0
+
+
+@dataclass(frozen=True)
+class DryImperfections:
+    """What goes wrong in dry tests."""
+
+    direction: tuple[float, float] = (0.0, 0.0)
+    side: tuple[float, float] = (0.0, 0.0)
+    side_start: float = 0.0
+    friction: float = 0.0
+    contact_gap: tuple[float, float] = (0.0, 0.0)
+    contact_load: float = 500.0
+    push_scatter: float = 0.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """All disturbances of a campaign."""
+
+    displacement: ChannelNoise = ChannelNoise()
+    force: ChannelNoise = ChannelNoise()
+    acceleration: ChannelNoise = ChannelNoise()
+    temperature: ChannelNoise = ChannelNoise()
+    speed: ChannelNoise = ChannelNoise()
+    mains_frequency: float = 50.0
+    mains_scatter: float = 0.0
+    mains_harmonics: tuple[float, ...] = ()
+    runout: tuple[float, ...] = ()  #: of the shaft, 1X, 2X, ... [m]
+    unbalance: float = 0.0  #: kg m
+    actuator_harmonics: tuple[float, ...] = ()  #: shares of the excitation
+    actuator_scatter: float = 0.0
+    cross_talk: float = 0.0  #: of the actuators
+    load_miss: float = 0.0  #: by how much a run misses its set point, standard deviations: share, rad, share
+    direction_miss: float = 0.0
+    speed_miss: float = 0.0
+    glitches: Glitches = Glitches()
+    dry: DryImperfections = DryImperfections()
+    bits: int | None = None
+
+    @classmethod
+    def none(cls) -> Noise:
+        """No disturbance at all: the records are the physics."""
+        return cls()
+
+    @classmethod
+    def like_samples(cls) -> Noise:
+        """As strong as in the sample campaigns, of every kind that they have."""
+        entries = dict(PAPER_RIG["noise"])
+        for name, amounts in entries.pop("channels").items():
+            entries[name] = ChannelNoise(**amounts)
+        entries |= {"glitches": Glitches(**entries["glitches"]), "dry": DryImperfections(**entries["dry"])}
+        return cls(**entries)
+
+    def scaled(self, factor: float) -> Noise:
+        """Return it with the channels' noise `factor` times as strong; shaft, actuators, dry tests as they are."""
+        return replace(self, **{name: getattr(self, name).scaled(factor) for name in PAPER_RIG["noise"]["channels"]})
+
+
+#: What random streams are for; a change in one leaves all others as they were.
+_PURPOSES = ("physics", "noise", "mains", "glitches", "dry", "faults", "campaign")
+
+
+def stream(seed: int, run: str, purpose: str) -> np.random.Generator:
+    """Generator for one run (by its id) and purpose; the same for the same arguments, on every machine."""
+    return np.random.default_rng([seed, crc32(run.encode()), _PURPOSES.index(purpose)])

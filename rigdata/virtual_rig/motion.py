@@ -11,10 +11,16 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import directions
-from rigdata.virtual_rig.instruments import Instruments
-from rigdata.virtual_rig.noise import Noise, stream
-from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, PlannedRun
-from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, load_vector, point_facts
+from rigdata.virtual_rig.instruments import Instruments, Noise, stream
+from rigdata.virtual_rig.truth import (
+    ClearanceSweep,
+    DryTest,
+    PlannedRun,
+    RigTruth,
+    VirtualRigError,
+    load_vector,
+    point_facts,
+)
 
 _SETTLING = 0.1  # time constant of an overshoot [s]
 #: How far the load passes a pad before the shaft slides along it, and over which angle it does [rad].
@@ -96,12 +102,9 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
     steady = replace(actual, excitation=0.0)
     lines, line_facts = [], []
     for frequency, force in forces:
-        line = answer(frequency, force, truth.stiffness(replace(actual, excitation=frequency)), instruments)
-        lines.append(line)
-        fact = {"frequency_Hz": round(frequency / (2 * np.pi), 9)}
-        for name, phasor in (("oil_force_N", line.oil_force), ("displacement_m", line.displacement)):
-            fact[name] = np.stack([phasor.real, phasor.imag], axis=1).tolist()
-        line_facts.append(fact)
+        h = truth.stiffness(replace(actual, excitation=frequency))
+        lines.append(answer(frequency, force, h, instruments))
+        line_facts.append({"frequency_Hz": round(frequency / (2 * np.pi), 9)})
     position = truth.position(steady)
     return Motion(
         time=np.arange(round(run.seconds * run.rate)) / run.rate,
@@ -168,20 +171,16 @@ def dry_motion(run: PlannedRun, test: DryTest, truth: RigTruth, noise: Noise, se
     facts = {
         "load_direction_error_deg": float(np.degrees(off)),
         "side_share": side,
-        "side_start_m": side_start,
         "contact_gap_m": gap,
-        "friction": flaws.friction,
     }
     return Motion(time, position, np.outer(load, directions(run.direction + off)), truth.cold_temperatures, facts)
 
 
 def load_history(test: DryTest, rate: float) -> tuple[FloatArray, FloatArray]:
     """Time (n,) [s] and load (n,) [N] of a dry test: ramps and holds."""
-    knots, level, held = [0.0], [test.start], []
+    knots, level, held = [0.0], [test.levels[-1] if test.branch == "down" else test.start], []
     rising = list(zip(test.levels, test.holds))
     order = {"up": rising, "down": rising[::-1], "cycle": rising + rising[-2::-1]}[test.branch]
-    if test.branch == "down":
-        level = [test.levels[-1]]
     for target, hold in order:
         arrival = knots[-1] + (test.ramp if target != level[-1] else 0.0)
         held.append((arrival, arrival + hold, target - level[-1], target))

@@ -15,11 +15,9 @@ from scipy.fft import irfft, next_fast_len
 
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.near_names import unknown_name
-from rigdata.virtual_rig.instruments import Instruments, Sensor
+from rigdata.virtual_rig.instruments import Instruments, Noise, Sensor, stream
 from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
-from rigdata.virtual_rig.noise import Noise, stream
-from rigdata.virtual_rig.plan import DryTest, PlannedRun, RigPlan
-from rigdata.virtual_rig.truth import PAPER_RIG, RigTruth, VirtualRigError
+from rigdata.virtual_rig.truth import PAPER_RIG, DryTest, PlannedRun, RigPlan, RigTruth, VirtualRigError
 
 #: Where each kind of fault sits ("sensor", "record", "run" or "file"), what it needs (fields, a layout, times in the
 #: files), and what it does.
@@ -122,7 +120,7 @@ def felt_direction(sensor: Sensor, instruments: Instruments) -> FloatArray:
     direction = sensor.direction()
     if sensor.error.cross:
         pairs = instruments.of(sensor.quantity)
-        partner = pairs[[s.name for s in pairs].index(sensor.name) ^ 1]
+        partner = pairs[pairs.index(sensor) ^ 1]
         direction = direction + sensor.error.cross * partner.direction()
     return direction
 

@@ -1,5 +1,6 @@
 """TOML that is meant to hurt: deep nesting, huge keys and numbers, in every file that a stranger may have written."""
 
+import contextlib
 import time
 
 import pytest
@@ -8,9 +9,9 @@ from model.bearing import BearingError
 from model.bearing_file import parse_bearing
 from model.effects import EffectError, load_effects
 from model.pivots import load_pivots
-from model.toml_text import MAX_DEPTH, parse_toml
 from rigdata.manifest.manifest import parse_manifest
-from rigdata.problem import RigDataError
+from rigdata.problem import MAX_DEPTH, RigDataError, parse_toml
+from rigdata.survey.draft import column_names, updated_manifest
 from rigdata.units import UnitError, parse_quantity
 from tests.manifests import PROBE, SWEEP, manifest
 from tpjb_ident.cli.inputs import parse_values
@@ -114,3 +115,12 @@ def test_a_number_of_thousands_of_digits_costs_no_time():
         parse_values("9" * 60_000 + " kN", "force", "--load")
     # the search for the end of the number took seconds, with the square of the digits
     assert time.process_time() - began < 1.0
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_manifest_that_is_carried_on_is_refused_likewise(name):
+    began = time.process_time()
+    with contextlib.suppress(RigDataError):  # those that are only large are taken
+        updated_manifest(BOMBS[name], [])
+    assert column_names(BOMBS[name]) == ()
+    assert time.process_time() - began < 2.0

@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rigdata
+from rigdata.campaign import inside
 from rigdata.problem import RigDataError
-from rigdata.safe_path import inside
 from tests.manifests import PROBE, SET_POINT, manifest, write_files
 from tpjb_ident.check.campaign import check_campaign
 

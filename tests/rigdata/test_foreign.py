@@ -11,8 +11,8 @@ from scipy.io import savemat
 
 from rigdata import RigDataError, load_campaign
 from rigdata.readers import series
-from rigdata.readers.base import FORMATS
-from rigdata.readers.file_reader import FileReader, ReadingCache
+from rigdata.readers.base import FORMATS, ReadingCache
+from rigdata.readers.file_reader import FileReader
 from rigdata.readers.series import Contents, Series, equidistant, is_time, seconds, with_unique_names
 from tests.foreign_files import read_series, write_columns, write_data_set, write_groups, write_mat73
 from tests.manifests import PROBE, SET_POINT, manifest, write_files

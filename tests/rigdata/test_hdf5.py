@@ -97,6 +97,18 @@ def test_time_dataset(tmp_path):
     assert run.record("X1A", 0, 2).time == pytest.approx([0.001, 0.005])
 
 
+def test_a_time_dataset_that_nobody_describes_counts_by_its_name_where_no_rate_is_stated(tmp_path):
+    path = tmp_path / "c.h5"
+    make(path, manifest(PROBES, SWEEP), rate=None)
+    with changed(path) as group:
+        group["Time"] = np.arange(N) * 4.0 + 1.0
+        group["Time"].attrs["unit"] = "ms"
+    run = reopened(path)
+    assert run.sample_rate == pytest.approx(250.0)
+    assert run.record("X1A", 0, 2).time == pytest.approx([0.001, 0.005])
+    assert reopened(write_hdf5(path, MANIFEST, COLUMNS | {"Time": np.zeros(N)}, None)).sample_rate == 10.0
+
+
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, 1e300, "abc", "500", [1.0, 2.0]])
 def test_senseless_rates(tmp_path, rate):
     """A text stands elsewhere in the file."""

@@ -18,8 +18,8 @@ from model.options import Options
 from model.pivots import BEYOND_TEST, PivotLaw, measured_pivots, pivot_laws
 from model.predict import predict
 from model.prediction import Prediction
-from model.toml_text import parse_toml
 from rigdata.operating_point import OperatingPoint
+from rigdata.problem import parse_toml
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from rigdata.campaign import MANIFEST_NAME, Campaign, load_campaign
+from rigdata.campaign import MANIFEST_NAME, Campaign, inside, load_campaign
 from rigdata.problem import Problem, RigDataError, RigError
 from rigdata.run import Run
-from rigdata.safe_path import inside
 from rigdata.survey.exports import records_below
 from tpjb_ident.check.campaign import judged
 from tpjb_ident.check.findings import Finding

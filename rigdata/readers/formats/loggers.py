@@ -87,13 +87,7 @@ def read_uff(path: Path) -> list[Series]:
         if function not in (_GENERAL, _TIME_RESPONSE) or np.iscomplexobj(data["data"]):
             unusable[f"function type {function}"] += 1
             continue
-        values, x = to_temporary_file(np.asarray(data["data"], dtype=float)), data.get("x")
-        step = float(data.get("abscissa_inc") or 0.0)
-        time = None
-        if x is not None and len(x) == len(values):
-            time = to_temporary_file(np.asarray(x, dtype=float))
-        elif step > 0:
-            time = equidistant(len(values), step, float(data.get("abscissa_min") or 0.0))
+        values, time = (to_temporary_file(np.asarray(data[key], dtype=float)) for key in ("data", "x"))
         unit = str(data.get("ordinate_axis_units_lab") or "").strip()
         unit = "" if unit.upper() == "NONE" else unit
         series.append(Series(_record_name(data, index), unit, values, time, f"set {index + 1}"))

@@ -27,10 +27,10 @@ _SHORTEST, _MOST_NAMES, _LONGEST = 8, 4096, 1000
 _DEEPEST = 4
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HEADER = 128
-#: Types of elements: variables, names, whole numbers, numbers of any size, and texts on top of these.
-_MATRIX, _COMPRESSED, _NAME, _WHOLE = frozenset({14}), 15, frozenset({1}), frozenset({5})
-_NUMBERS = frozenset({*range(1, 8), 9, 12, 13})
-_TEXTS = _NUMBERS | {16, 17, 18}
+#: Types of elements: variables, packed ones, names, whole numbers, flags; numbers of any size, and texts besides.
+_MATRIX, _COMPRESSED, _NAME, _WHOLE, _FLAGS = 14, 15, 1, 5, 6
+_NUMBERS = (*range(1, 8), 9, 12, 13)
+_TEXTS = (*_NUMBERS, 16, 17, 18)
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 4, 5, 16, 17
 _DEEPEST_ELEMENT = 32
 
@@ -193,7 +193,7 @@ class _Bytes:
     at: int
     end: int
 
-    def element(self, types: frozenset[int]) -> _Bytes:
+    def element(self, *types: int) -> _Bytes:
         """What the next element holds; it is passed."""
         if self.at + 8 > self.end:
             raise ValueError("ends inside an element")
@@ -227,7 +227,7 @@ def check_mat5(path: Path) -> None:
     try:
         while walk.at < walk.end:
             is_packed = walk.numbers("I")[:1] == (_COMPRESSED,)
-            element = walk.element(_MATRIX | {_COMPRESSED})
+            element = walk.element(_MATRIX, _COMPRESSED)
             if is_packed:
                 packed = data[element.at : element.end]
                 length = _Bytes(zlib.decompressobj().decompress(packed, 8), order, 0, 8).numbers("I")[1]
@@ -249,7 +249,7 @@ def _walk_matrix(walk: _Bytes, depth: int) -> None:
         raise ValueError("nests too deeply")
     if walk.at == walk.end:
         return  # an empty matrix has no parts at all
-    flags, _ = walk.element(frozenset({6})).numbers("I")
+    flags, _ = walk.element(_FLAGS).numbers("I")
     kind, is_complex = flags & 0xFF, bool(flags & 0x800)
     count = 1
     if kind == _OPAQUE:
@@ -262,10 +262,10 @@ def _walk_matrix(walk: _Bytes, depth: int) -> None:
         if not 1 <= len(shape) <= 32 or min(shape) < 0:
             raise ValueError("a variable has an impossible shape")
     if kind == _CHAR:
-        walk.element(_TEXTS)
+        walk.element(*_TEXTS)
     elif kind == _SPARSE or 6 <= kind <= 15:
         for _ in range((2 if kind == _SPARSE else 0) + 1 + is_complex):
-            walk.element(_NUMBERS)
+            walk.element(*_NUMBERS)
     elif kind in (_CELL, _STRUCT, _OBJECT, _FUNCTION, _OPAQUE):
         if kind == _OBJECT:
             walk.element(_NAME)

@@ -30,8 +30,8 @@ _REFERENCE, _BEHIND = struct.Struct("<IQI"), 80
 _MAX_STEPS = 64
 #: What h5py raises of a damaged file.
 _BROKEN = (RigDataError, OSError, RuntimeError, KeyError, ValueError, TypeError)
-#: Filters that the library brings along.
-_FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
+#: Filters that the library brings along: gzip, shuffle, fletcher32, szip, nbit, scaleoffset, lzf.
+_FILTERS = {*range(1, 7), 32000}
 #: Attributes of a dataset that state its unit.
 UNIT = ("unit", "units", "Unit", "Units")
 #: HDF5's class of texts (H5T_STRING), and the classes of what is stored in its own place: integers, floats, texts.

@@ -13,6 +13,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.device import Grid, timed_grid
+from rigdata.near_names import hint
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, Layout, RunReader
 from rigdata.readers.hdf5.guards import (
@@ -27,7 +28,7 @@ from rigdata.readers.hdf5.guards import (
     resolve,
     too_long_text,
 )
-from rigdata.readers.series import serving
+from rigdata.readers.series import Series, seconds, serving, time_columns
 
 _MAX_CHUNK = 256 * 2**20
 _PIECE = 2**20
@@ -95,7 +96,6 @@ class _Members(Layout):
 class Hdf5Reader(RunReader):
     """One run's group in an HDF5 file; the file is opened for every request and closed again."""
 
-    cached_layout: dict[tuple[int, int], _Members] = field(default_factory=dict, repr=False, compare=False)
     opened_members: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @contextmanager
@@ -146,8 +146,8 @@ class Hdf5Reader(RunReader):
             return self.opened_members[name]
         dataset = resolve(group, name, self.file, self.run)
         if dataset is None:
-            names = ", ".join(str(member)[:40] for member in itertools.islice(group, 20))
-            raise self.refuse(f"dataset {name}", "channel is missing in the file", f"It holds: {names or 'nothing'}")
+            held = hint(name, itertools.islice(group, 20), "It holds:")[:220]
+            raise self.refuse(f"dataset {name}", "channel is missing in the file", held)
         fault = ""
         if not isinstance(dataset, h5py.Dataset):
             fault = "is not a dataset"
@@ -170,19 +170,9 @@ class Hdf5Reader(RunReader):
             self.opened_members[name] = dataset
         return dataset
 
-    def _layout(self) -> _Members:
-        """What is sampled together; it is looked for once where the file is kept open."""
-        try:
-            state = self.path.stat()
-        except OSError as error:
-            raise self.refuse("", "the file is not there", "Check the path") from error
-        signature = (state.st_size, state.st_mtime_ns)
-        if signature not in self.cached_layout:
-            with self._group() as group:
-                layout = self._arranged(group)
-            self.cached_layout.clear()
-            self.cached_layout[signature] = layout
-        return self.cached_layout[signature]
+    def _read_layout(self) -> _Members:
+        with self._group() as group:
+            return self._arranged(group)
 
     def _arranged(self, group: Any) -> _Members:
         """What is sampled together: by time datasets, stated rates, and the length that most channels have."""
@@ -202,9 +192,11 @@ class Hdf5Reader(RunReader):
             empty = self.problem("error", "", fault, "Store one dataset per channel")
             raise RigDataError(problems[:_LISTED] or empty)
         stated = self._checked_rate(group.attrs)
-        names = [name for name in self.channels if name in lengths]
-        clocks = [i for i, name in enumerate(names) if self.channels[name].quantity == "time"]
         run_rate = stated or self.stated_rate
+        names = [name for name in self.channels if name in lengths]
+        if run_rate is None:  # else nobody needs times that are not described
+            names += [name for name in lengths if name not in self.channels]
+        clocks = time_columns(names, self.channels)
         timed = {}
         for clock in [names[i] for i in clocks]:
             time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
@@ -216,13 +208,16 @@ class Hdf5Reader(RunReader):
                 same = [clock for clock in (names[i], *timed) if lengths[clock] == lengths[name]]
                 timings[name] = timed[same[0]] if same else Grid(lengths[name], times=lengths[names[i]])
         remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
-        layout = self._planned(timings, run_rate, "dataset", remedy)
+        grids, faults = self._planned(timings, run_rate, "dataset", remedy)
         unserved = Grid(max(lengths.values()), "", run_rate or np.nan)
-        return _Members(layout.grids or (unserved,), layout.faults, members, largest)
+        return _Members(grids or (unserved,), faults, members, largest)
 
     def _seconds(self, group: Any, clock: str, start: int, stop: int) -> FloatArray:
-        """Some times of a time dataset [s]."""
-        return self.channels[clock].to_si(self._samples(group, clock, start, stop))
+        """Some times of a time dataset [s]; one that is not described tells its unit itself."""
+        values = self._samples(group, clock, start, stop)
+        if clock in self.channels:
+            return self.channels[clock].to_si(values)
+        return seconds(Series(clock, self._unit(group, clock), values))
 
     def _checked_rate(self, attributes: Any) -> float | None:
         if _RATE not in attributes:
@@ -276,10 +271,13 @@ class Hdf5Reader(RunReader):
         with self._group() as group:
             for name in filter(self._layout().members.__contains__, self.channels):
                 with suppress(RigDataError):  # raised when that channel is asked for
-                    attributes = self._dataset(group, name).attrs
-                    stated = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]
-                    units[name] = str(_text(attributes[stated[0]]) or "") if stated else ""
+                    units[name] = self._unit(group, name)
         return units
+
+    def _unit(self, group: Any, name: str) -> str:
+        attributes = self._dataset(group, name).attrs
+        stated = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]
+        return str(_text(attributes[stated[0]]) or "") if stated else ""
 
 
 def _text(value: Any) -> object:

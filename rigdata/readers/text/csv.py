@@ -37,12 +37,10 @@ def read_text(record: RecordFile) -> Contents:
     clocks = [i for i in time_columns(names, channels) if i not in head.dates]
     if len(clocks) == 1 and record.stated_rate is not None:  # nobody needs one that is not described
         clocks = [i for i in clocks if names[i] in channels]
-    used = {name for name, channel in channels.items() if channel.quantity != "ignore"}
-    if channels and not used.intersection(names):
+    used = {name for name, channel in channels.items() if channel.quantity != "ignore"} if channels else {*names}
+    if not used.intersection(names):
         raise record.refuse("", "holds none of the channels that are used", "Check the channels' names")
-    places = [i for i, name in enumerate(names) if name in used or i in clocks]
-    if not channels:
-        places = [i for i in range(len(names)) if i not in head.dates]
+    places = [i for i, name in enumerate(names) if i in clocks or (name in used and i not in head.dates)]
     columns, problems = read_table(head, places)
     length = len(columns[places[0]])
     timing = clocks if {*serving(names, clocks, channels)} == {*clocks} else places
@@ -239,7 +237,6 @@ def _is_cut_inside_last_cell(head: Head) -> bool:
     for line in [line for line in tail.decode(head.encoding, "replace").splitlines() if line.strip()][-6:]:
         cells = split_line(line, head.delimiter)
         _, mark, digits = cells[-1].partition(head.decimal)
-        if len(cells) == len(head.names):
-            decimals.append(len(digits) if mark else -1)
+        decimals.append(len(digits) if mark else -1)
     *usual, last = decimals or [0]
     return len(usual) >= 2 and len(set(usual)) == 1 and last < usual[0]

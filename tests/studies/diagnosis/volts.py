@@ -31,7 +31,7 @@ from model.pivots import pivot_laws
 from model.setup import Setup
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Instruments, Noise, RigPlan, RigTruth, VirtualRig, write_campaign
-from rigdata.virtual_rig.plan import ClearanceSweep, DryTest
+from rigdata.virtual_rig.truth import ClearanceSweep, DryTest
 from tests.studies.diagnosis.bench import Bench, Drawn, hidden, said
 from tests.studies.diagnosis.strangers import KINDS, draw, stranger
 from tests.studies.diagnosis.tables import tables

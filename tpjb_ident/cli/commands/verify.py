@@ -92,8 +92,8 @@ def files_of(results: Path, name: str, entry: Mapping[str, Any], given: Sequence
 
 def _state(folders: Iterable[Path], name: str, recorded_hash: str) -> str:
     """Compare the files of this name; one that is the same is enough, since two inputs may share a name."""
+    from rigdata.campaign import inside
     from rigdata.problem import RigDataError
-    from rigdata.safe_path import inside
 
     state = "missing"
     for folder in folders:
