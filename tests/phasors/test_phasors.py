@@ -10,7 +10,7 @@ from tests.seeds import seeds
 from tpjb_ident.phasors import line_fit, run_phasors
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import LineSettings, known_lines
-from tpjb_ident.phasors.run_data import PhasorSettings, oil_force
+from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.phasors.windows import (
     RecordTooShortError,
     WindowSettings,
@@ -120,13 +120,6 @@ def test_a_record_too_short_is_refused_with_the_length_it_takes():
     assert length / RATE >= needed * 0.999
     with pytest.raises(RecordTooShortError, match="cannot tell the lines apart"):
         plan_windows(60_000, RATE, close, WindowSettings(length=0.3))
-
-
-def test_inertia_is_added_to_the_cell_force():
-    f = oil_force(np.array([[100.0 + 0j, 0.0]]), np.array([[-0.5 + 0j, 2.0]]), 30.0)
-    np.testing.assert_allclose(f, [[85.0, 60.0]])
-    with pytest.raises(ValueError, match="housing mass"):
-        oil_force(np.zeros((1, 2), complex), np.zeros((1, 2), complex), float("nan"))
 
 
 def test_gaps_at_other_places_in_every_channel_need_no_robust_fit(monkeypatch):

@@ -48,9 +48,7 @@ def classic_line(spectra: Sequence[RunSpectra], groups: Sequence[IntArray], ends
     coherence = np.clip(1 - (freedom + 2) * np.diag(noise).real / size[2:] ** 2, 0.0, 1.0)
     covariance = complex_to_real_covariance(np.asarray(np.kron(noise, inverse.conj())))
     h = {"h1": h1, "h2": h2, "hv": signal[2:] @ np.linalg.inv(signal[:2])}
-    return ClassicLine(
-        {name: np.asarray(value, complex) for name, value in h.items()}, covariance, 2.0 * freedom, coherence, n
-    )
+    return ClassicLine(h, covariance, 2.0 * freedom, coherence, n)
 
 
 def _rows(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[ComplexArray, int]:

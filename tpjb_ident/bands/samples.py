@@ -20,6 +20,7 @@ from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.bad_samples import BAD_LIMIT, robust_deviation
 from tpjb_ident.phasors.channel_times import device_readers
+from tpjb_ident.phasors.lines import HIGHEST
 from tpjb_ident.phasors.run_data import QUANTITIES
 
 #: Share of a channel's samples that may be missing in stretches, bridged by straight lines,
@@ -121,7 +122,7 @@ def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, Floa
     recorded: list[tuple[Channel, FloatArray, FloatArray]] = []
     begins, places = [], np.arange(float(n))
     for reader in readers:
-        if not reader.shows(np.array(highest)):
+        if highest >= HIGHEST * reader.rate:
             text = f"the band reaches {highest:g} Hz, more than 0.45 of the sample rate of {reader.rate:g} Hz"
             raise refuse(run.file, "excitation_band", text, "Sample faster, or excite lower frequencies", run.id)
         is_alike = reader.length == readers[0].length and abs(reader.rate / readers[0].rate - 1) <= _ALIKE

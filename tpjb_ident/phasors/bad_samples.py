@@ -36,12 +36,7 @@ def white_noise(values: FloatArray) -> float:
 
 def usual_scale(scale: FloatArray) -> FloatArray:
     """Median over the windows with a scale (n_windows, q); infinite where none has."""
-    usual = np.full(scale.shape[1], np.inf)
-    for k, column in enumerate(scale.T):
-        finite_values = column[np.isfinite(column)]
-        if len(finite_values):
-            usual[k] = np.median(finite_values)
-    return usual
+    return np.asarray(np.ma.filled(np.ma.median(np.ma.masked_invalid(scale), axis=0), np.inf))
 
 
 def is_present(values: FloatArray) -> BoolArray:

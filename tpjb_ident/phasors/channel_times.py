@@ -49,10 +49,6 @@ class DeviceReader:
             return np.ceil(start * self.rate - 1e-6).astype(int)
         return np.searchsorted(self.stamps, start - 1e-6 / self.rate)
 
-    def shows(self, frequencies: FloatArray) -> np.ndarray:
-        """Which frequencies [Hz] its rate can show, (n,)."""
-        return np.asarray(frequencies < 0.45 * self.rate)
-
 
 def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
     """Devices of a run that have channels with a direction, or a command if asked; that of the first probe first."""

@@ -189,17 +189,12 @@ def compensated(
         gains[:, k] = np.exp(-2j * np.pi * frequencies * delays.get(channel.quantity, 0.0))
         if channel.response:
             gain = channel.response.at(frequencies)
-            gains[:, k] *= _reached(gain, frequencies, len(result.lines.excitation), run, channel.name)
+            unknown = ~np.isfinite(gain) | (np.abs(gain) <= 1e-6)
+            if unknown[: len(result.lines.excitation)].any():
+                text = f"its response at the excitation of {frequencies[unknown][0]:g} Hz is not known"
+                cure = "Extend filter_table, or check filter"
+                raise refuse(run.file, f"channel {channel.name}", f"{text}, or nothing comes through", cure, run.id)
+            gains[:, k] *= np.where(unknown, 1.0, gain)  # 1 at disturbing lines that a table does not reach
         if channel.name in slower:
             gains[:, k] *= slower[channel.name].at(frequencies)
-    return result if np.all(gains == 1.0) else result.divided(gains)
-
-
-def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Run, name: str) -> ComplexArray:
-    """The gain, 1 at disturbing lines that a table does not reach."""
-    valid = np.isfinite(gain) & (np.abs(gain) > 1e-6)
-    if not valid[:driven].all():
-        text = f"its response at the excitation of {frequencies[~valid][0]:g} Hz is not known, or nothing comes through"
-        cure = "Extend filter_table, or check filter"
-        raise refuse(run.file, f"channel {name}", text, cure, run.id)
-    return np.where(valid, gain, 1.0)
+    return result.divided(gains)

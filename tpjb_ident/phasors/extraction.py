@@ -10,7 +10,7 @@ from rigdata.run import Run
 from tpjb_ident.phasors.bad_samples import SCALE_LIMIT, usual_scale
 from tpjb_ident.phasors.channel_times import DeviceReader, device_readers
 from tpjb_ident.phasors.line_fit import LineFitter, WindowFit
-from tpjb_ident.phasors.lines import LineSet
+from tpjb_ident.phasors.lines import HIGHEST, LineSet
 from tpjb_ident.phasors.run_data import QUANTITIES, PhasorSettings, RunPhasors
 from tpjb_ident.phasors.shaft import ShaftCourse
 from tpjb_ident.phasors.windows import plan_windows
@@ -44,7 +44,7 @@ def extract(
             if k and (reader.rate, reader.length) != (readers[0].rate, readers[0].length):
                 firsts, length = reader.first_samples(start), int(seconds * reader.rate + 1e-6)
             fast = (clocks or {}).get(reader.device.name, 0.0)
-            device = _DeviceFit(reader, length, firsts, lines.faster(fast), speeds)
+            device = _DeviceFit(reader, length, firsts, lines.at_speed(lines.speed, fast), speeds)
             device.fit_all()
             if fast:  # phases count by the lines' common frequencies
                 ahead = np.multiply.outer(device.start + 0.5 * seconds, fast * lines.frequencies)
@@ -74,7 +74,7 @@ class _DeviceFit:
 
     def __init__(self, reader: DeviceReader, length: int, firsts: IntArray, lines: LineSet, speeds: FloatArray) -> None:
         self.reader, self.length, self.firsts, self.lines, self.speeds = reader, length, firsts, lines, speeds
-        self.shown = reader.shows(lines.frequencies)
+        self.shown = lines.frequencies < HIGHEST * reader.rate
         if not self.shown[: len(lines.excitation)].all() or length <= 2 * (2 * self.shown.sum() + 2):
             names, run = ", ".join(c.name for c in reader.channels), reader.run
             fault = f"{reader.rate:g} samples per second cannot show the excitation in windows of {length} samples"

@@ -43,8 +43,7 @@ def unexpected_lines(
             smallest = MIN_SHARE * float(np.nanmedian(sizes))
             for record in records:
                 columns = [k for k, place in enumerate(record.places) if place in places]
-                if columns:
-                    frequencies += _peaks(record, columns, np.append(listed_lines, frequencies), smallest)
+                frequencies += _peaks(record, columns, np.append(listed_lines, frequencies), smallest)
     top = REACH * max(result.lines.driven)
     lobe = _LOBE / records[0].duration
     frequencies = [f for f in frequencies if f < top and np.abs(images - f).min(initial=np.inf) > lobe]

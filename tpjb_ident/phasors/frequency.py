@@ -27,6 +27,7 @@ MAX_RETUNED = 0.005
 MAX_CLOCK_SLIP = 5e-4
 #: Phase [cycles] by which the shaft may run ahead or behind within one window.
 MAX_WINDOW_SLIP = 0.005
+_ALL = slice(None)
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Tuning:
     lines: LineSet
     follow: ShaftCourse | None
     conditions: tuple[Condition, ...]
-    settled: bool = True  #: whether the windows told the shaft's course: a drive far off its set point hides it
+    settled: bool  #: whether the windows told the shaft's course: a drive far off its set point hides it
 
 
 def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
@@ -83,10 +84,9 @@ def phase_advance(phasors: ComplexArray, start: FloatArray, noise: float) -> _Ad
     return _Advance(windows, turns / spacing, noise / size / (2 * np.pi * float(np.median(spacing))))
 
 
-def _line_advance(result: RunPhasors, line: int, rate: float, places: list[int] | None = None) -> _Advance | None:
+def _line_advance(result: RunPhasors, line: int, rate: float, places: list[int] | slice) -> _Advance | None:
     """Advance of a line in some channels together, each weighted by its power over its noise."""
-    chosen = list(range(len(result.channels))) if places is None else places
-    z, noise = result.z[:, line, chosen], usual_scale(result.scale[:, chosen]) / np.sqrt(result.length * rate)
+    z, noise = result.z[:, line, places], usual_scale(result.scale[:, places]) / np.sqrt(result.length * rate)
     present = np.isfinite(z).any(axis=0) & np.isfinite(noise)
     if not present.any():
         return None
@@ -96,7 +96,7 @@ def _line_advance(result: RunPhasors, line: int, rate: float, places: list[int] 
     return phase_advance(weighted, result.start, 1.0)
 
 
-def _line_slip(result: RunPhasors, line: int | None, rate: float, places: list[int] | None = None) -> float:
+def _line_slip(result: RunPhasors, line: int | None, rate: float, places: list[int] | slice = _ALL) -> float:
     """Frequency error of a line by some channels together [Hz]."""
     advance = None if line is None else _line_advance(result, line, rate, places)
     return 0.0 if advance is None else advance.slip

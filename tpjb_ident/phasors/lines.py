@@ -81,22 +81,14 @@ class LineSet:
         """Lines of the whole record: those of the windows, then the faint ones."""
         return self.excitation + self.nuisance + self.faint
 
-    def faster(self, rate: float) -> LineSet:
-        """The same lines by a clock that lets them turn faster, relative."""
-        return self._moved(rate, 0.0)
-
-    def at_speed(self, speed: float) -> LineSet:
-        """The same lines with 1X, 2X.. at another shaft speed [Hz]."""
-        return replace(self._moved(0.0, speed - self.speed), speed=speed)
-
-    def _moved(self, rate: float, turning: float) -> LineSet:
-        """The same lines, faster by a relative rate and with the shaft [Hz]."""
+    def at_speed(self, speed: float, rate: float = 0.0) -> LineSet:
+        """The same lines with 1X, 2X.. at another shaft speed [Hz]; all by a clock that runs faster by `rate`."""
         groups = []
         for lines in (self.excitation, self.nuisance, self.faint):
-            moved = [line.frequency * (1 + rate) + line.order * turning for line in lines]
+            moved = [line.frequency * (1 + rate) + line.order * (speed - self.speed) for line in lines]
             groups.append(tuple(replace(line, frequency=f) for line, f in zip(lines, moved)))
         excitation, nuisance, faint = groups
-        return replace(self, excitation=excitation, nuisance=nuisance, faint=faint)
+        return replace(self, excitation=excitation, nuisance=nuisance, faint=faint, speed=speed)
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,8 @@ _APART = 1.0
 
 def mains_frequency(campaign: Campaign, usual: float) -> float:
     """Frequency of the mains [Hz]."""
-    nominal = getattr(campaign, "mains", None)
-    if nominal is not None:
-        return float(nominal)
+    if campaign.mains is not None:
+        return campaign.mains
     driven = np.array([run.point.excitation_hz for run in campaign.of_kind("dynamic")])
     coincident = [c for c in MAINS_FREQUENCIES if (np.abs(driven - c) < _NEAR).any()]
     if not coincident or usual not in MAINS_FREQUENCIES:

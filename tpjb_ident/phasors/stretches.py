@@ -39,11 +39,10 @@ def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
     cuts = sorted(_cuts(groups, 0, len(good)))
     level = np.sqrt(np.mean(np.abs(windows) ** 2, axis=(1, 2)))
     idle = (level < _DEVIATIONS) | (level < _QUIET * np.quantile(level, 0.9))
-    if not cuts and not (idle.any() and np.median(level) > _DEVIATIONS):
+    is_steady = not cuts and not (idle.any() and np.median(level) > _DEVIATIONS)
+    if is_steady or idle.all():
         return result
     inside = _longest(windows.reshape(len(good), -1), np.array([0, *cuts, len(good)]), idle)
-    if not inside.any():
-        return result
     outside = np.ones(len(result.start), dtype=bool)
     outside[good[inside]] = False
     outside &= np.isfinite(result.z).any(axis=(1, 2))
@@ -85,8 +84,6 @@ def _longest(windows: ComplexArray, edges: IntArray, idle: BoolArray) -> BoolArr
         part[first:stop] = ~idle[first:stop]
         if part.sum() > inside.sum():
             inside = part
-    if not inside.any():
-        return inside
     places = np.flatnonzero(inside)
     middle = complex_median(windows[places])
     distance: FloatArray = np.linalg.norm(windows - middle, axis=1)

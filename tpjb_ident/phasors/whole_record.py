@@ -16,7 +16,7 @@ from tpjb_ident.phasors.bad_samples import white_noise
 from tpjb_ident.phasors.channel_times import Samples, device_readers
 from tpjb_ident.phasors.frequency import exact_frequencies
 from tpjb_ident.phasors.line_fit import LineFitter
-from tpjb_ident.phasors.lines import LineSet
+from tpjb_ident.phasors.lines import HIGHEST, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Noise of a line is looked at in the bins so far from it [1 / record length],
@@ -91,7 +91,7 @@ def fitted_whole(
     samples: Samples, rate: float, lines: LineSet, frequencies: FloatArray, places: list[int]
 ) -> WholeRecord:
     """Fit all samples of a device in one; times that stray from an even grid are taken for even."""
-    shown = frequencies < 0.45 * rate
+    shown = frequencies < HIGHEST * rate
     fitter = LineFitter(samples.rows.shape[1], rate, frequencies[shown], _DRIFT_ORDER)
     time = samples.time
     start = 0.0 if time is None or not np.isfinite(time[0]) else float(time[0])

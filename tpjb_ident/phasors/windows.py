@@ -81,7 +81,7 @@ def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> fl
     start = settings.min_cycles / min(lines.driven)
     length = start
     # A dozen beats between neighbours separate any two lines; what is not resolved then never is.
-    longest = max(start, 12.0 / _gap(lines)) if np.isfinite(_gap(lines)) else 2 * start
+    longest = max(start, 12.0 / _gap(lines))
     while length <= longest:
         if variance_inflation(frequencies, n_driven, length, rate) <= settings.max_inflation:
             return length
