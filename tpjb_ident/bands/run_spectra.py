@@ -39,7 +39,7 @@ OPEN_ENDS = ("multisine", "random", "sweep")
 
 def is_broadband(run: Run) -> bool:
     """Whether a run is excited over a band, not by a sine."""
-    return getattr(run, "excitation_kind", "sine") != "sine"
+    return run.excitation_kind != "sine"
 
 
 @dataclass(frozen=True)

@@ -83,16 +83,14 @@ class Samples:
         return replace(self, rate=rate or self.rate, rows=change(self.rows), command=command)
 
 
-def read_samples(
-    run: Run, seconds: float | None = None, fast: Mapping[str, float] | None = None, highest: float = 0.0
-) -> Samples:
-    """Read a run from its beginning.
+def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: float) -> Samples:
+    """Read the first `seconds` of a run.
 
     `fast`: channels by whose clock time runs faster than the first's, relative; `highest`: frequency [Hz] that every
     device must show.
     """
     rate = run.sample_rate
-    n = run.length if seconds is None else min(run.length, round(seconds * rate))
+    n = min(run.length, round(seconds * rate))
     recorded = _on_first_grid(run, n, highest)
     inside = np.all([_has_neighbours(values, at) for _, values, at in recorded], axis=0)
     channels, rows, lost, command = [], [], 0.0, np.zeros((2, n))
@@ -109,7 +107,7 @@ def read_samples(
         if _lost(values) > _MAX_LOST and is_spare(channel, [c for c, _, _ in recorded]):
             continue
         channels.append(channel)
-        rows.append(_at(_bridged(run, channel, values), at * (1 + (fast or {}).get(channel.name, 0.0))))
+        rows.append(_at(_bridged(run, channel, values), at * (1 + fast.get(channel.name, 0.0))))
         lost = max(lost, float((~np.isfinite(values)).mean()))
     bridged = holding((lost > _TOLD_LOST, "samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"))
     driven = command[:, inside] if command.any() else None

@@ -38,13 +38,14 @@ def extract(
     middles = np.asarray((np.arange(count) + 0.5) * length / run.sample_rate, dtype=float)
     speeds = np.full(count, np.nan) if follow is None else follow.at(middles)
     fit = WindowFit.empty(count, len(lines.frequencies), len(channels))
-    firsts, start = length * np.arange(count), np.empty(0)
+    start = np.empty(0)
     with run.opened():
         for k, reader in enumerate(readers):
+            firsts, samples = length * np.arange(count), length
             if k and (reader.rate, reader.length) != (readers[0].rate, readers[0].length):
-                firsts, length = reader.first_samples(start), int(seconds * reader.rate + 1e-6)
+                firsts, samples = reader.first_samples(start), int(seconds * reader.rate + 1e-6)
             fast = (clocks or {}).get(reader.device.name, 0.0)
-            device = _DeviceFit(reader, length, firsts, lines.at_speed(lines.speed, fast), speeds)
+            device = _DeviceFit(reader, samples, firsts, lines.at_speed(lines.speed, fast), speeds)
             device.fit_all()
             if fast:  # phases count by the lines' common frequencies
                 ahead = np.multiply.outer(device.start + 0.5 * seconds, fast * lines.frequencies)

@@ -73,14 +73,10 @@ def _peaks(record: WholeRecord, columns: list[int], lines: FloatArray, smallest:
     """Frequencies [Hz] of lines above `smallest` in some channels: faint ones fitted, and peaks of the residual."""
     amplitude = np.linalg.norm(hann_amplitude(record.spectrum[:, columns]), axis=1)
     step = 1 / record.duration
-    frequency = np.arange(len(amplitude)) * step
     least = np.maximum(_PROMINENCE * noise_floor(amplitude), smallest)
-    candidate = amplitude > least
-    candidate[frequency < _LOBE * step] = False
-    for f in lines:
-        candidate[np.abs(frequency - f) < _LOBE * step] = False
-    tops = [i for i in find_peaks(amplitude)[0] if candidate[i]]
-    peaks = [float(frequency[i] + step * vertex(amplitude[i - 1 : i + 2])) for i in tops]
+    tops = find_peaks(amplitude, height=least)[0]
+    tops = tops[np.abs(tops[:, None] * step - [0.0, *lines]).min(axis=1) >= _LOBE * step]
+    peaks = [float(i * step + step * vertex(amplitude[i - 1 : i + 2])) for i in tops]
     faint = record.lines.faint
     sizes = np.linalg.norm(record.z[len(record.z) - len(faint) :, columns], axis=1)
     at = np.minimum(np.round([line.frequency * record.duration for line in faint]).astype(int), len(least) - 1)

@@ -27,8 +27,8 @@ _NAMED = tuple(f"{n}X" for n in range(1, NAMED_HARMONICS + 1))
 _EXACT = 1e-6
 #: Lines closer than this are one [1 / record length].
 ONE_LINE = 0.6
-#: Harmonics of the shaft and of the drive that are looked at in the whole record.
-_FAINT_SHAFT, _FAINT_DRIVE = 4, 3
+#: Harmonics of the shaft that are looked at in the whole record.
+_FAINT_SHAFT = 4
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,6 @@ class LineSettings:
 
     mains: float = 50.0
     shaft_harmonics: int = 2
-    drive_harmonics: int = 2
     mains_harmonics: int = 1
 
 
@@ -151,28 +150,20 @@ def _shaft_lines(speed: float, first: int, last: int) -> list[Line]:
     return [Line(f"{n}X", n * speed, n * SPEED_DRIFT, n) for n in orders]
 
 
-def _drive_lines(driven: tuple[Line, ...], first: int, last: int) -> list[Line]:
-    lines = []
-    for line in driven:
-        lines += [Line(f"harmonic {n}", n * line.frequency, _EXACT) for n in range(first, last + 1)]
-    return lines
-
-
 def strong_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
     """What turns with the shaft, the mains, what the actuator makes of the drive."""
     orders = range(1, settings.mains_harmonics + 1) if settings.mains > 0 else ()
     mains = [Line("mains" if n == 1 else f"mains {n}", n * settings.mains, MAINS_DRIFT) for n in orders]
     shaft = _shaft_lines(speed, 1, settings.shaft_harmonics)
-    return shaft + mains + _drive_lines(driven, 2, settings.drive_harmonics)
+    return shaft + mains + [Line("harmonic 2", 2 * line.frequency, _EXACT) for line in driven]
 
 
 def _faint_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
     """Further harmonics, and what a film that is not linear makes of the shaft's and the drive's motion."""
     faint = _shaft_lines(speed, settings.shaft_harmonics + 1, _FAINT_SHAFT)
     for e in driven:
-        faint += _drive_lines((e,), settings.drive_harmonics + 1, _FAINT_DRIVE)
         twice, half = 2 * speed - e.frequency, 2 * e.frequency - speed
-        if speed > 0:
-            faint.append(Line("2X-f", abs(twice), _EXACT, 2 * np.sign(twice)))
-            faint.append(Line("2f-X", abs(half), _EXACT, -np.sign(half)))
+        faint.append(Line("harmonic 3", 3 * e.frequency, _EXACT))
+        faint.append(Line("2X-f", abs(twice), _EXACT, 2 * np.sign(twice)))
+        faint.append(Line("2f-X", abs(half), _EXACT, -np.sign(half)))
     return faint

@@ -132,7 +132,7 @@ def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[C
     common = _common_ratio(measured) if len(measured) else complex(1.0)
     if without_static_part(measured):
         common = 0j
-    if not len(measured) or not 0.5 < abs(common.real) < 2.0:  # such cells correct nothing, but are told
+    if not 0.5 < abs(common.real) < 2.0:  # such cells correct nothing, but are told
         return [np.zeros(len(ratio), complex) for ratio in ratios], common
     return [np.nan_to_num(ratio / common - 1.0) for ratio in ratios], common
 
