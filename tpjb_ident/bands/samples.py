@@ -157,12 +157,13 @@ def _is_own(values: FloatArray, at: FloatArray) -> bool:
 
 def _refuse_unlike(run: Run, name: str, rate: float, highest: float) -> None:
     """Refuse a device of its own rate that is too slow for the kernel; blows hold what folds back into the band."""
+    need, cure = "", "Sample faster, or excite lower frequencies"
     if run.excitation_kind == "impact":
-        text = f"is sampled at {rate:.6g} Hz, the first one at {run.sample_rate:.6g} Hz; blows need one rate"
-        raise refuse(run.file, f"device of channel {name}", text, "Record all at one rate", run.id)
-    if highest >= _REACH * rate:
-        text = f"is sampled at {rate:.6g} Hz; a band up to {highest:g} Hz needs {highest / _REACH:.4g} Hz"
-        raise refuse(run.file, f"device of channel {name}", text, "Sample faster, or excite lower frequencies", run.id)
+        need, cure = f"the first one at {run.sample_rate:.6g} Hz; blows need one rate", "Record all at one rate"
+    elif highest >= _REACH * rate:
+        need = f"a band up to {highest:g} Hz needs {highest / _REACH:.4g} Hz"
+    if need:
+        raise refuse(run.file, f"device of channel {name}", f"is sampled at {rate:.6g} Hz, {need}", cure, run.id)
 
 
 def _rounding(time: FloatArray) -> float:

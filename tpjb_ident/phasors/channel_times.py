@@ -1,7 +1,6 @@
 """The channels of a run by the devices that recorded them, read stretch by stretch at each device's own times."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -35,19 +34,12 @@ class DeviceReader:
         time, rows = self.run.read_device(self.device, [c.name for c in self.channels], start, stop)
         return Samples(rows, time)
 
-    @cached_property
-    def stamps(self) -> FloatArray | None:
-        """Times of all samples [s]; None where they are counted."""
-        if self.device.counted:
-            return None
-        parts = [self.read(k, min(k + 2**17, self.length)).time for k in range(0, self.length, 2**17)]
-        return np.concatenate([part for part in parts if part is not None])
-
     def first_samples(self, start: FloatArray) -> IntArray:
         """First sample at or after each of some times (n,) [s]."""
-        if self.stamps is None:
+        if self.device.counted:
             return np.ceil(start * self.rate - 1e-6).astype(int)
-        return np.searchsorted(self.stamps, start - 1e-6 / self.rate)
+        time, _ = self.run.read_device(self.device, [self.channels[0].name], 0, self.length)
+        return np.searchsorted(np.asarray(time), start - 1e-6 / self.rate)
 
 
 def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:

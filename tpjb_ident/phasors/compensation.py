@@ -17,7 +17,7 @@ from scipy.signal import find_peaks
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import refuse
 from rigdata.run import Run
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.channel_times import device_readers
 from tpjb_ident.phasors.found_lines import vertex
 from tpjb_ident.phasors.lines import SPEED_DRIFT
@@ -66,7 +66,7 @@ class SlowerChannel:
         ratio = self.export_rate / self.rate
         even = abs(ratio - round(ratio)) < _EVEN * ratio
         small = np.sin(np.pi * f / self.export_rate) * round(ratio) if even else np.pi * f / self.rate
-        gain = np.where(f > 0, np.sin(np.pi * f / self.rate) / np.where(f > 0, small, 1.0), 1.0)
+        gain = np.sin(np.pi * f / self.rate) / small
         if self.order == 2:
             return np.asarray(gain**2, dtype=complex)
         late = 0.5 / self.rate - (0.5 / self.export_rate if even else 0.0)
@@ -106,7 +106,7 @@ def slower_channel(values: FloatArray, export_rate: float, speed: float = 0.0) -
     size, agreement, chance = np.abs(spectrum), *_pair_agreement(spectrum)
     peaks = find_peaks(agreement)[0]
     # the shaft's own motion makes such sums of any other
-    step, orders = export_rate / n, np.array([1.0, 2.0]) * (speed > 0)
+    step, orders = export_rate / n, np.array([1.0, 2.0])
     near_shaft = np.abs(peaks[:, None] * step - orders * speed) < orders * (SPEED_DRIFT + 2 * step)
     peaks = peaks[~near_shaft.any(axis=1)]
     for k in peaks[chance[peaks] > _CLEAR].tolist():
@@ -170,10 +170,8 @@ def _filling_order(size: FloatArray, k: int) -> int | None:
 
 def slower_condition(slower: Mapping[str, SlowerChannel]) -> tuple[Condition, ...]:
     """What to say of channels that were filled up."""
-    if not slower:
-        return ()
     rates = ", ".join(f"{name} {_ORDERS[s.order]} from {s.rate:.4g} Hz" for name, s in slower.items())
-    return (Condition("slower-channels", f"{rates}; what that does to a sine was taken out"),)
+    return holding((slower, "slower-channels", f"{rates}; what that does to a sine was taken out"))
 
 
 def compensated(

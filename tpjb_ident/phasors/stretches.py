@@ -28,9 +28,9 @@ def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
     """The run with the windows of its longest stretch alone; those of others give no phasor."""
     driven = len(result.lines.excitation)
     noise = phasor_noise(result, rate)
-    live = np.isfinite(noise) & np.array([c.quantity != "acceleration" for c in result.channels])
-    z = result.z[:, :driven, live] / noise[live]
-    quantity = np.array([c.quantity for c, is_live in zip(result.channels, live) if is_live])
+    quantity = np.array([c.quantity for c in result.channels])
+    live = np.isfinite(noise) & (quantity != "acceleration")
+    z, quantity = result.z[:, :driven, live] / noise[live], quantity[live]
     good = np.flatnonzero(np.isfinite(z).all(axis=(1, 2)))
     if len(good) < _LEAST or len(set(quantity)) < 2:
         return result
@@ -43,12 +43,10 @@ def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
     if is_steady or idle.all():
         return result
     inside = _longest(windows.reshape(len(good), -1), np.array([0, *cuts, len(good)]), idle)
-    outside = np.ones(len(result.start), dtype=bool)
-    outside[good[inside]] = False
-    outside &= np.isfinite(result.z).any(axis=(1, 2))
-    first, last = good[inside][[0, -1]]
-    span = float(result.start[first]), float(result.start[last] + result.length)
-    return replace(result, z=np.where(outside[:, None, None], np.nan, result.z), span=span)
+    repeats = good[inside]
+    z = np.full_like(result.z, np.nan)
+    z[repeats] = result.z[repeats]
+    return replace(result, z=z, span=(float(result.start[repeats[0]]), float(result.start[repeats[-1]] + result.length)))
 
 
 def _cuts(groups: list[ComplexArray], first: int, stop: int) -> list[int]:
