@@ -123,11 +123,9 @@ def run_spectra(
         samples = read_samples(run, seconds, fast, band[1])
         temperatures = mean_temperatures(run)
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.lines.mains, band[1])
-    driven, period = _period(run, samples, band, lines)
-    length, cut, width = samples.length, samples, LEFT_OUT
-    if period is not None:
-        length, cut, width = round(period), resampled(driven, period, band[1]), LEFT_OUT_OF_PERIOD
-    clean = without_disturbances(cut, lines, None if period is None else length)
+    cut, period = _period(run, samples, band, lines)
+    length, width = (cut.length, LEFT_OUT) if period is None else (period, LEFT_OUT_OF_PERIOD)
+    clean = without_disturbances(cut, lines, period)
     places, motion = _places(clean.rate, length, band), _motion(clean)
 
     def transformed(record: Samples, places: IntArray) -> tuple[RunPhasors, ComplexArray | None]:
@@ -180,8 +178,8 @@ def _motion(samples: Samples) -> tuple[float, float, float]:
 
 def _period(
     run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Line, ...]
-) -> tuple[Samples, float | None]:
-    """The driven part of a record, and the period [samples] with which it repeats itself; None where it does not."""
+) -> tuple[Samples, int | None]:
+    """The driven whole periods of a record, and their samples; all of it and None where it does not repeat itself."""
     if run.excitation_kind not in OPEN_ENDS:
         return samples, None
     is_stated = run.excitation_kind == "multisine"
@@ -189,11 +187,13 @@ def _period(
     part = driven_part(clean, band)
     clean, driven = (record.mapped(lambda rows: rows[:, part]) for record in (clean, samples))
     period = find_period(clean, band, lines, 1.0 if is_stated else _LEFT)
-    if period is None and is_stated:
+    if period is not None:
+        return resampled(driven, period, band[1]), round(period)
+    if is_stated:
         text = "a multi-sine, but no period is found that the record holds three times"
         cure = 'Record longer; or state excitation = "random" if it does not repeat'
         raise refuse(run.file, "excitation", text, cure, run.id)
-    return driven, period
+    return samples, None
 
 
 def _places(rate: float, length: int, band: tuple[float, float]) -> IntArray:

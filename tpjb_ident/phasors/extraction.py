@@ -47,11 +47,13 @@ def extract(
             fast = (clocks or {}).get(reader.device.name, 0.0)
             device = _DeviceFit(reader, samples, firsts, lines.at_speed(lines.speed, fast), speeds)
             device.fit_all()
-            if fast:  # phases count by the lines' common frequencies
-                ahead = np.multiply.outer(device.start + 0.5 * seconds, fast * lines.frequencies)
-                device.windows.z[:] *= np.exp(2j * np.pi * ahead)[:, :, None]
-            names = [c.name for c in reader.channels]
-            fit.put(np.arange(count), device.windows, channels=[c.name in names for c, _ in channels])
+            # phases count by the lines' common frequencies
+            ahead = np.multiply.outer(device.start + 0.5 * seconds, fast * lines.frequencies[device.shown])
+            z, *figures = device.windows
+            chosen = [c in reader.channels for c, _ in channels]
+            fit.z[np.ix_(np.arange(count), device.shown, chosen)] = z * np.exp(2j * np.pi * ahead)[:, :, None]
+            for table, part in zip(fit[1:], figures):
+                table[:, chosen] = part
             start = start if k else device.start
     return RunPhasors(
         run.id,
@@ -61,10 +63,7 @@ def extract(
         start,
         seconds,
         tuple(channel for channel, _ in channels),
-        fit.z,
-        fit.mean,
-        fit.scale,
-        fit.lost,
+        *fit,
         housing_mass,
         device=tuple(name for _, name in channels),
     )
@@ -81,7 +80,7 @@ class _DeviceFit:
             fault = f"{reader.rate:g} samples per second cannot show the excitation in windows of {length} samples"
             raise refuse(run.file, f"channels {names}", fault, "Sample them faster, or record longer", run.id)
         self.fitter = LineFitter(length, reader.rate, lines.frequencies[self.shown])
-        self.windows = WindowFit.empty(len(firsts), len(self.shown), len(reader.channels))
+        self.windows = WindowFit.empty(len(firsts), int(self.shown.sum()), len(reader.channels))
         self.start = np.full(len(firsts), np.nan)
 
     def fit_all(self) -> None:
@@ -117,8 +116,8 @@ class _DeviceFit:
             if timed.sum() > 2 * self.fitter.design.shape[1]:
                 fitter = self._fitter(self.speeds[first + i], time[i, timed] if uneven[i] else None)
                 origin = time[i, timed][:1] if uneven[i] else start[i : i + 1]
-                fit.put(np.array([i]), fitter.fit(rows[:, i : i + 1, timed], origin, usual))
-        self.windows.put(np.arange(first, stop), fit, lines=self.shown)
+                fit.put(slice(i, i + 1), fitter.fit(rows[:, i : i + 1, timed], origin, usual))
+        self.windows.put(slice(first, stop), fit)
         self.start[first:stop] = start
 
     def _is_uneven(self, time: FloatArray) -> BoolArray:
