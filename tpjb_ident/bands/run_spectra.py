@@ -20,8 +20,7 @@ from tpjb_ident.bands.disturbing_lines import (
 )
 from tpjb_ident.bands.period import driven_part, find_period, resampled
 from tpjb_ident.bands.samples import Samples, read_samples
-from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition
+from tpjb_ident.phasors.compensation import compensated, filled_channels
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.runs.point_data import mean_temperatures
@@ -130,13 +129,14 @@ def run_spectra(
 
     def transformed(record: Samples, places: IntArray) -> tuple[RunPhasors, ComplexArray | None]:
         phasors = _phasors(run, record, _bins(record.rows, length, places), places, samples.rows.mean(axis=1))
+        phasors = replace(phasors, housing_mass=housing_mass, conditions=samples.conditions)
         command = None if record.command is None else _bins(record.command, length, places)
-        return compensated(replace(phasors, housing_mass=housing_mass), run, slower, settings.delays), command
+        return compensated(phasors, run, slower, settings.delays), command
 
     def spectra_of(places: IntArray) -> RunSpectra:
         phasors, command = transformed(clean, places)
         return RunSpectra(
-            replace(phasors, conditions=merged(samples.conditions, slower_condition(slower))),
+            phasors,
             command,
             bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
             lines,

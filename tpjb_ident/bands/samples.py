@@ -124,22 +124,22 @@ def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, Floa
             text = f"the band reaches {highest:g} Hz, more than 0.45 of the sample rate of {reader.rate:g} Hz"
             raise refuse(run.file, "excitation_band", text, "Sample faster, or excite lower frequencies", run.id)
         is_alike = reader.length == readers[0].length and abs(reader.rate / readers[0].rate - 1) <= _ALIKE
-        part = reader.read(0, n if is_alike else reader.length)
-        begins.append(_begin(run, part.time, reader.rate))
+        time, rows = reader.read(0, n if is_alike else reader.length)
+        begins.append(_begin(run, time, reader.rate))
         if not is_alike:
             _refuse_unlike(run, reader.channels[0].name, reader.rate, highest)
         at = places if is_alike else (places / run.sample_rate + begins[0] - begins[-1]) * reader.rate
-        recorded += [(channel, values, at) for channel, values in zip(reader.channels, part.rows)]
+        recorded += [(channel, values, at) for channel, values in zip(reader.channels, rows)]
     return sorted(recorded, key=lambda record: (*QUANTITIES, "command").index(record[0].quantity))
 
 
 def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
     """Time of a device's first sample [s], by all of its stamps; refused where these have gaps."""
-    if time is None or not np.isfinite(time).any():
+    if time is None or np.isfinite(time).sum() < 3:
         return 0.0
     place = np.flatnonzero(np.isfinite(time))
     off = time[place] * rate - place
-    drift = np.polyval(np.polyfit(place, off, 1), place) if len(place) > 2 else off
+    drift = np.polyval(np.polyfit(place, off, 1), place)
     if np.abs(off - drift).max() > _MAX_JITTER + 0.6 * rate * _rounding(time[place]):
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
         raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)

@@ -12,14 +12,6 @@ from tpjb_ident.phasors.run_data import QUANTITIES
 
 
 @dataclass(frozen=True)
-class Samples:
-    """Consecutive samples of a device."""
-
-    rows: FloatArray  #: (n_channels, n), SI; NaN where there is no value
-    time: FloatArray | None  #: (n,), s; None where times are counted from the rate
-
-
-@dataclass(frozen=True)
 class DeviceReader:
     """Channels of one device: one rate, one row of times."""
 
@@ -29,10 +21,9 @@ class DeviceReader:
     rate: float
     length: int
 
-    def read(self, start: int, stop: int) -> Samples:
-        """Samples start..stop-1."""
-        time, rows = self.run.read_device(self.device, [c.name for c in self.channels], start, stop)
-        return Samples(rows, time)
+    def read(self, start: int, stop: int) -> tuple[FloatArray | None, FloatArray]:
+        """Times (n,) of samples start..stop-1 [s], None where they are counted from the rate; rows (n_channels, n)."""
+        return self.run.read_device(self.device, [c.name for c in self.channels], start, stop)
 
     def first_samples(self, start: FloatArray) -> IntArray:
         """First sample at or after each of some times (n,) [s]."""
@@ -44,26 +35,22 @@ class DeviceReader:
 
 def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
     """Devices of a run that have channels with a direction, or a command if asked; that of the first probe first."""
-    _check_directions(run)
-    directed = {c.name: c for q in QUANTITIES for c in run.channels.values() if c.quantity == q and c.axis is not None}
+    directed = []
+    for quantity in QUANTITIES:
+        if quantity != "acceleration" or run.of(quantity):
+            directed += run.vector_channels(quantity)
     if command:
-        directed |= {c.name: c for c in run.channels.values() if c.quantity == "command"}
-    devices = run.devices
-    for name in directed.keys() - {name for device in devices for name in device.channels}:
-        run.record(name, 0, 0)  # says that the file lacks it
+        directed += run.of("command")
+    recorded = {name for device in run.devices for name in device.channels}
+    for channel in directed:
+        if channel.name not in recorded:
+            run.record(channel.name, 0, 0)  # says that the file lacks it
     readers = []
-    for device in devices:
-        channels = tuple(c for name, c in directed.items() if name in device.channels)
+    for device in run.devices:
+        channels = tuple(c for c in directed if c.name in device.channels)
         rate = device.rate if np.isfinite(device.rate) else run.sample_rate
         # of a run that ends early all devices do
         length = min(device.length, int(np.ceil(run.length / run.sample_rate * rate)))
         if channels:
             readers.append(DeviceReader(run, device, channels, rate, length))
     return tuple(readers)
-
-
-def _check_directions(run: Run) -> None:
-    """Refuse a run whose channels of a quantity do not span the plane."""
-    for quantity in QUANTITIES:
-        if quantity != "acceleration" or run.of(quantity):
-            run.vector_channels(quantity)

@@ -9,7 +9,7 @@ linear makes of the shaft's own motion stands at X - f and 2X - f, and is no ima
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -17,7 +17,7 @@ from scipy.signal import find_peaks
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import refuse
 from rigdata.run import Run
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import holding, merged
 from tpjb_ident.phasors.channel_times import device_readers
 from tpjb_ident.phasors.found_lines import vertex
 from tpjb_ident.phasors.lines import SPEED_DRIFT
@@ -84,7 +84,7 @@ def filled_channels(run: Run) -> dict[str, SlowerChannel]:
     slower: dict[str, SlowerChannel] = {}
     for reader in device_readers(run):
         power = np.clip(np.log2(_LOOK * reader.rate) + 1, _LEAST_POWER, _MOST_POWER)
-        rows = reader.read(0, min(reader.length, 2 ** int(power) - 2)).rows
+        _, rows = reader.read(0, min(reader.length, 2 ** int(power) - 2))
         for channel, values in zip(reader.channels, rows):
             filling = slower_channel(values, reader.rate, run.point.shaft_speed_hz)
             if filling is not None:
@@ -168,12 +168,6 @@ def _filling_order(size: FloatArray, k: int) -> int | None:
     return order if abs(shown - order) < _AGREE * order else None
 
 
-def slower_condition(slower: Mapping[str, SlowerChannel]) -> tuple[Condition, ...]:
-    """What to say of channels that were filled up."""
-    rates = ", ".join(f"{name} {_ORDERS[s.order]} from {s.rate:.4g} Hz" for name, s in slower.items())
-    return holding((slower, "slower-channels", f"{rates}; what that does to a sine was taken out"))
-
-
 def compensated(
     result: RunPhasors, run: Run, slower: Mapping[str, SlowerChannel], delays: Mapping[str, float]
 ) -> RunPhasors:
@@ -195,4 +189,6 @@ def compensated(
             gains[:, k] *= np.where(unknown, 1.0, gain)  # 1 at disturbing lines that a table does not reach
         if channel.name in slower:
             gains[:, k] *= slower[channel.name].at(frequencies)
-    return result.divided(gains)
+    rates = ", ".join(f"{name} {_ORDERS[s.order]} from {s.rate:.4g} Hz" for name, s in slower.items())
+    filled = holding((slower, "slower-channels", f"{rates}; what that does to a sine was taken out"))
+    return replace(result.divided(gains), conditions=merged(result.conditions, filled))

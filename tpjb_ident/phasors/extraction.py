@@ -101,22 +101,21 @@ class _DeviceFit:
     def _fit(self, first: int, stop: int, usual: FloatArray | None = None) -> None:
         """Read and fit windows first..stop-1; `usual` (n_channels,) is the scale that windows of the run have."""
         begin = self.firsts[first]
-        samples = self.reader.read(begin, self.firsts[stop - 1] + self.length)
+        time, rows = self.reader.read(begin, self.firsts[stop - 1] + self.length)
+        if time is None:
+            time = np.arange(begin, begin + rows.shape[1]) / self.reader.rate
         at = (self.firsts[first:stop] - begin)[:, None] + np.arange(self.length)
-        rows = samples.rows[:, at]
-        start, uneven = self.firsts[first:stop] / self.reader.rate, np.zeros(stop - first, dtype=bool)
-        if samples.time is not None:
-            time = samples.time[at]
-            start = np.where(np.isfinite(time[:, 0]), time[:, 0], start)
-            uneven = self._is_uneven(time)
+        time, rows = time[at], rows[:, at]
+        start = np.where(np.isfinite(time[:, 0]), time[:, 0], self.firsts[first:stop] / self.reader.rate)
         fit = self.fitter.fit(rows, start, usual)
         usual = usual_scale(fit.scale) if usual is None else usual
-        for i in np.flatnonzero(uneven | np.isfinite(self.speeds[first:stop])).tolist():
-            timed = np.isfinite(time[i]) if uneven[i] else np.ones(self.length, dtype=bool)
+        speeds = self.speeds[first:stop]
+        for i in np.flatnonzero(self._is_uneven(time) | np.isfinite(speeds)).tolist():
+            timed = np.isfinite(time[i])
             if timed.sum() > 2 * self.fitter.design.shape[1]:
-                fitter = self._fitter(self.speeds[first + i], time[i, timed] if uneven[i] else None)
-                origin = time[i, timed][:1] if uneven[i] else start[i : i + 1]
-                fit.put(slice(i, i + 1), fitter.fit(rows[:, i : i + 1, timed], origin, usual))
+                lines = self.lines.at_speed(speeds[i]) if np.isfinite(speeds[i]) else self.lines
+                fitter = LineFitter(timed.sum(), self.reader.rate, lines.frequencies[self.shown], time=time[i, timed])
+                fit.put(slice(i, i + 1), fitter.fit(rows[:, i : i + 1, timed], time[i, timed][:1], usual))
         self.windows.put(slice(first, stop), fit)
         self.start[first:stop] = start
 
@@ -124,9 +123,3 @@ class _DeviceFit:
         """Windows (n,) whose time stamps (n, length) stray from an even grid."""
         grid = time[:, :1] + np.arange(self.length) / self.reader.rate
         return ~(np.abs(time - grid).max(axis=1) <= MAX_JITTER / self.reader.rate)
-
-    def _fitter(self, speed: float, time: FloatArray | None) -> LineFitter:
-        """Fit of one window with a shaft speed [Hz] or times (length,) [s] of its own."""
-        lines = self.lines.at_speed(speed) if np.isfinite(speed) else self.lines
-        length = self.length if time is None else len(time)
-        return LineFitter(length, self.reader.rate, lines.frequencies[self.shown], time=time)

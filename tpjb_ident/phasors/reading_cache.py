@@ -24,9 +24,9 @@ SHORT = 2**17
 class _ReadingCache:
     """A run's reader that keeps the first samples of all channels."""
 
-    def __init__(self, reader: Any, channels: Sequence[str]) -> None:
+    def __init__(self, reader: Any, channels: Sequence[str], samples: int = SHORT) -> None:
         self._reader, self._channels = reader, channels
-        self.samples = min(SHORT, reader.length())
+        self.samples = min(samples, reader.length())
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._reader, name)

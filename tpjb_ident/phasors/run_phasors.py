@@ -14,7 +14,7 @@ import numpy as np
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition
+from tpjb_ident.phasors.compensation import compensated, filled_channels
 from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.found_lines import lines_beside, near_line, unexpected_lines
 from tpjb_ident.phasors.frequency import DRIFT, device_rates, retuned, tuned
@@ -45,7 +45,7 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
     device = tuple(
         f"{slower[c.name].rate:.4g} Hz" if c.name in slower else d for c, d in zip(result.channels, result.device)
     )
-    conditions = merged(fit.conditions, result.lines.conditions, slower_condition(slower))
+    conditions = merged(fit.conditions, result.lines.conditions)
     return compensated(replace(result, conditions=conditions, device=device), run, slower, settings.delays)
 
 

@@ -4,7 +4,6 @@ Windows of another excitation, of none, or across the change say nothing of the 
 has. A change of the drive shows in forces and displacements alike; what shows in one of them is a fault of channels.
 """
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -46,7 +45,8 @@ def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
     repeats = good[inside]
     z = np.full_like(result.z, np.nan)
     z[repeats] = result.z[repeats]
-    return replace(result, z=z, span=(float(result.start[repeats[0]]), float(result.start[repeats[-1]] + result.length)))
+    first, last = result.start[repeats[[0, -1]]].tolist()
+    return replace(result, z=z, span=(first, last + result.length))
 
 
 def _cuts(groups: list[ComplexArray], first: int, stop: int) -> list[int]:
@@ -55,15 +55,15 @@ def _cuts(groups: list[ComplexArray], first: int, stop: int) -> list[int]:
         return []
     parts = [group[first:stop] for group in groups]
     joined = np.concatenate(parts, axis=1)
-    total = _scatter(joined)
     places = range(_LEAST, stop - first - _LEAST + 1)
     remainders = [_scatter(joined[:k]) + _scatter(joined[k:]) for k in places]
     best = places[int(np.argmin(remainders))]
-    levels = [(part[:best].mean(axis=0), part[best:].mean(axis=0)) for part in parts]
-    largest = [max(np.linalg.norm(before), np.linalg.norm(after)) for before, after in levels]
-    changes = [np.linalg.norm(after - before) for before, after in levels]
-    if min(remainders) > _LEFT * total or any(change < _CHANGE * size for change, size in zip(changes, largest)):
+    if min(remainders) > _LEFT * _scatter(joined):
         return []
+    for part in parts:
+        before, after = part[:best].mean(axis=0), part[best:].mean(axis=0)
+        if np.linalg.norm(after - before) < _CHANGE * max(np.linalg.norm(before), np.linalg.norm(after)):
+            return []
     cut = first + best
     return [*_cuts(groups, first, cut), cut, *_cuts(groups, cut, stop)]
 
@@ -76,12 +76,8 @@ def _scatter(windows: ComplexArray) -> float:
 
 def _longest(windows: ComplexArray, edges: IntArray, idle: BoolArray) -> BoolArray:
     """Windows (n,) of the longest driven stretch that do not lie across a change; `windows` (n, m)."""
-    inside = np.zeros(len(windows), dtype=bool)
-    for first, stop in itertools.pairwise(edges):
-        part = np.zeros(len(windows), dtype=bool)
-        part[first:stop] = ~idle[first:stop]
-        if part.sum() > inside.sum():
-            inside = part
+    stretch = np.repeat(np.arange(len(edges) - 1), np.diff(edges))
+    inside = ~idle & (stretch == np.bincount(stretch[~idle]).argmax())
     places = np.flatnonzero(inside)
     middle = complex_median(windows[places])
     distance: FloatArray = np.linalg.norm(windows - middle, axis=1)
