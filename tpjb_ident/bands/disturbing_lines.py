@@ -32,10 +32,9 @@ LEFT_OUT_OF_PERIOD = 0.6
 def find_disturbances(samples: Samples, speed: float, mains: float, top: float) -> tuple[Line, ...]:
     """Shaft harmonics and mains up to above the band, at the frequencies at which the record shows them."""
     reach = min(HIGHEST * samples.rate, 1.5 * top)
-    shaft = _shown(samples, speed, SPEED_DRIFT) if speed > 0 else 0.0
+    shaft = _shown(samples, speed, SPEED_DRIFT) if samples.length / samples.rate * speed > 2 else 0.0
     supply = _shown(samples, mains, MAINS_DRIFT) if mains > 0 else 0.0
-    harmonics = _SHAFT_HARMONICS if samples.length / samples.rate * speed > 2 else 0
-    settings = LineSettings(supply, harmonics, mains_harmonics=_MAINS_HARMONICS)
+    settings = LineSettings(supply, _SHAFT_HARMONICS, _MAINS_HARMONICS)
     resolved: list[Line] = []
     for line in strong_lines((), shaft, settings):
         is_resolved = all(abs(line.frequency - near.frequency) > samples.rate / samples.length for near in resolved)

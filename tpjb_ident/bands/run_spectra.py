@@ -135,15 +135,10 @@ def run_spectra(
 
     def spectra_of(places: IntArray) -> RunSpectra:
         phasors, command = transformed(clean, places)
-        return RunSpectra(
-            phasors,
-            command,
-            bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
-            lines,
-            None if period is None else length / clean.rate,
-            temperatures,
-            *motion,
-        )
+        seconds = length / clean.rate
+        disturbed = bins_taken(phasors.lines.frequencies, lines, seconds, width)
+        repeat = None if period is None else seconds
+        return RunSpectra(phasors, command, disturbed, lines, repeat, temperatures, *motion)
 
     spectra = spectra_of(places)
     if period is not None:

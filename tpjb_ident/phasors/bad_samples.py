@@ -49,10 +49,7 @@ def with_flanks(outlying: BoolArray) -> BoolArray:
     """Bad samples: isolated ones by themselves, disturbances with their flanks; `outlying` (n,)."""
     bad = np.array(outlying)
     at = np.flatnonzero(outlying)
-    if len(at) < _MANY:
-        return bad
-    groups = np.split(at, np.flatnonzero(np.diff(at) > 2) + 1)
-    for group in groups:
+    for group in np.split(at, np.flatnonzero(np.diff(at) > 2) + 1):
         if len(group) >= _MANY:
             bad[max(group[0] - _MARGIN, 0) : group[-1] + _MARGIN + 1] = True
     return bad

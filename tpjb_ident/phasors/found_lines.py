@@ -113,7 +113,7 @@ def near_line(result: RunPhasors, driven: int, duration: float, rate: float) -> 
     live = np.isfinite(noise)
     z = result.z[:, driven, live] / noise[live]
     good = np.isfinite(z).all(axis=1)
-    if good.sum() < _LEAST or not live.any():
+    if good.sum() < _LEAST:
         return None
     windows, time = z[good], (result.start[good] + 0.5 * result.length) / duration
     count, channels = windows.shape

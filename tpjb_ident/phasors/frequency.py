@@ -88,8 +88,6 @@ def _line_advance(result: RunPhasors, line: int, rate: float, places: list[int] 
     """Advance of a line in some channels together, each weighted by its power over its noise."""
     z, noise = result.z[:, line, places], usual_scale(result.scale[:, places]) / np.sqrt(result.length * rate)
     present = np.isfinite(z).any(axis=0) & np.isfinite(noise)
-    if not present.any():
-        return None
     # a channel without noise must not stand for all
     least = 1e-9 * np.nanmax(np.abs(z[:, present]), axis=0)
     weighted = z[:, present] / np.maximum(noise[present], least + np.finfo(float).tiny)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.calibration import Channel
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.vector import directions, plane_vector
 from tpjb_ident.conditions import Condition
@@ -16,7 +16,7 @@ from tpjb_ident.phasors.bad_samples import usual_scale
 from tpjb_ident.phasors.lines import LineSet, LineSettings
 from tpjb_ident.phasors.windows import WindowSettings
 
-QUANTITIES = ("displacement", "force", "acceleration")
+QUANTITIES = VECTOR_QUANTITIES
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from rigdata.vector import directions
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.bad_samples import robust_deviation
 
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
@@ -89,7 +89,7 @@ def refused_runs(problems: Sequence[Problem]) -> tuple[Condition, ...]:
     """A condition that names the runs which were left out, with the first reason of each; none where all are used."""
     reasons = {str(problem.run): problem.what for problem in reversed(problems)}
     listed = "; ".join(f"{run} ({reasons[run]})" for run in sorted(reasons))
-    return (Condition("runs-refused", listed),) if reasons else ()
+    return holding((reasons, "runs-refused", listed))
 
 
 def piece_means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:

@@ -75,7 +75,7 @@ def gather(runs: list[RunPhasors], digests: Sequence[RunDigest] = ()) -> list[Po
     points = []
     for point, members in group([(run.point, run.lines.driven) for run in runs]):
         data = point_data(point, [(runs[k], i) for k, i in members])
-        points.append(replace(data, digests=tuple(digests[k] for k, _ in members) if digests else ()))
+        points.append(replace(data, digests=tuple(digests[k] for k, _ in members if digests)))
     return points
 
 
