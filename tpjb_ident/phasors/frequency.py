@@ -11,9 +11,9 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
-from tpjb_ident.phasors.bad_samples import robust_deviation, usual_scale
+from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.lines import LineSet, known_lines
-from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors, phasor_noise
 from tpjb_ident.phasors.shaft import ShaftCourse
 
 #: Name of the condition that a shaft's changing speed gives rise to.
@@ -86,12 +86,11 @@ def phase_advance(phasors: ComplexArray, start: FloatArray, noise: float) -> _Ad
 
 def _line_advance(result: RunPhasors, line: int, rate: float, places: list[int] | slice) -> _Advance | None:
     """Advance of a line in some channels together, each weighted by its power over its noise."""
-    z, noise = result.z[:, line, places], usual_scale(result.scale[:, places]) / np.sqrt(result.length * rate)
+    z, noise = result.z[:, line, places], 0.5 * phasor_noise(result, rate)[places]
     present = np.isfinite(z).any(axis=0) & np.isfinite(noise)
     # a channel without noise must not stand for all
     least = 1e-9 * np.nanmax(np.abs(z[:, present]), axis=0)
-    weighted = z[:, present] / np.maximum(noise[present], least + np.finfo(float).tiny)
-    return phase_advance(weighted, result.start, 1.0)
+    return phase_advance(z[:, present] / np.maximum(noise[present], least), result.start, 1.0)
 
 
 def _line_slip(result: RunPhasors, line: int | None, rate: float, places: list[int] | slice = _ALL) -> float:
@@ -169,9 +168,8 @@ def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, flo
     line = result.lines.place("1X")
     if line is None:
         return None
-    noise = float(np.median(usual_scale(result.scale[:, result.pick("displacement")])))
-    z = result.displacement.phasors[:, line]
-    advance = phase_advance(z, result.start, noise / np.sqrt(result.length * rate))
+    noise = 0.5 * float(np.median(phasor_noise(result, rate)[result.pick("displacement")]))
+    advance = phase_advance(result.displacement.phasors[:, line], result.start, noise)
     if advance is None:
         return None
     speeds = np.full(len(result.start), np.nan)
