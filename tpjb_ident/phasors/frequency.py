@@ -10,7 +10,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from rigdata.run import Run
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.lines import LineSet, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors, phasor_noise
@@ -106,21 +106,19 @@ def tuned(
     rate, span = run.sample_rate, result.start[-1] - result.start[0] + result.length
     slips = np.array([_line_slip(result, i, rate) for i in range(len(result.lines.excitation))])
     slips[np.abs(slips) * span <= MAX_SLIP] = 0.0
-    exact = tuple(frequency + slip for frequency, slip in zip(result.lines.driven, slips.tolist()))
+    exact = tuple((np.array(result.lines.driven) + slips).tolist())
     settled = bool(np.all(np.abs(slips) * result.length <= MAX_RETUNED))
     turning, follow = _line_slip(result, result.lines.place("1X"), rate), _drifting(result, rate) if settled else None
     if not slips.any() and follow is None and abs(turning) * span <= 5 * MAX_SLIP:
         return None
-    conditions = []
-    if slips.any():
-        shown, stated = ", ".join(f"{f:.5g}" for f in exact), ", ".join(f"{f:g}" for f in driven)
-        text = f"excitation found at {shown} Hz, set point {stated} Hz; the found one was used for the fit"
-        conditions.append(Condition("excitation off set point", text))
+    shown, stated = ", ".join(f"{f:.5g}" for f in exact), ", ".join(f"{f:g}" for f in driven)
+    text = f"excitation found at {shown} Hz, set point {stated} Hz; the found one was used for the fit"
+    conditions = holding((slips.any(), "excitation off set point", text))
     if follow is not None:
         low, high = follow.speed.min(), follow.speed.max()
-        conditions.append(Condition(DRIFT, f"shaft speed between {low:.4g} and {high:.4g} Hz; followed by window"))
+        conditions += (Condition(DRIFT, f"shaft speed between {low:.4g} and {high:.4g} Hz; followed by window"),)
     lines = known_lines(exact, speed + turning, rate, settings.lines, result.lines.found, run.length / rate)
-    return Tuning(lines, follow, tuple(conditions), settled)
+    return Tuning(lines, follow, conditions, settled)
 
 
 def device_rates(result: RunPhasors, rate: float) -> dict[str, float]:
