@@ -70,13 +70,13 @@ class _RunFit:
     def __init__(self, run: Run, housing_mass: float, settings: PhasorSettings) -> None:
         self.run, self.mass, self.settings = run, housing_mass, settings
         self.driven = settings.excitation_lines or (run.point.excitation_hz,)
-        speed, self.conditions = shaft_speed(run)
-        self._fit(self._lines(self.driven, speed, ()), None)
+        self.speed, self.conditions = shaft_speed(run)
+        self._fit(self._lines(self.driven, ()))
         self.slower = filled_channels(run)
-        self._add_unexpected(speed)
-        self._add_near(speed)
+        self._add_unexpected()
+        self._add_near()
         for _ in range(_TUNINGS):
-            better = tuned(run, self.result, self.driven, speed, settings)
+            better = tuned(run, self.result, self.driven, self.speed, settings)
             if better is None:
                 break
             self.conditions += better.conditions
@@ -92,7 +92,7 @@ class _RunFit:
         """Fit all of a long run with the lines of its beginning."""
         first, share = self.result, np.sqrt(self.run.length / run.length)
         self.run = run
-        self._fit_windows(first.lines, None)
+        self._fit_windows(first.lines)
         self.conditions = tuple(c for c in self.conditions if c != DRIFT)
         better = tuned(run, self.result, self.driven, first.lines.speed, self.settings)
         if better is not None:
@@ -106,33 +106,33 @@ class _RunFit:
         residual = tuple(share * bins for bins in first.residual)
         self.result = replace(self.result, record=first.record, residual=residual, rounding=first.rounding)
 
-    def _lines(self, excitation: tuple[float, ...], speed: float, extra: tuple[float, ...]) -> LineSet:
+    def _lines(self, excitation: tuple[float, ...], extra: tuple[float, ...]) -> LineSet:
         run, rate = self.run, self.run.sample_rate
         if not max(excitation) < HIGHEST * rate:
             fault = f"{rate:g} samples per second cannot show an excitation of {max(excitation):g} Hz"
             cure = "Check sample_rate, the unit of the time column (ms called s?) and excitation_frequency"
             raise refuse(run.file, "time", fault, cure, run.id)
-        return known_lines(excitation, speed, rate, self.settings.lines, extra, run.length / rate)
+        return known_lines(excitation, self.speed, rate, self.settings.lines, extra, run.length / rate)
 
-    def _fit(self, lines: LineSet, follow: ShaftCourse | None) -> None:
+    def _fit(self, lines: LineSet, follow: ShaftCourse | None = None) -> None:
         self._fit_windows(lines, follow)
         self.records = whole_records(self.run, self.result)
 
-    def _fit_windows(self, lines: LineSet, follow: ShaftCourse | None) -> None:
+    def _fit_windows(self, lines: LineSet, follow: ShaftCourse | None = None) -> None:
         """Windows of the run's longest stretch of one excitation."""
         self.follow = follow
         windows = extract(self.run, self.mass, self.settings, lines, follow, self.clocks)
         self.result = longest_stretch(windows, self.run.sample_rate)
 
-    def _add_unexpected(self, speed: float) -> None:
+    def _add_unexpected(self) -> None:
         """Fit lines along that stand out of the residual, but for the images of what was filled up."""
         images = [slow.images(self.result.lines.frequencies) for slow in self.slower.values()]
         extra, conditions = unexpected_lines(self.records, self.result, np.ravel(images))
         if extra:
             self.conditions += conditions
-            self._fit(self._lines(self.driven, speed, extra), None)
+            self._fit(self._lines(self.driven, extra))
 
-    def _add_near(self, speed: float) -> None:
+    def _add_near(self) -> None:
         """Fit lines along that no window tells from the excitation: their beat looks like a drive off its set point."""
         lines, exact, neighbours = self.result.lines, list(self.result.lines.driven), []
         for i in range(len(exact)):
@@ -141,7 +141,7 @@ class _RunFit:
                 exact[i] = pair[0]
                 neighbours.append(pair[1])
         if neighbours:
-            self._fit(self._lines(tuple(exact), speed, (*lines.found, *neighbours)), None)
+            self._fit(self._lines(tuple(exact), (*lines.found, *neighbours)))
             self.conditions += (lines_beside(tuple(neighbours)),)
 
 
