@@ -36,7 +36,10 @@ def white_noise(values: FloatArray) -> float:
 
 def usual_scale(scale: FloatArray) -> FloatArray:
     """Median over the windows with a scale (n_windows, q); infinite where none has."""
-    return np.asarray(np.ma.filled(np.ma.median(np.ma.masked_invalid(scale), axis=0), np.inf))
+    present = np.isfinite(scale)
+    ranked = np.sort(np.where(present, scale, np.inf), axis=0)
+    count, column = present.sum(axis=0), np.arange(scale.shape[1])
+    return np.asarray(0.5 * (ranked[(count - 1) // 2, column] + ranked[count // 2, column]))
 
 
 def is_present(values: FloatArray) -> BoolArray:
