@@ -108,8 +108,9 @@ class _RunFit:
 
     def _lines(self, excitation: tuple[float, ...], extra: tuple[float, ...]) -> LineSet:
         run, rate = self.run, self.run.sample_rate
-        if not max(excitation) < HIGHEST * rate:
-            fault = f"{rate:g} samples per second cannot show an excitation of {max(excitation):g} Hz"
+        beyond = [f for f in excitation if not 0.0 < f < HIGHEST * rate]
+        if beyond:
+            fault = f"{rate:g} samples per second cannot show an excitation of {beyond[0]:g} Hz"
             cure = "Check sample_rate, the unit of the time column (ms called s?) and excitation_frequency"
             raise refuse(run.file, "time", fault, cure, run.id)
         return known_lines(excitation, self.speed, rate, self.settings.lines, extra, run.length / rate)
