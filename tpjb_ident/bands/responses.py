@@ -145,7 +145,7 @@ def pooled_noise(responses: list[LineResponse]) -> tuple[list[ComplexArray], Flo
     """Noise of a row at every group of one run with its neighbours (m, m), and its degrees of freedom (n,)."""
     residual = np.array([r.residual for r in responses])
     freedom = np.array([r.freedom for r in responses])
-    reach = int(np.ceil(0.5 * _FREEDOM / max(float(freedom.mean()), 1e-9))) if len(freedom) else 0
+    reach = int(np.ceil(0.5 * _FREEDOM / max(float(freedom.mean()), 1e-9)))
     noises, totals = [], []
     for k in range(len(freedom)):
         near = slice(max(k - reach, 0), k + reach + 1)
