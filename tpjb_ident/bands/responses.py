@@ -72,10 +72,10 @@ def nuisance(runs: Sequence[RunSpectra], bins: IntArray, sources: ComplexArray, 
     """
     place = runs[0].frequencies[bins] - runs[0].frequencies[bins].mean()
     place /= max(float(np.abs(place).max()), 1e-300)
-    columns = [np.tile(place, len(runs))[:, None] * sources]
-    if ends:
-        columns.append(np.kron(np.eye(len(runs)), np.vander(place, 2, increasing=True)))
-    return np.concatenate(columns, axis=1)
+    sloped = np.asarray(np.tile(place, len(runs))[:, None] * sources)
+    if not ends:
+        return sloped
+    return np.concatenate([sloped, np.kron(np.eye(len(runs)), np.vander(place, 2, increasing=True))], axis=1)
 
 
 def _sources(run: RunSpectra, instrument: str) -> tuple[ComplexArray, ComplexArray]:

@@ -50,7 +50,7 @@ def extract(
             # phases count by the lines' common frequencies
             ahead = np.multiply.outer(device.start + 0.5 * seconds, fast * lines.frequencies[device.shown])
             z, *figures = device.windows
-            chosen = [c in reader.channels for c, _ in channels]
+            chosen = np.array([c in reader.channels for c, _ in channels])
             fit.z[np.ix_(np.arange(count), device.shown, chosen)] = z * np.exp(2j * np.pi * ahead)[:, :, None]
             for table, part in zip(fit[1:], figures):
                 table[:, chosen] = part
@@ -114,8 +114,9 @@ class _DeviceFit:
             timed = np.isfinite(time[i])
             if timed.sum() > 2 * self.fitter.design.shape[1]:
                 lines = self.lines.at_speed(speeds[i]) if np.isfinite(speeds[i]) else self.lines
-                fitter = LineFitter(timed.sum(), self.reader.rate, lines.frequencies[self.shown], time=time[i, timed])
-                fit.put(slice(i, i + 1), fitter.fit(rows[:, i : i + 1, timed], time[i, timed][:1], usual))
+                times = time[i, timed]
+                fitter = LineFitter(len(times), self.reader.rate, lines.frequencies[self.shown], time=times)
+                fit.put(slice(i, i + 1), fitter.fit(rows[:, i : i + 1, timed], times[:1], usual))
         self.windows.put(slice(first, stop), fit)
         self.start[first:stop] = start
 

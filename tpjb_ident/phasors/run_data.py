@@ -92,7 +92,9 @@ class RunPhasors:
     def _vector(self, quantity: str) -> PhasorBlock:
         places = self.pick(quantity)
         lost = self.lost[:, places].max(axis=1, initial=0.0)
-        return PhasorBlock(self.plane(quantity, self.z), self.plane(quantity, self.mean + 0j).real, lost)
+        return PhasorBlock(
+            self.plane(quantity, self.z), self.plane(quantity, np.asarray(self.mean, complex)).real, lost
+        )
 
     def divided(self, gains: ComplexArray) -> RunPhasors:
         """The run without gains of its channels at the whole record's lines, (n_whole_lines, n_channels)."""
