@@ -171,6 +171,8 @@ class LineFitter:
 
 def even_design(length: int, rate: float, frequencies: FloatArray, drift_order: int = 1) -> FloatArray:
     """The columns of `line_design` on an even grid: waves of one block, turned from block to block."""
+    if length < 2 * BLOCK:
+        return line_design(np.arange(length) / rate, frequencies, drift_order)
     tau, starts = np.arange(BLOCK) / rate, np.arange(0, length, BLOCK) / rate
     design = np.empty((length, 2 * len(frequencies) + drift_order + 1))
     for k, frequency in enumerate(frequencies):
