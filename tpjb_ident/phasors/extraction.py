@@ -109,13 +109,14 @@ class _DeviceFit:
         start = np.where(np.isfinite(time[:, 0]), time[:, 0], self.firsts[first:stop] / self.reader.rate)
         fit = self.fitter.fit(rows, start, usual)
         usual = usual_scale(fit.scale) if usual is None else usual
-        speeds = self.speeds[first:stop]
-        for i in np.flatnonzero(self._is_uneven(time) | np.isfinite(speeds)).tolist():
+        speeds, uneven = self.speeds[first:stop], self._is_uneven(time)
+        for i in np.flatnonzero(uneven | np.isfinite(speeds)).tolist():
             timed = np.isfinite(time[i])
             if timed.sum() > 2 * self.fitter.design.shape[1]:
                 lines = self.lines.at_speed(speeds[i]) if np.isfinite(speeds[i]) else self.lines
                 times = time[i, timed]
-                fitter = LineFitter(len(times), self.reader.rate, lines.frequencies[self.shown], time=times)
+                frequencies, stamps = lines.frequencies[self.shown], times if uneven[i] else None
+                fitter = LineFitter(len(times), self.reader.rate, frequencies, time=stamps)
                 fit.put(slice(i, i + 1), fitter.fit(rows[:, i : i + 1, timed], times[:1], usual))
         self.windows.put(slice(first, stop), fit)
         self.start[first:stop] = start
