@@ -161,6 +161,21 @@ def test_cells_at_a_rate_of_their_own_are_fitted_at_their_own_times(rate, stampe
     assert np.isfinite(result.record[0]).all()
 
 
+def test_a_third_device_of_the_firsts_rate_is_cut_as_the_first(monkeypatch):
+    times = np.arange(round(300.0 * SECONDS)) / 300.0
+    rng = np.random.default_rng(2)
+    data = {n: reading(n, times if n[0] == "F" else TIME, rng) for n in ALL}
+    reader = ApartReader(data, None, 300.0)
+    run = run_of(reader, channels(QUANTITIES))
+    two = run_phasors(run, 30.0)
+    first, second = reader.devices()
+    three = replace(first, channels=("DX", "DY")), second, replace(first, name="C", channels=("AX", "AY"))
+    monkeypatch.setattr(reader, "devices", lambda: three)
+    apart = run_phasors(run, 30.0)
+    assert apart.device == ("", "", "B", "B", "C", "C")
+    np.testing.assert_allclose(apart.z[:, 0], two.z[:, 0], rtol=1e-9)
+
+
 def test_a_device_that_ends_early_leaves_its_last_windows_empty():
     rng = np.random.default_rng(2)
     times = np.arange(round(300.0 * 3.0)) / 300.0

@@ -10,7 +10,7 @@ from tests.seeds import seeds
 from tpjb_ident.phasors import line_fit, run_phasors
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import LineSettings, known_lines
-from tpjb_ident.phasors.run_data import PhasorSettings, oil_force
+from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.phasors.windows import (
     RecordTooShortError,
     WindowSettings,
@@ -122,13 +122,6 @@ def test_a_record_too_short_is_refused_with_the_length_it_takes():
         plan_windows(60_000, RATE, close, WindowSettings(length=0.3))
 
 
-def test_inertia_is_added_to_the_cell_force():
-    f = oil_force(np.array([[100.0 + 0j, 0.0]]), np.array([[-0.5 + 0j, 2.0]]), 30.0)
-    np.testing.assert_allclose(f, [[85.0, 60.0]])
-    with pytest.raises(ValueError, match="housing mass"):
-        oil_force(np.zeros((1, 2), complex), np.zeros((1, 2), complex), float("nan"))
-
-
 def test_gaps_at_other_places_in_every_channel_need_no_robust_fit(monkeypatch):
     """The samples present are fitted by the normal equations less the missing ones: 20 times quicker, and exact."""
     rng = np.random.default_rng(8)
@@ -153,10 +146,22 @@ def test_gaps_at_other_places_in_every_channel_need_no_robust_fit(monkeypatch):
         assert not residual[k, i][~used].any()
 
 
+def fit_at(rate):
+    """A run's fit before its first step."""
+    fit = object.__new__(run_phasors._RunFit)
+    fit.run = SimpleNamespace(file="r1.csv", id="r1", sample_rate=rate, length=4000)
+    fit.settings, fit.speed = PhasorSettings(), 20.0
+    return fit
+
+
 def test_a_time_column_in_the_wrong_unit_is_named_with_file_and_cure():
     """Milliseconds called seconds make a record of one sample a second."""
-    run = SimpleNamespace(file="r1.csv", id="r1", sample_rate=1.0, length=4000)
-    fit = object.__new__(run_phasors._RunFit)
-    fit.run, fit.settings = run, PhasorSettings()
     with pytest.raises(RigDataError, match=r"r1.csv, time: 1 samples per second .* 35 Hz.*ms called s"):
-        fit._lines((35.0,), 20.0, ())
+        fit_at(1.0)._lines((35.0,), ())
+
+
+@pytest.mark.parametrize("frequencies", [(0.0,), (-5.0,), (450.0,), (600.0,), (25.0, 460.0)])
+def test_excitations_outside_the_band_are_refused(frequencies):
+    with pytest.raises(RigDataError, match=f"cannot show an excitation of {frequencies[-1]:g} Hz"):
+        fit_at(1000.0)._lines(frequencies, ())
+    assert fit_at(1000.0)._lines((449.0,), ()).driven == (449.0,)

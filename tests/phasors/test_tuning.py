@@ -8,7 +8,6 @@ import pytest
 
 from rigdata.operating_point import OperatingPoint
 from tests.phasors.phasor_cases import complex_normal, vector_channels
-from tpjb_ident.phasors.channel_times import Samples
 from tpjb_ident.phasors.found_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
 from tpjb_ident.phasors.frequency import (
     MAX_RETUNED,
@@ -215,7 +214,7 @@ def heard(force=(), displacement=(), noise=1e-4):
 def fitted(rows):
     """The record in one fit, and as a run of one window."""
     frequencies = np.array([line.frequency for line in LINES.whole])
-    record = fitted_whole(Samples(rows, None), RATE, LINES, frequencies, [0, 1, 2, 3])
+    record = fitted_whole(rows, 0.0, RATE, LINES, frequencies, [0, 1, 2, 3])
     windows = record.z[None, : len(LINES.frequencies)]
     return (record,), in_channels(windows, np.full((1, 4), 1e-3), np.zeros(1), N / RATE)
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.bands.responses import end_columns, orthogonal, place_in_line
+from tpjb_ident.bands.responses import nuisance, orthogonal
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimators.r_matrix import complex_to_real_covariance
 
@@ -48,9 +48,7 @@ def classic_line(spectra: Sequence[RunSpectra], groups: Sequence[IntArray], ends
     coherence = np.clip(1 - (freedom + 2) * np.diag(noise).real / size[2:] ** 2, 0.0, 1.0)
     covariance = complex_to_real_covariance(np.asarray(np.kron(noise, inverse.conj())))
     h = {"h1": h1, "h2": h2, "hv": signal[2:] @ np.linalg.inv(signal[:2])}
-    return ClassicLine(
-        {name: np.asarray(value, complex) for name, value in h.items()}, covariance, 2.0 * freedom, coherence, n
-    )
+    return ClassicLine(h, covariance, 2.0 * freedom, coherence, n)
 
 
 def _rows(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[ComplexArray, int]:
@@ -58,8 +56,5 @@ def _rows(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[Co
     rows = np.concatenate([np.concatenate([s.D[:, bins], s.F[:, bins]], axis=2).reshape(-1, 4) for s in spectra])
     if spectra[0].period is not None:
         return rows, 0
-    place = place_in_line(spectra[0].frequencies[bins])
-    sloped = rows[:, :2] * np.tile(place, len(spectra))[:, None]
-    leaked = end_columns(len(spectra), place)[:, : None if ends else 0]
-    basis = np.linalg.qr(np.concatenate([sloped, leaked], axis=1))[0]
+    basis = np.linalg.qr(nuisance(spectra, bins, rows[:, :2], ends))[0]
     return orthogonal(rows, basis), basis.shape[1]

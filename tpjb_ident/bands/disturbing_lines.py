@@ -13,7 +13,7 @@ from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.bands.samples import Samples
 from tpjb_ident.phasors.found_lines import vertex
 from tpjb_ident.phasors.line_fit import even_design
-from tpjb_ident.phasors.lines import MAINS_DRIFT, SPEED_DRIFT, Line, LineSettings, strong_lines
+from tpjb_ident.phasors.lines import HIGHEST, MAINS_DRIFT, SPEED_DRIFT, Line, LineSettings, strong_lines
 
 #: Highest harmonics of shaft and mains that are looked for.
 _SHAFT_HARMONICS, _MAINS_HARMONICS = 8, 5
@@ -31,11 +31,10 @@ LEFT_OUT_OF_PERIOD = 0.6
 
 def find_disturbances(samples: Samples, speed: float, mains: float, top: float) -> tuple[Line, ...]:
     """Shaft harmonics and mains up to above the band, at the frequencies at which the record shows them."""
-    reach = min(0.45 * samples.rate, 1.5 * top)
-    shaft = _shown(samples, speed, SPEED_DRIFT) if speed > 0 else 0.0
+    reach = min(HIGHEST * samples.rate, 1.5 * top)
+    shaft = _shown(samples, speed, SPEED_DRIFT) if samples.length / samples.rate * speed > 2 else 0.0
     supply = _shown(samples, mains, MAINS_DRIFT) if mains > 0 else 0.0
-    harmonics = _SHAFT_HARMONICS if samples.length / samples.rate * speed > 2 else 0
-    settings = LineSettings(supply, harmonics, mains_harmonics=_MAINS_HARMONICS)
+    settings = LineSettings(supply, _SHAFT_HARMONICS, _MAINS_HARMONICS)
     resolved: list[Line] = []
     for line in strong_lines((), shaft, settings):
         is_resolved = all(abs(line.frequency - near.frequency) > samples.rate / samples.length for near in resolved)

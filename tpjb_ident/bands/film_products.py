@@ -56,10 +56,12 @@ def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
     unknown = np.full((len(runs), len(runs[0].frequencies), 2), np.nan)
     within, runs = runs[0].frequencies, [run.wide or run for run in runs]
     driven = np.all([run.driven & ~run.disturbed for run in runs], axis=0)
+    if not driven.any():
+        return FilmProducts(np.nan, unknown, 0.0, 0.0, True)
     film = _film(runs, driven)
     turned = [film.at_turned(runs, order) for order in (1, 2)]
     orbit = ALLOWED_CHANGE * CHANGE_BY_ORBIT * turned[1]
-    if runs[0].period is None or not driven.any():
+    if runs[0].period is None:
         return FilmProducts(np.nan, unknown, orbit, 0.0, True)
     number = np.round(runs[0].frequencies * runs[0].period).astype(int)
     beside = [np.isin(number, _beside_shaft(runs[0], order)) for order in (1, 2)]
@@ -67,7 +69,7 @@ def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
     shaft = orbit, float(np.linalg.norm(np.multiply(falls_on_lines, turned)))
     undriven = ~np.any([*beside, *(run.driven | run.disturbed for run in runs)], axis=0)
     motion = [np.sum(np.abs(run.D.mean(axis=0)) ** 2, axis=1) * run.driven for run in runs]
-    sums = np.array([np.stack(_sums(number, power / 4), axis=1) for power in motion])
+    sums = np.array([_sums(number, power / 4) for power in motion])
     usual = sums.mean(axis=0)
     reached = usual > _REACHED * np.median(usual[driven | undriven], axis=0)
     undriven &= reached.any(axis=1)
@@ -126,14 +128,14 @@ def _curvature(sums: FloatArray, power: FloatArray, noise: FloatArray) -> tuple[
     return float(square), float(cube)
 
 
-def _sums(number: IntArray, power: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sums over two and three lines of either sign that meet at a line, of their powers; `number` (n,) of periods."""
+def _sums(number: IntArray, power: FloatArray) -> FloatArray:
+    """Sums (n, 2) over two and three lines of either sign that meet at a line, of their powers; `number` (n,)."""
     top = int(number.max())
     lines = np.zeros(2 * top + 1)
     lines[top + number], lines[top - number] = power, power
     two = fftconvolve(lines, lines)
     three = fftconvolve(two, lines)
-    return np.maximum(two[2 * top + number], 0.0), np.maximum(three[3 * top + number], 0.0)
+    return np.maximum(np.stack([two[2 * top + number], three[3 * top + number]], axis=1), 0.0)
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,7 @@ class _Film:
         """Force at f - nX that goes with a run's motion at f, over the force at f; zero where noise explains it."""
         squares = [0.0]
         for run in runs:
-            if order in run.turned and self.driven.any():
+            if order in run.turned:
                 turned, motion = run.turned[order], run.D.mean(axis=0)[self.driven]
                 D, F = turned.displacement.phasors, turned.oil_force(slice(None))
                 force = self.unexplained(D, F, run.frequencies - order * run.shaft)[0, self.driven]
@@ -180,13 +182,13 @@ class _Film:
 def _film(runs: Sequence[RunSpectra], driven: BoolArray) -> _Film:
     """The film of some runs by their driven lines (n_bins,)."""
     omega = 2 * np.pi * runs[0].frequencies[driven]
-    middle = float(np.median(omega)) if len(omega) else 1.0
+    middle = float(np.median(omega))
     columns = _columns(omega, middle)
     D, F = (np.array([getattr(run, name).mean(axis=0)[driven] for run in runs]) for name in "DF")
     design = np.einsum("kijq,rkj->rkiq", columns, D).reshape(-1, columns.shape[3])
     rows = np.concatenate([design.real, design.imag])
     numbers = np.linalg.lstsq(rows, np.concatenate([F.real.ravel(), F.imag.ravel()]), rcond=None)[0]
-    return _Film(driven, numbers, middle, float(np.mean(np.sum(np.abs(F) ** 2, axis=2))) if F.size else np.inf)
+    return _Film(driven, numbers, middle, float(np.mean(np.sum(np.abs(F) ** 2, axis=2))))
 
 
 def _columns(omega: FloatArray, middle: float) -> ComplexArray:

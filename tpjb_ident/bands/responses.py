@@ -53,10 +53,7 @@ def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, e
     z = np.concatenate([run.phasors.z[0, bins] for run in runs])
     sources = [_sources(run, instrument) for run in runs]
     u, by_time = (np.concatenate([part[bins] for part in parts]) for parts in zip(*sources))
-    place = place_in_line(runs[0].frequencies[bins])
-    sloped = np.tile(place, len(runs))[:, None] * u
-    columns = np.concatenate([sloped, end_columns(len(runs), place)[:, : None if ends else 0]], axis=1)
-    return _regressed(z, u, by_time, columns)
+    return _regressed(z, u, by_time, nuisance(runs, bins, u, ends))
 
 
 def _over_periods(rows: ComplexArray, start: FloatArray) -> LineResponse:
@@ -68,15 +65,17 @@ def _over_periods(rows: ComplexArray, start: FloatArray) -> LineResponse:
     return LineResponse(mean[None], float(n), _outer(remaining), n - 1.0, slope[None], np.array([1 / spread]), float(n))
 
 
-def place_in_line(frequencies: FloatArray) -> FloatArray:
-    """Places (n,) of a line's bins about their mean, 1 at the farthest."""
-    place = frequencies - frequencies.mean()
-    return np.asarray(place / max(float(np.abs(place).max()), 1e-300))
+def nuisance(runs: Sequence[RunSpectra], bins: IntArray, sources: ComplexArray, ends: bool) -> ComplexArray:
+    """Columns that a line's bins hold besides the response to `sources` (runs n, k): its slope over their places.
 
-
-def end_columns(runs: int, place: FloatArray) -> ComplexArray:
-    """What the ends of each run's record leak into its bins: straight lines over their place, (runs n, 2 runs)."""
-    return np.asarray(np.kron(np.eye(runs), np.vander(place, 2, increasing=True)), dtype=complex)
+    And what the `ends` of each run's record leak into them: straight lines.
+    """
+    place = runs[0].frequencies[bins] - runs[0].frequencies[bins].mean()
+    place /= max(float(np.abs(place).max()), 1e-300)
+    sloped = np.asarray(np.tile(place, len(runs))[:, None] * sources)
+    if not ends:
+        return sloped
+    return np.concatenate([sloped, np.kron(np.eye(len(runs)), np.vander(place, 2, increasing=True))], axis=1)
 
 
 def _sources(run: RunSpectra, instrument: str) -> tuple[ComplexArray, ComplexArray]:
@@ -115,12 +114,12 @@ def _likeness(wave: ComplexArray, second: ComplexArray) -> float:
     return float(np.abs(np.fft.fft(product, 4 * len(product))).max() / max(float(np.abs(product).sum()), 1e-300))
 
 
-def _regressed(z: ComplexArray, u: ComplexArray, by_time: ComplexArray, nuisance: ComplexArray) -> LineResponse:
+def _regressed(z: ComplexArray, u: ComplexArray, by_time: ComplexArray, besides: ComplexArray) -> LineResponse:
     """Responses of rows (b, m) to sources (b, k), apart from their slope and from what the ends leak (b, j).
 
     `by_time` (b, k): the sources' product with time; the part of the rows that goes with it is what moves.
     """
-    basis = np.linalg.qr(nuisance)[0]
+    basis = np.linalg.qr(besides)[0]
     q, triangle = np.linalg.qr(orthogonal(u, basis))
     independent = np.abs(np.diag(triangle)) > _NOTHING * max(float(np.abs(triangle).max()), 1e-300)
     q, triangle, by_time = q[:, independent], triangle[np.ix_(independent, independent)], by_time[:, independent]
@@ -146,7 +145,7 @@ def pooled_noise(responses: list[LineResponse]) -> tuple[list[ComplexArray], Flo
     """Noise of a row at every group of one run with its neighbours (m, m), and its degrees of freedom (n,)."""
     residual = np.array([r.residual for r in responses])
     freedom = np.array([r.freedom for r in responses])
-    reach = int(np.ceil(0.5 * _FREEDOM / max(float(freedom.mean()), 1e-9))) if len(freedom) else 0
+    reach = int(np.ceil(0.5 * _FREEDOM / max(float(freedom.mean()), 1e-9)))
     noises, totals = [], []
     for k in range(len(freedom)):
         near = slice(max(k - reach, 0), k + reach + 1)

@@ -20,8 +20,7 @@ from tpjb_ident.bands.disturbing_lines import (
 )
 from tpjb_ident.bands.period import driven_part, find_period, resampled
 from tpjb_ident.bands.samples import Samples, read_samples
-from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition
+from tpjb_ident.phasors.compensation import compensated, filled_channels
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.runs.point_data import mean_temperatures
@@ -39,7 +38,7 @@ OPEN_ENDS = ("multisine", "random", "sweep")
 
 def is_broadband(run: Run) -> bool:
     """Whether a run is excited over a band, not by a sine."""
-    return getattr(run, "excitation_kind", "sine") != "sine"
+    return run.excitation_kind != "sine"
 
 
 @dataclass(frozen=True)
@@ -123,29 +122,23 @@ def run_spectra(
         samples = read_samples(run, seconds, fast, band[1])
         temperatures = mean_temperatures(run)
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.lines.mains, band[1])
-    driven, period = _period(run, samples, band, lines)
-    length, cut, width = samples.length, samples, LEFT_OUT
-    if period is not None:
-        length, cut, width = round(period), resampled(driven, period, band[1]), LEFT_OUT_OF_PERIOD
-    clean = without_disturbances(cut, lines, None if period is None else length)
+    cut, period = _period(run, samples, band, lines)
+    length, width = (cut.length, LEFT_OUT) if period is None else (period, LEFT_OUT_OF_PERIOD)
+    clean = without_disturbances(cut, lines, period)
     places, motion = _places(clean.rate, length, band), _motion(clean)
 
     def transformed(record: Samples, places: IntArray) -> tuple[RunPhasors, ComplexArray | None]:
         phasors = _phasors(run, record, _bins(record.rows, length, places), places, samples.rows.mean(axis=1))
+        phasors = replace(phasors, housing_mass=housing_mass, conditions=samples.conditions)
         command = None if record.command is None else _bins(record.command, length, places)
-        return compensated(replace(phasors, housing_mass=housing_mass), run, slower, settings.delays), command
+        return compensated(phasors, run, slower, settings.delays), command
 
     def spectra_of(places: IntArray) -> RunSpectra:
         phasors, command = transformed(clean, places)
-        return RunSpectra(
-            replace(phasors, conditions=merged(samples.conditions, slower_condition(slower))),
-            command,
-            bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
-            lines,
-            None if period is None else length / clean.rate,
-            temperatures,
-            *motion,
-        )
+        seconds = length / clean.rate
+        disturbed = bins_taken(phasors.lines.frequencies, lines, seconds, width)
+        repeat = None if period is None else seconds
+        return RunSpectra(phasors, command, disturbed, lines, repeat, temperatures, *motion)
 
     spectra = spectra_of(places)
     if period is not None:
@@ -180,8 +173,8 @@ def _motion(samples: Samples) -> tuple[float, float, float]:
 
 def _period(
     run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Line, ...]
-) -> tuple[Samples, float | None]:
-    """The driven part of a record, and the period [samples] with which it repeats itself; None where it does not."""
+) -> tuple[Samples, int | None]:
+    """The driven whole periods of a record, and their samples; all of it and None where it does not repeat itself."""
     if run.excitation_kind not in OPEN_ENDS:
         return samples, None
     is_stated = run.excitation_kind == "multisine"
@@ -189,11 +182,13 @@ def _period(
     part = driven_part(clean, band)
     clean, driven = (record.mapped(lambda rows: rows[:, part]) for record in (clean, samples))
     period = find_period(clean, band, lines, 1.0 if is_stated else _LEFT)
-    if period is None and is_stated:
+    if period is not None:
+        return resampled(driven, period, band[1]), round(period)
+    if is_stated:
         text = "a multi-sine, but no period is found that the record holds three times"
         cure = 'Record longer; or state excitation = "random" if it does not repeat'
         raise refuse(run.file, "excitation", text, cure, run.id)
-    return driven, period
+    return samples, None
 
 
 def _places(rate: float, length: int, band: tuple[float, float]) -> IntArray:

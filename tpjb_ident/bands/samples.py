@@ -20,6 +20,7 @@ from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.bad_samples import BAD_LIMIT, robust_deviation
 from tpjb_ident.phasors.channel_times import device_readers
+from tpjb_ident.phasors.lines import HIGHEST
 from tpjb_ident.phasors.run_data import QUANTITIES
 
 #: Share of a channel's samples that may be missing in stretches, bridged by straight lines,
@@ -82,16 +83,14 @@ class Samples:
         return replace(self, rate=rate or self.rate, rows=change(self.rows), command=command)
 
 
-def read_samples(
-    run: Run, seconds: float | None = None, fast: Mapping[str, float] | None = None, highest: float = 0.0
-) -> Samples:
-    """Read a run from its beginning.
+def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: float) -> Samples:
+    """Read the first `seconds` of a run.
 
     `fast`: channels by whose clock time runs faster than the first's, relative; `highest`: frequency [Hz] that every
     device must show.
     """
     rate = run.sample_rate
-    n = run.length if seconds is None else min(run.length, round(seconds * rate))
+    n = min(run.length, round(seconds * rate))
     recorded = _on_first_grid(run, n, highest)
     inside = np.all([_has_neighbours(values, at) for _, values, at in recorded], axis=0)
     channels, rows, lost, command = [], [], 0.0, np.zeros((2, n))
@@ -108,7 +107,7 @@ def read_samples(
         if _lost(values) > _MAX_LOST and is_spare(channel, [c for c, _, _ in recorded]):
             continue
         channels.append(channel)
-        rows.append(_at(_bridged(run, channel, values), at * (1 + (fast or {}).get(channel.name, 0.0))))
+        rows.append(_at(_bridged(run, channel, values), at * (1 + fast.get(channel.name, 0.0))))
         lost = max(lost, float((~np.isfinite(values)).mean()))
     bridged = holding((lost > _TOLD_LOST, "samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"))
     driven = command[:, inside] if command.any() else None
@@ -121,26 +120,26 @@ def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, Floa
     recorded: list[tuple[Channel, FloatArray, FloatArray]] = []
     begins, places = [], np.arange(float(n))
     for reader in readers:
-        if not reader.shows(np.array(highest)):
+        if highest >= HIGHEST * reader.rate:
             text = f"the band reaches {highest:g} Hz, more than 0.45 of the sample rate of {reader.rate:g} Hz"
             raise refuse(run.file, "excitation_band", text, "Sample faster, or excite lower frequencies", run.id)
         is_alike = reader.length == readers[0].length and abs(reader.rate / readers[0].rate - 1) <= _ALIKE
-        part = reader.read(0, n if is_alike else reader.length)
-        begins.append(_begin(run, part.time, reader.rate))
+        time, rows = reader.read(0, n if is_alike else reader.length)
+        begins.append(_begin(run, time, reader.rate))
         if not is_alike:
             _refuse_unlike(run, reader.channels[0].name, reader.rate, highest)
         at = places if is_alike else (places / run.sample_rate + begins[0] - begins[-1]) * reader.rate
-        recorded += [(channel, values, at) for channel, values in zip(reader.channels, part.rows)]
+        recorded += [(channel, values, at) for channel, values in zip(reader.channels, rows)]
     return sorted(recorded, key=lambda record: (*QUANTITIES, "command").index(record[0].quantity))
 
 
 def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
     """Time of a device's first sample [s], by all of its stamps; refused where these have gaps."""
-    if time is None or not np.isfinite(time).any():
+    if time is None or np.isfinite(time).sum() < 3:
         return 0.0
     place = np.flatnonzero(np.isfinite(time))
     off = time[place] * rate - place
-    drift = np.polyval(np.polyfit(place, off, 1), place) if len(place) > 2 else off
+    drift = np.polyval(np.polyfit(place, off, 1), place)
     if np.abs(off - drift).max() > _MAX_JITTER + 0.6 * rate * _rounding(time[place]):
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
         raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
@@ -158,12 +157,13 @@ def _is_own(values: FloatArray, at: FloatArray) -> bool:
 
 def _refuse_unlike(run: Run, name: str, rate: float, highest: float) -> None:
     """Refuse a device of its own rate that is too slow for the kernel; blows hold what folds back into the band."""
+    need, cure = "", "Sample faster, or excite lower frequencies"
     if run.excitation_kind == "impact":
-        text = f"is sampled at {rate:.6g} Hz, the first one at {run.sample_rate:.6g} Hz; blows need one rate"
-        raise refuse(run.file, f"device of channel {name}", text, "Record all at one rate", run.id)
-    if highest >= _REACH * rate:
-        text = f"is sampled at {rate:.6g} Hz; a band up to {highest:g} Hz needs {highest / _REACH:.4g} Hz"
-        raise refuse(run.file, f"device of channel {name}", text, "Sample faster, or excite lower frequencies", run.id)
+        need, cure = f"the first one at {run.sample_rate:.6g} Hz; blows need one rate", "Record all at one rate"
+    elif highest >= _REACH * rate:
+        need = f"a band up to {highest:g} Hz needs {highest / _REACH:.4g} Hz"
+    if need:
+        raise refuse(run.file, f"device of channel {name}", f"is sampled at {rate:.6g} Hz, {need}", cure, run.id)
 
 
 def _rounding(time: FloatArray) -> float:

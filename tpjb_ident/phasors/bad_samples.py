@@ -36,12 +36,10 @@ def white_noise(values: FloatArray) -> float:
 
 def usual_scale(scale: FloatArray) -> FloatArray:
     """Median over the windows with a scale (n_windows, q); infinite where none has."""
-    usual = np.full(scale.shape[1], np.inf)
-    for k, column in enumerate(scale.T):
-        finite_values = column[np.isfinite(column)]
-        if len(finite_values):
-            usual[k] = np.median(finite_values)
-    return usual
+    present = np.isfinite(scale)
+    ranked = np.sort(np.where(present, scale, np.inf), axis=0)
+    count, column = present.sum(axis=0), np.arange(scale.shape[1])
+    return np.asarray(0.5 * (ranked[(count - 1) // 2, column] + ranked[count // 2, column]))
 
 
 def is_present(values: FloatArray) -> BoolArray:
@@ -54,10 +52,7 @@ def with_flanks(outlying: BoolArray) -> BoolArray:
     """Bad samples: isolated ones by themselves, disturbances with their flanks; `outlying` (n,)."""
     bad = np.array(outlying)
     at = np.flatnonzero(outlying)
-    if len(at) < _MANY:
-        return bad
-    groups = np.split(at, np.flatnonzero(np.diff(at) > 2) + 1)
-    for group in groups:
+    for group in np.split(at, np.flatnonzero(np.diff(at) > 2) + 1):
         if len(group) >= _MANY:
             bad[max(group[0] - _MARGIN, 0) : group[-1] + _MARGIN + 1] = True
     return bad

@@ -1,7 +1,6 @@
 """The channels of a run by the devices that recorded them, read stretch by stretch at each device's own times."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -10,14 +9,6 @@ from rigdata.calibration import Channel
 from rigdata.device import Device
 from rigdata.run import Run
 from tpjb_ident.phasors.run_data import QUANTITIES
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Consecutive samples of a device."""
-
-    rows: FloatArray  #: (n_channels, n), SI; NaN where there is no value
-    time: FloatArray | None  #: (n,), s; None where times are counted from the rate
 
 
 @dataclass(frozen=True)
@@ -30,52 +21,36 @@ class DeviceReader:
     rate: float
     length: int
 
-    def read(self, start: int, stop: int) -> Samples:
-        """Samples start..stop-1."""
-        time, rows = self.run.read_device(self.device, [c.name for c in self.channels], start, stop)
-        return Samples(rows, time)
-
-    @cached_property
-    def stamps(self) -> FloatArray | None:
-        """Times of all samples [s]; None where they are counted."""
-        if self.device.counted:
-            return None
-        parts = [self.read(k, min(k + 2**17, self.length)).time for k in range(0, self.length, 2**17)]
-        return np.concatenate([part for part in parts if part is not None])
+    def read(self, start: int, stop: int) -> tuple[FloatArray | None, FloatArray]:
+        """Times (n,) of samples start..stop-1 [s], None where they are counted from the rate; rows (n_channels, n)."""
+        return self.run.read_device(self.device, [c.name for c in self.channels], start, stop)
 
     def first_samples(self, start: FloatArray) -> IntArray:
         """First sample at or after each of some times (n,) [s]."""
-        if self.stamps is None:
+        if self.device.counted:
             return np.ceil(start * self.rate - 1e-6).astype(int)
-        return np.searchsorted(self.stamps, start - 1e-6 / self.rate)
-
-    def shows(self, frequencies: FloatArray) -> np.ndarray:
-        """Which frequencies [Hz] its rate can show, (n,)."""
-        return np.asarray(frequencies < 0.45 * self.rate)
+        time, _ = self.run.read_device(self.device, [self.channels[0].name], 0, self.length)
+        return np.searchsorted(np.asarray(time), start - 1e-6 / self.rate)
 
 
 def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
     """Devices of a run that have channels with a direction, or a command if asked; that of the first probe first."""
-    _check_directions(run)
-    directed = {c.name: c for q in QUANTITIES for c in run.channels.values() if c.quantity == q and c.axis is not None}
+    directed = []
+    for quantity in QUANTITIES:
+        if quantity != "acceleration" or run.of(quantity):
+            directed += run.vector_channels(quantity)
     if command:
-        directed |= {c.name: c for c in run.channels.values() if c.quantity == "command"}
-    devices = run.devices
-    for name in directed.keys() - {name for device in devices for name in device.channels}:
-        run.record(name, 0, 0)  # says that the file lacks it
+        directed += run.of("command")
+    recorded = {name for device in run.devices for name in device.channels}
+    for channel in directed:
+        if channel.name not in recorded:
+            run.record(channel.name, 0, 0)  # says that the file lacks it
     readers = []
-    for device in devices:
-        channels = tuple(c for name, c in directed.items() if name in device.channels)
+    for device in run.devices:
+        channels = tuple(c for c in directed if c.name in device.channels)
         rate = device.rate if np.isfinite(device.rate) else run.sample_rate
         # of a run that ends early all devices do
         length = min(device.length, int(np.ceil(run.length / run.sample_rate * rate)))
         if channels:
             readers.append(DeviceReader(run, device, channels, rate, length))
     return tuple(readers)
-
-
-def _check_directions(run: Run) -> None:
-    """Refuse a run whose channels of a quantity do not span the plane."""
-    for quantity in QUANTITIES:
-        if quantity != "acceleration" or run.of(quantity):
-            run.vector_channels(quantity)

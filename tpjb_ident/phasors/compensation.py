@@ -9,7 +9,7 @@ linear makes of the shaft's own motion stands at X - f and 2X - f, and is no ima
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -17,7 +17,7 @@ from scipy.signal import find_peaks
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import refuse
 from rigdata.run import Run
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import holding, merged
 from tpjb_ident.phasors.channel_times import device_readers
 from tpjb_ident.phasors.found_lines import vertex
 from tpjb_ident.phasors.lines import SPEED_DRIFT
@@ -66,7 +66,7 @@ class SlowerChannel:
         ratio = self.export_rate / self.rate
         even = abs(ratio - round(ratio)) < _EVEN * ratio
         small = np.sin(np.pi * f / self.export_rate) * round(ratio) if even else np.pi * f / self.rate
-        gain = np.where(f > 0, np.sin(np.pi * f / self.rate) / np.where(f > 0, small, 1.0), 1.0)
+        gain = np.sin(np.pi * f / self.rate) / small
         if self.order == 2:
             return np.asarray(gain**2, dtype=complex)
         late = 0.5 / self.rate - (0.5 / self.export_rate if even else 0.0)
@@ -84,7 +84,7 @@ def filled_channels(run: Run) -> dict[str, SlowerChannel]:
     slower: dict[str, SlowerChannel] = {}
     for reader in device_readers(run):
         power = np.clip(np.log2(_LOOK * reader.rate) + 1, _LEAST_POWER, _MOST_POWER)
-        rows = reader.read(0, min(reader.length, 2 ** int(power) - 2)).rows
+        _, rows = reader.read(0, min(reader.length, 2 ** int(power) - 2))
         for channel, values in zip(reader.channels, rows):
             filling = slower_channel(values, reader.rate, run.point.shaft_speed_hz)
             if filling is not None:
@@ -106,7 +106,7 @@ def slower_channel(values: FloatArray, export_rate: float, speed: float = 0.0) -
     size, agreement, chance = np.abs(spectrum), *_pair_agreement(spectrum)
     peaks = find_peaks(agreement)[0]
     # the shaft's own motion makes such sums of any other
-    step, orders = export_rate / n, np.array([1.0, 2.0]) * (speed > 0)
+    step, orders = export_rate / n, np.array([1.0, 2.0])
     near_shaft = np.abs(peaks[:, None] * step - orders * speed) < orders * (SPEED_DRIFT + 2 * step)
     peaks = peaks[~near_shaft.any(axis=1)]
     for k in peaks[chance[peaks] > _CLEAR].tolist():
@@ -168,14 +168,6 @@ def _filling_order(size: FloatArray, k: int) -> int | None:
     return order if abs(shown - order) < _AGREE * order else None
 
 
-def slower_condition(slower: Mapping[str, SlowerChannel]) -> tuple[Condition, ...]:
-    """What to say of channels that were filled up."""
-    if not slower:
-        return ()
-    rates = ", ".join(f"{name} {_ORDERS[s.order]} from {s.rate:.4g} Hz" for name, s in slower.items())
-    return (Condition("slower-channels", f"{rates}; what that does to a sine was taken out"),)
-
-
 def compensated(
     result: RunPhasors, run: Run, slower: Mapping[str, SlowerChannel], delays: Mapping[str, float]
 ) -> RunPhasors:
@@ -189,17 +181,14 @@ def compensated(
         gains[:, k] = np.exp(-2j * np.pi * frequencies * delays.get(channel.quantity, 0.0))
         if channel.response:
             gain = channel.response.at(frequencies)
-            gains[:, k] *= _reached(gain, frequencies, len(result.lines.excitation), run, channel.name)
+            unknown = ~np.isfinite(gain) | (np.abs(gain) <= 1e-6)
+            if unknown[: len(result.lines.excitation)].any():
+                text = f"its response at the excitation of {frequencies[unknown][0]:g} Hz is not known"
+                cure = "Extend filter_table, or check filter"
+                raise refuse(run.file, f"channel {channel.name}", f"{text}, or nothing comes through", cure, run.id)
+            gains[:, k] *= np.where(unknown, 1.0, gain)  # 1 at disturbing lines that a table does not reach
         if channel.name in slower:
             gains[:, k] *= slower[channel.name].at(frequencies)
-    return result if np.all(gains == 1.0) else result.divided(gains)
-
-
-def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Run, name: str) -> ComplexArray:
-    """The gain, 1 at disturbing lines that a table does not reach."""
-    valid = np.isfinite(gain) & (np.abs(gain) > 1e-6)
-    if not valid[:driven].all():
-        text = f"its response at the excitation of {frequencies[~valid][0]:g} Hz is not known, or nothing comes through"
-        cure = "Extend filter_table, or check filter"
-        raise refuse(run.file, f"channel {name}", text, cure, run.id)
-    return np.where(valid, gain, 1.0)
+    rates = ", ".join(f"{name} {_ORDERS[s.order]} from {s.rate:.4g} Hz" for name, s in slower.items())
+    filled = holding((slower, "slower-channels", f"{rates}; what that does to a sine was taken out"))
+    return replace(result.divided(gains), conditions=merged(result.conditions, filled))

@@ -10,7 +10,7 @@ from rigdata.run import Run
 from tpjb_ident.phasors.bad_samples import SCALE_LIMIT, usual_scale
 from tpjb_ident.phasors.channel_times import DeviceReader, device_readers
 from tpjb_ident.phasors.line_fit import LineFitter, WindowFit
-from tpjb_ident.phasors.lines import LineSet
+from tpjb_ident.phasors.lines import HIGHEST, LineSet
 from tpjb_ident.phasors.run_data import QUANTITIES, PhasorSettings, RunPhasors
 from tpjb_ident.phasors.shaft import ShaftCourse
 from tpjb_ident.phasors.windows import plan_windows
@@ -38,19 +38,22 @@ def extract(
     middles = np.asarray((np.arange(count) + 0.5) * length / run.sample_rate, dtype=float)
     speeds = np.full(count, np.nan) if follow is None else follow.at(middles)
     fit = WindowFit.empty(count, len(lines.frequencies), len(channels))
-    firsts, start = length * np.arange(count), np.empty(0)
+    start = np.empty(0)
     with run.opened():
         for k, reader in enumerate(readers):
+            firsts, samples = length * np.arange(count), length
             if k and (reader.rate, reader.length) != (readers[0].rate, readers[0].length):
-                firsts, length = reader.first_samples(start), int(seconds * reader.rate + 1e-6)
+                firsts, samples = reader.first_samples(start), int(seconds * reader.rate + 1e-6)
             fast = (clocks or {}).get(reader.device.name, 0.0)
-            device = _DeviceFit(reader, length, firsts, lines.faster(fast), speeds)
+            device = _DeviceFit(reader, samples, firsts, lines.at_speed(lines.speed, fast), speeds)
             device.fit_all()
-            if fast:  # phases count by the lines' common frequencies
-                ahead = np.multiply.outer(device.start + 0.5 * seconds, fast * lines.frequencies)
-                device.windows.z[:] *= np.exp(2j * np.pi * ahead)[:, :, None]
-            names = [c.name for c in reader.channels]
-            fit.put(np.arange(count), device.windows, channels=[c.name in names for c, _ in channels])
+            # phases count by the lines' common frequencies
+            ahead = np.multiply.outer(device.start + 0.5 * seconds, fast * lines.frequencies[device.shown])
+            z, *figures = device.windows
+            chosen = np.array([c in reader.channels for c, _ in channels])
+            fit.z[np.ix_(np.arange(count), device.shown, chosen)] = z * np.exp(2j * np.pi * ahead)[:, :, None]
+            for table, part in zip(fit[1:], figures):
+                table[:, chosen] = part
             start = start if k else device.start
     return RunPhasors(
         run.id,
@@ -60,10 +63,7 @@ def extract(
         start,
         seconds,
         tuple(channel for channel, _ in channels),
-        fit.z,
-        fit.mean,
-        fit.scale,
-        fit.lost,
+        *fit,
         housing_mass,
         device=tuple(name for _, name in channels),
     )
@@ -74,13 +74,13 @@ class _DeviceFit:
 
     def __init__(self, reader: DeviceReader, length: int, firsts: IntArray, lines: LineSet, speeds: FloatArray) -> None:
         self.reader, self.length, self.firsts, self.lines, self.speeds = reader, length, firsts, lines, speeds
-        self.shown = reader.shows(lines.frequencies)
+        self.shown = lines.frequencies < HIGHEST * reader.rate
         if not self.shown[: len(lines.excitation)].all() or length <= 2 * (2 * self.shown.sum() + 2):
             names, run = ", ".join(c.name for c in reader.channels), reader.run
             fault = f"{reader.rate:g} samples per second cannot show the excitation in windows of {length} samples"
             raise refuse(run.file, f"channels {names}", fault, "Sample them faster, or record longer", run.id)
         self.fitter = LineFitter(length, reader.rate, lines.frequencies[self.shown])
-        self.windows = WindowFit.empty(len(firsts), len(self.shown), len(reader.channels))
+        self.windows = WindowFit.empty(len(firsts), int(self.shown.sum()), len(reader.channels))
         self.start = np.full(len(firsts), np.nan)
 
     def fit_all(self) -> None:
@@ -101,32 +101,27 @@ class _DeviceFit:
     def _fit(self, first: int, stop: int, usual: FloatArray | None = None) -> None:
         """Read and fit windows first..stop-1; `usual` (n_channels,) is the scale that windows of the run have."""
         begin = self.firsts[first]
-        samples = self.reader.read(begin, self.firsts[stop - 1] + self.length)
+        time, rows = self.reader.read(begin, self.firsts[stop - 1] + self.length)
+        if time is None:
+            time = np.arange(begin, begin + rows.shape[1]) / self.reader.rate
         at = (self.firsts[first:stop] - begin)[:, None] + np.arange(self.length)
-        rows = samples.rows[:, at]
-        start, uneven = self.firsts[first:stop] / self.reader.rate, np.zeros(stop - first, dtype=bool)
-        if samples.time is not None:
-            time = samples.time[at]
-            start = np.where(np.isfinite(time[:, 0]), time[:, 0], start)
-            uneven = self._is_uneven(time)
+        time, rows = time[at], rows[:, at]
+        start = np.where(np.isfinite(time[:, 0]), time[:, 0], self.firsts[first:stop] / self.reader.rate)
         fit = self.fitter.fit(rows, start, usual)
         usual = usual_scale(fit.scale) if usual is None else usual
-        for i in np.flatnonzero(uneven | np.isfinite(self.speeds[first:stop])).tolist():
-            timed = np.isfinite(time[i]) if uneven[i] else np.ones(self.length, dtype=bool)
+        speeds, uneven = self.speeds[first:stop], self._is_uneven(time)
+        for i in np.flatnonzero(uneven | np.isfinite(speeds)).tolist():
+            timed = np.isfinite(time[i])
             if timed.sum() > 2 * self.fitter.design.shape[1]:
-                fitter = self._fitter(self.speeds[first + i], time[i, timed] if uneven[i] else None)
-                origin = time[i, timed][:1] if uneven[i] else start[i : i + 1]
-                fit.put(np.array([i]), fitter.fit(rows[:, i : i + 1, timed], origin, usual))
-        self.windows.put(np.arange(first, stop), fit, lines=self.shown)
+                lines = self.lines.at_speed(speeds[i]) if np.isfinite(speeds[i]) else self.lines
+                times = time[i, timed]
+                frequencies, stamps = lines.frequencies[self.shown], times if uneven[i] else None
+                fitter = LineFitter(len(times), self.reader.rate, frequencies, time=stamps)
+                fit.put(slice(i, i + 1), fitter.fit(rows[:, i : i + 1, timed], times[:1], usual))
+        self.windows.put(slice(first, stop), fit)
         self.start[first:stop] = start
 
     def _is_uneven(self, time: FloatArray) -> BoolArray:
         """Windows (n,) whose time stamps (n, length) stray from an even grid."""
         grid = time[:, :1] + np.arange(self.length) / self.reader.rate
         return ~(np.abs(time - grid).max(axis=1) <= MAX_JITTER / self.reader.rate)
-
-    def _fitter(self, speed: float, time: FloatArray | None) -> LineFitter:
-        """Fit of one window with a shaft speed [Hz] or times (length,) [s] of its own."""
-        lines = self.lines.at_speed(speed) if np.isfinite(speed) else self.lines
-        length = self.length if time is None else len(time)
-        return LineFitter(length, self.reader.rate, lines.frequencies[self.shown], time=time)

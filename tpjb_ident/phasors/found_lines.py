@@ -43,8 +43,7 @@ def unexpected_lines(
             smallest = MIN_SHARE * float(np.nanmedian(sizes))
             for record in records:
                 columns = [k for k, place in enumerate(record.places) if place in places]
-                if columns:
-                    frequencies += _peaks(record, columns, np.append(listed_lines, frequencies), smallest)
+                frequencies += _peaks(record, columns, np.append(listed_lines, frequencies), smallest)
     top = REACH * max(result.lines.driven)
     lobe = _LOBE / records[0].duration
     frequencies = [f for f in frequencies if f < top and np.abs(images - f).min(initial=np.inf) > lobe]
@@ -74,14 +73,10 @@ def _peaks(record: WholeRecord, columns: list[int], lines: FloatArray, smallest:
     """Frequencies [Hz] of lines above `smallest` in some channels: faint ones fitted, and peaks of the residual."""
     amplitude = np.linalg.norm(hann_amplitude(record.spectrum[:, columns]), axis=1)
     step = 1 / record.duration
-    frequency = np.arange(len(amplitude)) * step
     least = np.maximum(_PROMINENCE * noise_floor(amplitude), smallest)
-    candidate = amplitude > least
-    candidate[frequency < _LOBE * step] = False
-    for f in lines:
-        candidate[np.abs(frequency - f) < _LOBE * step] = False
-    tops = [i for i in find_peaks(amplitude)[0] if candidate[i]]
-    peaks = [float(frequency[i] + step * vertex(amplitude[i - 1 : i + 2])) for i in tops]
+    tops = find_peaks(amplitude, height=least)[0]
+    tops = tops[np.abs(tops[:, None] * step - [0.0, *lines]).min(axis=1) >= _LOBE * step]
+    peaks = [float(i * step + step * vertex(amplitude[i - 1 : i + 2])) for i in tops]
     faint = record.lines.faint
     sizes = np.linalg.norm(record.z[len(record.z) - len(faint) :, columns], axis=1)
     at = np.minimum(np.round([line.frequency * record.duration for line in faint]).astype(int), len(least) - 1)
@@ -118,7 +113,7 @@ def near_line(result: RunPhasors, driven: int, duration: float, rate: float) -> 
     live = np.isfinite(noise)
     z = result.z[:, driven, live] / noise[live]
     good = np.isfinite(z).all(axis=1)
-    if good.sum() < _LEAST or not live.any():
+    if good.sum() < _LEAST:
         return None
     windows, time = z[good], (result.start[good] + 0.5 * result.length) / duration
     count, channels = windows.shape

@@ -10,10 +10,10 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from rigdata.run import Run
-from tpjb_ident.conditions import Condition
-from tpjb_ident.phasors.bad_samples import robust_deviation, usual_scale
+from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.lines import LineSet, known_lines
-from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors, phasor_noise
 from tpjb_ident.phasors.shaft import ShaftCourse
 
 #: Name of the condition that a shaft's changing speed gives rise to.
@@ -27,6 +27,7 @@ MAX_RETUNED = 0.005
 MAX_CLOCK_SLIP = 5e-4
 #: Phase [cycles] by which the shaft may run ahead or behind within one window.
 MAX_WINDOW_SLIP = 0.005
+_ALL = slice(None)
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Tuning:
     lines: LineSet
     follow: ShaftCourse | None
     conditions: tuple[Condition, ...]
-    settled: bool = True  #: whether the windows told the shaft's course: a drive far off its set point hides it
+    settled: bool  #: whether the windows told the shaft's course: a drive far off its set point hides it
 
 
 def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
@@ -83,20 +84,16 @@ def phase_advance(phasors: ComplexArray, start: FloatArray, noise: float) -> _Ad
     return _Advance(windows, turns / spacing, noise / size / (2 * np.pi * float(np.median(spacing))))
 
 
-def _line_advance(result: RunPhasors, line: int, rate: float, places: list[int] | None = None) -> _Advance | None:
+def _line_advance(result: RunPhasors, line: int, rate: float, places: list[int] | slice) -> _Advance | None:
     """Advance of a line in some channels together, each weighted by its power over its noise."""
-    chosen = list(range(len(result.channels))) if places is None else places
-    z, noise = result.z[:, line, chosen], usual_scale(result.scale[:, chosen]) / np.sqrt(result.length * rate)
+    z, noise = result.z[:, line, places], 0.5 * phasor_noise(result, rate)[places]
     present = np.isfinite(z).any(axis=0) & np.isfinite(noise)
-    if not present.any():
-        return None
     # a channel without noise must not stand for all
     least = 1e-9 * np.nanmax(np.abs(z[:, present]), axis=0)
-    weighted = z[:, present] / np.maximum(noise[present], least + np.finfo(float).tiny)
-    return phase_advance(weighted, result.start, 1.0)
+    return phase_advance(z[:, present] / np.maximum(noise[present], least), result.start, 1.0)
 
 
-def _line_slip(result: RunPhasors, line: int | None, rate: float, places: list[int] | None = None) -> float:
+def _line_slip(result: RunPhasors, line: int | None, rate: float, places: list[int] | slice = _ALL) -> float:
     """Frequency error of a line by some channels together [Hz]."""
     advance = None if line is None else _line_advance(result, line, rate, places)
     return 0.0 if advance is None else advance.slip
@@ -109,21 +106,19 @@ def tuned(
     rate, span = run.sample_rate, result.start[-1] - result.start[0] + result.length
     slips = np.array([_line_slip(result, i, rate) for i in range(len(result.lines.excitation))])
     slips[np.abs(slips) * span <= MAX_SLIP] = 0.0
-    exact = tuple(frequency + slip for frequency, slip in zip(result.lines.driven, slips.tolist()))
+    exact = tuple((np.array(result.lines.driven) + slips).tolist())
     settled = bool(np.all(np.abs(slips) * result.length <= MAX_RETUNED))
     turning, follow = _line_slip(result, result.lines.place("1X"), rate), _drifting(result, rate) if settled else None
     if not slips.any() and follow is None and abs(turning) * span <= 5 * MAX_SLIP:
         return None
-    conditions = []
-    if slips.any():
-        shown, stated = ", ".join(f"{f:.5g}" for f in exact), ", ".join(f"{f:g}" for f in driven)
-        text = f"excitation found at {shown} Hz, set point {stated} Hz; the found one was used for the fit"
-        conditions.append(Condition("excitation off set point", text))
+    shown, stated = ", ".join(f"{f:.5g}" for f in exact), ", ".join(f"{f:g}" for f in driven)
+    text = f"excitation found at {shown} Hz, set point {stated} Hz; the found one was used for the fit"
+    conditions = holding((slips.any(), "excitation off set point", text))
     if follow is not None:
         low, high = follow.speed.min(), follow.speed.max()
-        conditions.append(Condition(DRIFT, f"shaft speed between {low:.4g} and {high:.4g} Hz; followed by window"))
+        conditions += (Condition(DRIFT, f"shaft speed between {low:.4g} and {high:.4g} Hz; followed by window"),)
     lines = known_lines(exact, speed + turning, rate, settings.lines, result.lines.found, run.length / rate)
-    return Tuning(lines, follow, tuple(conditions), settled)
+    return Tuning(lines, follow, conditions, settled)
 
 
 def device_rates(result: RunPhasors, rate: float) -> dict[str, float]:
@@ -171,9 +166,8 @@ def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, flo
     line = result.lines.place("1X")
     if line is None:
         return None
-    noise = float(np.median(usual_scale(result.scale[:, result.pick("displacement")])))
-    z = result.displacement.phasors[:, line]
-    advance = phase_advance(z, result.start, noise / np.sqrt(result.length * rate))
+    noise = 0.5 * float(np.median(phasor_noise(result, rate)[result.pick("displacement")]))
+    advance = phase_advance(result.displacement.phasors[:, line], result.start, noise)
     if advance is None:
         return None
     speeds = np.full(len(result.start), np.nan)

@@ -6,12 +6,11 @@ of one run are repeats of one phasor as long as the drive is locked to the recor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.phasors.bad_samples import (
     BAD_LIMIT,
     SCALE_LIMIT,
@@ -31,8 +30,7 @@ _ROUNDS = 8
 BLOCK = 256
 
 
-@dataclass(frozen=True)
-class WindowFit:
+class WindowFit(NamedTuple):
     """Lines of some channels in some windows of one run."""
 
     z: ComplexArray  #: (n_windows, n_lines, n_channels) complex: phasors; NaN where a window gives none
@@ -47,19 +45,10 @@ class WindowFit:
         z = np.full((windows, lines, channels), np.nan + 0j)
         return WindowFit(z, missing, missing.copy(), np.ones((windows, channels)))
 
-    def put(
-        self,
-        windows: IntArray,
-        part: WindowFit,
-        lines: BoolArray | None = None,
-        channels: Sequence[bool] | None = None,
-    ) -> None:
-        """Put the fit of some windows, lines and channels, by default of all, in the place of what is there."""
-        chosen_lines = np.ones(self.z.shape[1], dtype=bool) if lines is None else lines
-        chosen = np.ones(self.z.shape[2], dtype=bool) if channels is None else np.asarray(channels)
-        self.z[np.ix_(windows, chosen_lines, chosen)] = part.z
-        table = np.ix_(windows, chosen)
-        self.mean[table], self.scale[table], self.lost[table] = part.mean, part.scale, part.lost
+    def put(self, windows: slice, part: WindowFit) -> None:
+        """Put the fit of some windows in the place of what is there."""
+        for values, fitted in zip(self, part):
+            values[windows] = fitted
 
 
 class LineFitter:

@@ -43,9 +43,8 @@ def film_lines(run: RunPhasors) -> tuple[FilmLines | None, ...]:
 
     result = []
     for i, driven in enumerate(run.lines.excitation):
-        wanted = {"2f": 2 * driven.frequency, "3f": 3 * driven.frequency}
-        if run.lines.speed > 0:
-            wanted["2X-f"] = abs(2 * run.lines.speed - driven.frequency)
+        crossed = abs(2 * run.lines.speed - driven.frequency)
+        wanted = {"2f": 2 * driven.frequency, "3f": 3 * driven.frequency, "2X-f": crossed}
         lines = {}
         for name, frequency in wanted.items():
             place = _alone(run, frequency, name)

@@ -12,6 +12,7 @@ from rigdata.campaign import Campaign
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError
 from rigdata.run import Run
+from tpjb_ident.phasors.whole_record import hann_amplitude
 
 #: Excitations this near to one of them make the question matter [Hz].
 _NEAR = 0.3
@@ -25,9 +26,8 @@ _APART = 1.0
 
 def mains_frequency(campaign: Campaign, usual: float) -> float:
     """Frequency of the mains [Hz]."""
-    nominal = getattr(campaign, "mains", None)
-    if nominal is not None:
-        return float(nominal)
+    if campaign.mains is not None:
+        return campaign.mains
     driven = np.array([run.point.excitation_hz for run in campaign.of_kind("dynamic")])
     coincident = [c for c in MAINS_FREQUENCIES if (np.abs(driven - c) < _NEAR).any()]
     if not coincident or usual not in MAINS_FREQUENCIES:
@@ -57,15 +57,13 @@ def _line_at(run: Run, choice: float) -> list[bool]:
         records = [run.vector(q, 0, min(run.length, _LOOK)) for q in ("displacement", "force")]
     except RigDataError:  # the run's own reading says so
         return []
-    usable = [record for record in records if record.rate >= 3 * choice and len(record) >= record.rate]
-    shown = False
-    for record in usable:
-        n = len(record)
-        window = np.hanning(n)[:, None]
-        spectrum = np.fft.rfft((record.values - record.values.mean(axis=0)) * window, axis=0)
-        amplitude = np.linalg.norm(spectrum, axis=1)
-        away, width = np.abs(np.fft.rfftfreq(n, 1 / record.rate) - choice), max(0.2, 2 * record.rate / n)
-        around = (away > 2 * width) & (away < 2 * width + 4.0)
-        # a missing value leaves no spectrum, and no line in it
-        shown |= bool(amplitude[away <= width].max() > _CLEAR * np.median(amplitude[around]))
-    return [shown] if usable else []
+    shown = []
+    for record in records:
+        if record.rate >= 3 * choice and len(record) >= record.rate:
+            # a missing value leaves no spectrum, and no line in it
+            amplitude = np.linalg.norm(hann_amplitude(np.fft.rfft(record.values, axis=0)), axis=1)
+            step = record.rate / len(record)
+            away, width = np.abs(step * np.arange(len(amplitude)) - choice), max(0.2, 2 * step)
+            around = (away > 2 * width) & (away < 2 * width + 4.0)
+            shown.append(bool(amplitude[away <= width].max() > _CLEAR * np.median(amplitude[around])))
+    return [any(shown)] if shown else []

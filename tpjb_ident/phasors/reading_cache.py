@@ -25,7 +25,7 @@ class _ReadingCache:
     """A run's reader that keeps the first samples of all channels."""
 
     def __init__(self, reader: Any, channels: Sequence[str], samples: int = SHORT) -> None:
-        self._reader, self._channels = reader, tuple(channels)
+        self._reader, self._channels = reader, channels
         self.samples = min(samples, reader.length())
 
     def __getattr__(self, name: str) -> Any:
@@ -76,8 +76,8 @@ def with_kept_beginning(run: Run) -> Run:
         return run
     apart = run.reader.apart()
     names = [name for name, c in run.channels.items() if c.quantity != "time" and name not in apart]
-    cached: Any = _ReadingCache(run.reader, names)
-    return replace(run, reader=cached)
+    reader: Any = _ReadingCache(run.reader, names)
+    return replace(run, reader=reader)
 
 
 def beginning_of(run: Run, samples: int | None = None) -> Run:

@@ -8,16 +8,15 @@ from functools import cached_property
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.calibration import Channel
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.vector import directions, plane_vector
 from tpjb_ident.conditions import Condition
-from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.bad_samples import usual_scale
 from tpjb_ident.phasors.lines import LineSet, LineSettings
 from tpjb_ident.phasors.windows import WindowSettings
 
-QUANTITIES = ("displacement", "force", "acceleration")
+QUANTITIES = VECTOR_QUANTITIES
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class RunPhasors:
     span: tuple[float, float] | None = None  #: s: part of the record with one excitation; None: all of it
     device: tuple[str, ...] = ()  #: (n_channels,): clock terms exist between devices only
     #: (n_whole_lines, n_channels) complex, SI: phasors of the whole record's lines, those of the windows first
-    record: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex))
+    record: ComplexArray = field(default_factory=lambda: np.empty((0, 1), complex))
     #: by line of the whole record, (n_bins, n_channels) complex: residual in the bins around it
     residual: tuple[ComplexArray, ...] = ()
     rounding: FloatArray = field(default_factory=lambda: np.empty(0))  #: (n_channels,), SI^2: by it on a line, at most
@@ -100,31 +99,23 @@ class RunPhasors:
     def divided(self, gains: ComplexArray) -> RunPhasors:
         """The run without gains of its channels at the whole record's lines, (n_whole_lines, n_channels)."""
         residual = tuple(bins / gain for bins, gain in zip(self.residual, gains))
-        record = self.record / gains if len(self.record) else self.record
+        record = self.record / gains[: len(self.record)]
         return replace(self, z=self.z / gains[: self.z.shape[1]], record=record, residual=residual)
 
     def film_force(self, values: ComplexArray) -> ComplexArray:
-        """X and Y (.., 2) of the oil force [N] by values (.., n_channels) of all channels."""
-        moves = bool(self.pick("acceleration"))
-        a = self.plane("acceleration", values) if moves else None
-        return oil_force(self.plane("force", values), a, self.housing_mass if moves else 0.0)
+        """X and Y (.., 2) of the oil force [N] by values (.., n_channels) of all channels.
+
+        Housing balance: F_oil = F_cell + m_h a_h, with F_cell the force with which the housing pushes the cells and a_h
+        the absolute acceleration of the housing.
+        """
+        force = self.plane("force", values)
+        if self.pick("acceleration"):
+            force += self.housing_mass * self.plane("acceleration", values)
+        return force
 
     def oil_force(self, line: int | slice = 0) -> ComplexArray:
         """Oil-force phasors at one line, shape (n, 2) [N], or at several, (n, n_lines, 2)."""
         return self.film_force(self.z[:, line])
-
-
-def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | None, housing_mass: float) -> ComplexArray:
-    """Oil-film force phasors, (..., 2) [N]; `cell_force` (..., 2) [N], `housing_acceleration` (..., 2).
-
-    Housing balance: F_oil = F_cell + m_h a_h, with F_cell the force with which the housing pushes the cells and a_h the
-    absolute acceleration of the housing.
-    """
-    if not (np.isfinite(housing_mass) and housing_mass >= 0):
-        raise BadInputError(f"housing mass must be finite and not negative, got {housing_mass} kg")
-    if housing_acceleration is None:
-        return np.asarray(cell_force, dtype=complex)
-    return np.asarray(cell_force + housing_mass * housing_acceleration, dtype=complex)
 
 
 def complex_median(z: ComplexArray) -> ComplexArray:

@@ -14,7 +14,7 @@ import numpy as np
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition
+from tpjb_ident.phasors.compensation import compensated, filled_channels
 from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.found_lines import lines_beside, near_line, unexpected_lines
 from tpjb_ident.phasors.frequency import DRIFT, device_rates, retuned, tuned
@@ -45,7 +45,7 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
     device = tuple(
         f"{slower[c.name].rate:.4g} Hz" if c.name in slower else d for c, d in zip(result.channels, result.device)
     )
-    conditions = merged(fit.conditions, result.lines.conditions, slower_condition(slower))
+    conditions = merged(fit.conditions, result.lines.conditions)
     return compensated(replace(result, conditions=conditions, device=device), run, slower, settings.delays)
 
 
@@ -70,13 +70,13 @@ class _RunFit:
     def __init__(self, run: Run, housing_mass: float, settings: PhasorSettings) -> None:
         self.run, self.mass, self.settings = run, housing_mass, settings
         self.driven = settings.excitation_lines or (run.point.excitation_hz,)
-        speed, self.conditions = shaft_speed(run)
-        self._fit(self._lines(self.driven, speed, ()), None)
+        self.speed, self.conditions = shaft_speed(run)
+        self._fit(self._lines(self.driven, ()))
         self.slower = filled_channels(run)
-        self._add_unexpected(speed)
-        self._add_near(speed)
+        self._add_unexpected()
+        self._add_near()
         for _ in range(_TUNINGS):
-            better = tuned(run, self.result, self.driven, speed, settings)
+            better = tuned(run, self.result, self.driven, self.speed, settings)
             if better is None:
                 break
             self.conditions += better.conditions
@@ -92,7 +92,7 @@ class _RunFit:
         """Fit all of a long run with the lines of its beginning."""
         first, share = self.result, np.sqrt(self.run.length / run.length)
         self.run = run
-        self._fit_windows(first.lines, None)
+        self._fit_windows(first.lines)
         self.conditions = tuple(c for c in self.conditions if c != DRIFT)
         better = tuned(run, self.result, self.driven, first.lines.speed, self.settings)
         if better is not None:
@@ -106,33 +106,34 @@ class _RunFit:
         residual = tuple(share * bins for bins in first.residual)
         self.result = replace(self.result, record=first.record, residual=residual, rounding=first.rounding)
 
-    def _lines(self, excitation: tuple[float, ...], speed: float, extra: tuple[float, ...]) -> LineSet:
+    def _lines(self, excitation: tuple[float, ...], extra: tuple[float, ...]) -> LineSet:
         run, rate = self.run, self.run.sample_rate
-        if not max(excitation) < HIGHEST * rate:
-            fault = f"{rate:g} samples per second cannot show an excitation of {max(excitation):g} Hz"
+        beyond = [f for f in excitation if not 0.0 < f < HIGHEST * rate]
+        if beyond:
+            fault = f"{rate:g} samples per second cannot show an excitation of {beyond[0]:g} Hz"
             cure = "Check sample_rate, the unit of the time column (ms called s?) and excitation_frequency"
             raise refuse(run.file, "time", fault, cure, run.id)
-        return known_lines(excitation, speed, rate, self.settings.lines, extra, run.length / rate)
+        return known_lines(excitation, self.speed, rate, self.settings.lines, extra, run.length / rate)
 
-    def _fit(self, lines: LineSet, follow: ShaftCourse | None) -> None:
+    def _fit(self, lines: LineSet, follow: ShaftCourse | None = None) -> None:
         self._fit_windows(lines, follow)
         self.records = whole_records(self.run, self.result)
 
-    def _fit_windows(self, lines: LineSet, follow: ShaftCourse | None) -> None:
+    def _fit_windows(self, lines: LineSet, follow: ShaftCourse | None = None) -> None:
         """Windows of the run's longest stretch of one excitation."""
         self.follow = follow
         windows = extract(self.run, self.mass, self.settings, lines, follow, self.clocks)
         self.result = longest_stretch(windows, self.run.sample_rate)
 
-    def _add_unexpected(self, speed: float) -> None:
+    def _add_unexpected(self) -> None:
         """Fit lines along that stand out of the residual, but for the images of what was filled up."""
         images = [slow.images(self.result.lines.frequencies) for slow in self.slower.values()]
         extra, conditions = unexpected_lines(self.records, self.result, np.ravel(images))
         if extra:
             self.conditions += conditions
-            self._fit(self._lines(self.driven, speed, extra), None)
+            self._fit(self._lines(self.driven, extra))
 
-    def _add_near(self, speed: float) -> None:
+    def _add_near(self) -> None:
         """Fit lines along that no window tells from the excitation: their beat looks like a drive off its set point."""
         lines, exact, neighbours = self.result.lines, list(self.result.lines.driven), []
         for i in range(len(exact)):
@@ -141,7 +142,7 @@ class _RunFit:
                 exact[i] = pair[0]
                 neighbours.append(pair[1])
         if neighbours:
-            self._fit(self._lines(tuple(exact), speed, (*lines.found, *neighbours)), None)
+            self._fit(self._lines(tuple(exact), (*lines.found, *neighbours)))
             self.conditions += (lines_beside(tuple(neighbours)),)
 
 

@@ -20,6 +20,8 @@ _LOCKED = 0.98
 _CLEAR = 10.0
 #: Samples of the keyphasor that are looked at.
 _LOOK = 2**17
+#: Unit phasors where nothing tells the shaft's turning.
+_NO_TURNS = np.empty(0, complex)
 
 
 @dataclass(frozen=True)
@@ -65,40 +67,33 @@ def shaft_phases(run: Run, phasors: RunPhasors) -> ComplexArray:
     phases = np.full(len(phasors.lines.excitation), np.nan + 0j)
     for i, line in enumerate(phasors.lines.excitation):
         n = shaft_order(line.frequency, phasors.lines.speed)
-        if not n:
-            continue
-        turns = _by_keyphasor(run, line.frequency / n)
-        if turns is None and n > 1:
+        turns = _by_keyphasor(run, line.frequency / n) if n else _NO_TURNS
+        if n > 1 and not len(turns):
             turns = _by_first_line(phasors, line.frequency / n)
-        if turns is None:
-            continue
-        finite_values = turns[np.isfinite(turns)]
-        mean = complex(np.sum(finite_values**n)) / max(len(finite_values), 1)
+        mean = complex(np.sum(turns**n)) / max(len(turns), 1)
         if abs(mean) > _LOCKED:
             phases[i] = mean / abs(mean)
     return phases
 
 
-def _by_keyphasor(run: Run, turning: float) -> ComplexArray | None:
+def _by_keyphasor(run: Run, turning: float) -> ComplexArray:
     """Unit phasors at the frequency `turning` [Hz] of the shaft as every pulse of the keyphasor shows it."""
-    names = [c.name for c in run.channels.values() if c.quantity == "keyphasor"]
-    if not names or not isinstance(run, Run):
-        return None
-    record = run.record(names[0], 0, min(run.length, _LOOK))
-    pulses = pulse_times(record.values, record.time)
-    pulses = pulses[np.isfinite(pulses)]
-    return np.exp(-2j * np.pi * turning * pulses) if len(pulses) > 2 else None
+    pulses = np.empty(0)
+    for channel in run.of("keyphasor")[:1]:
+        record = run.record(channel.name, 0, min(run.length, _LOOK))
+        pulses = pulse_times(record.values, record.time)
+        pulses = pulses[np.isfinite(pulses)]
+    return np.exp(-2j * np.pi * turning * pulses) if len(pulses) > 2 else _NO_TURNS
 
 
-def _by_first_line(phasors: RunPhasors, turning: float) -> ComplexArray | None:
-    """Unit phasors at the frequency `turning` [Hz] of the forward part of the 1X line in every window."""
+def _by_first_line(phasors: RunPhasors, turning: float) -> ComplexArray:
+    """Unit phasors at the frequency `turning` [Hz] of the forward part of the 1X line in the windows."""
     place = phasors.lines.place("1X")
     if place is None:
-        return None
+        return _NO_TURNS
     d = phasors.displacement.phasors[:, place]
     middle = phasors.start + 0.5 * phasors.length
     z = (d[:, 0] + 1j * d[:, 1]) * np.exp(2j * np.pi * (phasors.lines.frequencies[place] - turning) * middle)
-    good = z[np.isfinite(z)]
-    if not len(good) or not abs(good.mean()) > _CLEAR * good.std() / np.sqrt(len(good)):
-        return None
-    return np.asarray(z / np.abs(z))
+    z = z[np.isfinite(z)]
+    is_clear = len(z) and abs(z.mean()) > _CLEAR * z.std() / np.sqrt(len(z))
+    return np.asarray(z / np.abs(z)) if is_clear else _NO_TURNS

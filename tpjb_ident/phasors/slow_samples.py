@@ -11,21 +11,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage, special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.calibration import Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
 from rigdata.vector import directions
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.bad_samples import robust_deviation
-
-if TYPE_CHECKING:
-    from rigdata.calibration import Channel
-    from rigdata.campaign import Run
 
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
 _SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch
@@ -75,7 +72,7 @@ def spare_slopes(run: Run, along: FloatArray) -> dict[str, FloatArray]:
     """
     slopes: dict[str, FloatArray] = {}
     for quantity in ("force", "displacement"):
-        names = [name for name, c in run.channels.items() if c.quantity == quantity and c.axis is not None]
+        names = [channel.name for channel in run.vector_channels(quantity)]
         if len(names) < 3:
             continue
         moved = run.vector(quantity).values @ along.T
@@ -92,7 +89,7 @@ def refused_runs(problems: Sequence[Problem]) -> tuple[Condition, ...]:
     """A condition that names the runs which were left out, with the first reason of each; none where all are used."""
     reasons = {str(problem.run): problem.what for problem in reversed(problems)}
     listed = "; ".join(f"{run} ({reasons[run]})" for run in sorted(reasons))
-    return (Condition("runs-refused", listed),) if reasons else ()
+    return holding((reasons, "runs-refused", listed))
 
 
 def piece_means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
@@ -158,10 +155,11 @@ def live_run(run: Run) -> Run:
     in the curve itself gives it away, but readings without noise do.
     """
     statistics = _statistics(run)
-    run = _without_dead_spares(run, statistics)
-    problems = []
+    alive = [c for name, c in run.channels.items() if name not in statistics or not statistics[name].constant]
+    used = {name: c for name, c in run.channels.items() if c in alive or not is_spare(c, alive)}
+    run, problems = replace(run, channels=used), []
     for quantity in ("force", "displacement"):
-        alike = [name for name, c in run.channels.items() if c.quantity == quantity]
+        alike = [channel.name for channel in run.of(quantity)]
         moving = [_repeated(statistics[name]) for name in alike if not statistics[name].constant]
         if (
             max(moving, default=0.0) <= _NOISE_FREE
@@ -194,13 +192,6 @@ def is_spare(channel: Channel, alive: Sequence[Channel]) -> bool:
     """Whether the others of a channel's quantity that are alive tell the plane without it."""
     axes = [c.axis for c in alive if c.quantity == channel.quantity and c.name != channel.name and c.axis is not None]
     return len(axes) > 1 and bool(np.linalg.svd(directions(axes), compute_uv=False)[-1] > _PLANE)
-
-
-def _without_dead_spares(run: Run, statistics: Mapping[str, ChannelStatistics]) -> Run:
-    """The run without channels that read one value throughout, where others tell the plane without them."""
-    alive = [c for name, c in run.channels.items() if name not in statistics or not statistics[name].constant]
-    channels = {name: c for name, c in run.channels.items() if c in alive or not is_spare(c, alive)}
-    return run if len(channels) == len(run.channels) else replace(run, channels=channels)
 
 
 def contradictions(

@@ -4,7 +4,6 @@ Windows of another excitation, of none, or across the change say nothing of the 
 has. A change of the drive shows in forces and displacements alike; what shows in one of them is a fault of channels.
 """
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -28,9 +27,9 @@ def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
     """The run with the windows of its longest stretch alone; those of others give no phasor."""
     driven = len(result.lines.excitation)
     noise = phasor_noise(result, rate)
-    live = np.isfinite(noise) & np.array([c.quantity != "acceleration" for c in result.channels])
-    z = result.z[:, :driven, live] / noise[live]
-    quantity = np.array([c.quantity for c, is_live in zip(result.channels, live) if is_live])
+    quantity = np.array([c.quantity for c in result.channels])
+    live = np.isfinite(noise) & (quantity != "acceleration")
+    z, quantity = result.z[:, :driven, live] / noise[live], quantity[live]
     good = np.flatnonzero(np.isfinite(z).all(axis=(1, 2)))
     if len(good) < _LEAST or len(set(quantity)) < 2:
         return result
@@ -39,17 +38,15 @@ def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
     cuts = sorted(_cuts(groups, 0, len(good)))
     level = np.sqrt(np.mean(np.abs(windows) ** 2, axis=(1, 2)))
     idle = (level < _DEVIATIONS) | (level < _QUIET * np.quantile(level, 0.9))
-    if not cuts and not (idle.any() and np.median(level) > _DEVIATIONS):
+    is_steady = not cuts and not (idle.any() and np.median(level) > _DEVIATIONS)
+    if is_steady or idle.all():
         return result
     inside = _longest(windows.reshape(len(good), -1), np.array([0, *cuts, len(good)]), idle)
-    if not inside.any():
-        return result
-    outside = np.ones(len(result.start), dtype=bool)
-    outside[good[inside]] = False
-    outside &= np.isfinite(result.z).any(axis=(1, 2))
-    first, last = good[inside][[0, -1]]
-    span = float(result.start[first]), float(result.start[last] + result.length)
-    return replace(result, z=np.where(outside[:, None, None], np.nan, result.z), span=span)
+    repeats = good[inside]
+    z = np.full_like(result.z, np.nan)
+    z[repeats] = result.z[repeats]
+    first, last = result.start[repeats[[0, -1]]].tolist()
+    return replace(result, z=z, span=(first, last + result.length))
 
 
 def _cuts(groups: list[ComplexArray], first: int, stop: int) -> list[int]:
@@ -58,15 +55,15 @@ def _cuts(groups: list[ComplexArray], first: int, stop: int) -> list[int]:
         return []
     parts = [group[first:stop] for group in groups]
     joined = np.concatenate(parts, axis=1)
-    total = _scatter(joined)
     places = range(_LEAST, stop - first - _LEAST + 1)
     remainders = [_scatter(joined[:k]) + _scatter(joined[k:]) for k in places]
     best = places[int(np.argmin(remainders))]
-    levels = [(part[:best].mean(axis=0), part[best:].mean(axis=0)) for part in parts]
-    largest = [max(np.linalg.norm(before), np.linalg.norm(after)) for before, after in levels]
-    changes = [np.linalg.norm(after - before) for before, after in levels]
-    if min(remainders) > _LEFT * total or any(change < _CHANGE * size for change, size in zip(changes, largest)):
+    if min(remainders) > _LEFT * _scatter(joined):
         return []
+    for part in parts:
+        before, after = part[:best].mean(axis=0), part[best:].mean(axis=0)
+        if np.linalg.norm(after - before) < _CHANGE * max(np.linalg.norm(before), np.linalg.norm(after)):
+            return []
     cut = first + best
     return [*_cuts(groups, first, cut), cut, *_cuts(groups, cut, stop)]
 
@@ -79,14 +76,8 @@ def _scatter(windows: ComplexArray) -> float:
 
 def _longest(windows: ComplexArray, edges: IntArray, idle: BoolArray) -> BoolArray:
     """Windows (n,) of the longest driven stretch that do not lie across a change; `windows` (n, m)."""
-    inside = np.zeros(len(windows), dtype=bool)
-    for first, stop in itertools.pairwise(edges):
-        part = np.zeros(len(windows), dtype=bool)
-        part[first:stop] = ~idle[first:stop]
-        if part.sum() > inside.sum():
-            inside = part
-    if not inside.any():
-        return inside
+    stretch = np.repeat(np.arange(len(edges) - 1), np.diff(edges))
+    inside = ~idle & (stretch == np.bincount(stretch[~idle]).argmax())
     places = np.flatnonzero(inside)
     middle = complex_median(windows[places])
     distance: FloatArray = np.linalg.norm(windows - middle, axis=1)

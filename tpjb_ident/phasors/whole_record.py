@@ -13,10 +13,10 @@ from scipy.ndimage import median_filter
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.run import Run
 from tpjb_ident.phasors.bad_samples import white_noise
-from tpjb_ident.phasors.channel_times import Samples, device_readers
+from tpjb_ident.phasors.channel_times import device_readers
 from tpjb_ident.phasors.frequency import exact_frequencies
 from tpjb_ident.phasors.line_fit import LineFitter
-from tpjb_ident.phasors.lines import LineSet
+from tpjb_ident.phasors.lines import HIGHEST, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Noise of a line is looked at in the bins so far from it [1 / record length],
@@ -80,25 +80,22 @@ def whole_records(run: Run, result: RunPhasors) -> tuple[WholeRecord, ...]:
         first, stop = 0, reader.length
         if result.span is not None:
             first, stop = np.minimum(reader.first_samples(np.array(result.span)), reader.length).tolist()
-        samples = reader.read(first, stop)
-        if samples.time is None and first:
-            samples = replace(samples, time=np.arange(first, stop) / reader.rate)
-        records.append(fitted_whole(samples, reader.rate, result.lines, frequencies, places))
+        time, rows = reader.read(first, stop)
+        start = first / reader.rate if time is None or not np.isfinite(time[0]) else float(time[0])
+        records.append(fitted_whole(rows, start, reader.rate, result.lines, frequencies, places))
     return tuple(records)
 
 
 def fitted_whole(
-    samples: Samples, rate: float, lines: LineSet, frequencies: FloatArray, places: list[int]
+    rows: FloatArray, start: float, rate: float, lines: LineSet, frequencies: FloatArray, places: list[int]
 ) -> WholeRecord:
-    """Fit all samples of a device in one; times that stray from an even grid are taken for even."""
-    shown = frequencies < 0.45 * rate
-    fitter = LineFitter(samples.rows.shape[1], rate, frequencies[shown], _DRIFT_ORDER)
-    time = samples.time
-    start = 0.0 if time is None or not np.isfinite(time[0]) else float(time[0])
-    fit, residual = fitter.fit_with_residual(samples.rows[:, None], np.array([start]))
+    """Fit all samples (n_channels, n) of a device in one; times that stray from an even grid are taken for even."""
+    shown = frequencies < HIGHEST * rate
+    fitter = LineFitter(rows.shape[1], rate, frequencies[shown], _DRIFT_ORDER)
+    fit, residual = fitter.fit_with_residual(rows[:, None], np.array([start]))
     z = np.full((len(shown), len(places)), np.nan + 0j)
     z[shown] = fit.z[0]
-    return WholeRecord(lines, places, z, 1 - fit.lost[0], residual[:, 0], rate, start, _rounding(samples.rows))
+    return WholeRecord(lines, places, z, 1 - fit.lost[0], residual[:, 0], rate, start, _rounding(rows))
 
 
 def _rounding(rows: FloatArray) -> FloatArray:

@@ -58,14 +58,11 @@ def line_design(time: FloatArray, frequencies: FloatArray, drift_order: int = 1)
 
 def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, rate: float) -> float:
     """Worst variance of an excitation phasor against a fit of that line alone; `frequencies` (n_lines,)."""
-    n = round(length * rate)
-    if n <= 2 * len(frequencies) + 2:
-        return math.inf
     # A few hundred samples carry the whole geometry as long as no line aliases.
     step = max(1, int(rate / (8.0 * frequencies.max())))
-    design = line_design(np.arange(0, n, step) / rate, frequencies)
+    design = line_design(np.arange(0, round(length * rate), step) / rate, frequencies)
     if design.shape[0] <= design.shape[1]:
-        design = line_design(np.arange(n) / rate, frequencies)
+        return math.inf
     r = np.linalg.qr(design, mode="r")
     if np.abs(np.diag(r)).min() < 1e-9 * np.abs(np.diag(r)).max():
         return math.inf
@@ -81,7 +78,7 @@ def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> fl
     start = settings.min_cycles / min(lines.driven)
     length = start
     # A dozen beats between neighbours separate any two lines; what is not resolved then never is.
-    longest = max(start, 12.0 / _gap(lines)) if np.isfinite(_gap(lines)) else 2 * start
+    longest = max(start, 12.0 / _gap(lines))
     while length <= longest:
         if variance_inflation(frequencies, n_driven, length, rate) <= settings.max_inflation:
             return length

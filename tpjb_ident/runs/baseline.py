@@ -11,7 +11,7 @@ import numpy as np
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from tpjb_ident.check.observation import observe
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.blocks import RigStiffness
 from tpjb_ident.estimators.estimate import estimate_table
 from tpjb_ident.estimators.r_matrix import phasor_table
@@ -51,7 +51,7 @@ def dry_test(campaign: Campaign, settings: PhasorSettings, method: str) -> DryTe
     good = sorted((est for est in estimates if np.isfinite(est.covariance).all()), key=lambda est: est.omega)
     bad = [f"{est.omega / (2 * np.pi):g} Hz" for est in estimates if not np.isfinite(est.covariance).all()]
     text = f"the baseline runs at {', '.join(bad)} give no answer: two directions are needed"
-    conditions = (Condition("baseline-missing", text),) if bad else ()
+    conditions = holding((bad, "baseline-missing", text))
     if not good:
         return DryTest(conditions=conditions)
     parts = (np.array([getattr(est, name) for est in good]) for name in ("omega", "h", "covariance"))

@@ -75,7 +75,7 @@ def gather(runs: list[RunPhasors], digests: Sequence[RunDigest] = ()) -> list[Po
     points = []
     for point, members in group([(run.point, run.lines.driven) for run in runs]):
         data = point_data(point, [(runs[k], i) for k, i in members])
-        points.append(replace(data, digests=tuple(digests[k] for k, _ in members) if digests else ()))
+        points.append(replace(data, digests=tuple(digests[k] for k, _ in members if digests)))
     return points
 
 
@@ -109,15 +109,13 @@ def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> 
 
 def mean_temperatures(run: Run) -> dict[int, float]:
     """Mean temperature per pad over a run [K]; pads with several sensors give their mean."""
-    table: dict[int, list[float]] = {}
+    means = []
     for sensor in run.temperatures():
-        if sensor.pad is None:
-            continue
         values = run.record(sensor.name, 0, _TEMPERATURE_SAMPLES).values
-        finite_values = values[np.isfinite(values)]
-        if len(finite_values):
-            table.setdefault(sensor.pad, []).append(float(finite_values.mean()))
-    return {pad: float(np.mean(values)) for pad, values in sorted(table.items())}
+        values = values[np.isfinite(values)]
+        if sensor.pad is not None and len(values):
+            means.append({sensor.pad: float(values.mean())})
+    return pad_means(means)
 
 
 def pad_means(runs: Sequence[dict[int, float]]) -> dict[int, float]:

@@ -99,8 +99,7 @@ def missed_load(misses: ComplexArray, members: Sequence[int]) -> complex:
 
 def static_loads(campaign: Campaign, points: Sequence[LoadCase]) -> StaticLoads:
     """Zero of the cells, and the misses of all runs of a campaign's points."""
-    cells = [channel for channel in campaign.channels.values() if channel.quantity == "force"]
-    stated = float(max((getattr(cell, "zero_uncertainty", 0.0) for cell in cells), default=0.0))
+    stated = max((c.zero_uncertainty for c in campaign.channels.values() if c.quantity == "force"), default=0.0)
     set_points = np.concatenate([np.full(len(data.mean_loads), _set_point(data)) for data in points])
     zero, error = cell_zero(np.concatenate([_measured(data) for data in points]), set_points, stated)
     return StaticLoads(*load_misses(points, zero), zero, error)
@@ -132,7 +131,7 @@ def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[C
     common = _common_ratio(measured) if len(measured) else complex(1.0)
     if without_static_part(measured):
         common = 0j
-    if not len(measured) or not 0.5 < abs(common.real) < 2.0:  # such cells correct nothing, but are told
+    if not 0.5 < abs(common.real) < 2.0:  # such cells correct nothing, but are told
         return [np.zeros(len(ratio), complex) for ratio in ratios], common
     return [np.nan_to_num(ratio / common - 1.0) for ratio in ratios], common
 
