@@ -18,7 +18,7 @@ def observation(load, size, stated=0.0, force=0.0, displacement=45.0, frequency=
     run = SimpleNamespace(id="r", file="r.csv", point=point, excitation_direction=np.radians(stated))
     lines = {"displacement": 1e-6 * directions(np.radians(displacement)), "force": size * directions(np.radians(force))}
     return SimpleNamespace(
-        run=run, report=Reporter(run), other_line=np.nan, shows=lambda quantity: True,
+        run=run, report=Reporter(run), conditions=(), shows=lambda quantity: True,
         film_force=lambda mass: lines["force"], line=lines.get, names=lambda quantity: ["L1H", "L1V"],
         of=lambda quantity: [],
     )  # fmt: skip

@@ -42,6 +42,7 @@ def campaign(described, runs, mount=None):
         channels={c.name: c for c in described},
         of_kind=lambda kind: [observation.run for observation in runs],
         housing_mass=MASS,
+        mass_uncertainty=0.0,
         mount=mount,
     )
 

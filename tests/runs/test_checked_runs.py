@@ -11,12 +11,14 @@ from rigdata.readers.hdf5.reader import Hdf5Reader
 from rigdata.readers.text import csv
 from tests.rigs.acquisition import EXACT, Acquisition
 from tests.rigs.closed_form import Rig, channels_of, with_entries, write_rig
+from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Reporter, verdicts
 from tpjb_ident.check.observation import observe
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.reading_cache import beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_data import PhasorSettings
+from tpjb_ident.phasors.run_phasors import run_phasors
 from tpjb_ident.runs.run_store import packed, unpacked
 
 QUICK = Rig(frequencies=(25.0,), directions=(0.0, 30.0, 60.0, 90.0, 120.0, 150.0), seconds=1.5)
@@ -140,3 +142,14 @@ def test_records_of_several_excitations_are_checked_at_each(tmp_path):
     assert all("run-left-out" in p.quality for p in lost.points)
     turned = identify(written(tmp_path / "cells", rig, L1V={"gain": -1.0}), settings)
     assert all("records-contradicted" in p.quality for p in turned.points)
+
+
+@pytest.mark.slow
+def test_a_drive_off_its_set_point_is_what_identification_makes_of_it(tmp_path):
+    """By 2.8 %: measured where it is, as the run's phasors say, and no error of the check."""
+    campaign = written(tmp_path, replace(QUICK, seconds=4.0, detune=0.7))
+    assert check_campaign(campaign) == []
+    for run in campaign.of_kind("dynamic"):
+        phasors = run_phasors(run, campaign.housing_mass)
+        assert phasors.conditions == ("excitation off set point",)
+        assert phasors.lines.driven == (pytest.approx(25.7, abs=2e-3),)

@@ -186,12 +186,11 @@ def verdicts(reports: Sequence[Reporter]) -> Verdicts:
     result = Verdicts()
     alike = len({report.run.id for report in reports})
     for (key, severity), concerned in groups.items():
-        for run, problem in concerned.items():
-            if severity == "warning":
-                warnings = result.run_gains if key.startswith(RUN_GAIN) else result.doubtful
-                warnings.setdefault(run, []).append(problem)
-            elif severity == "error" and is_shared(len(concerned), alike):
-                result.shared.setdefault(run, []).append(problem)
-            elif severity == "error":
-                result.unusable.setdefault(run, problem)
+        warnings = result.run_gains if key.startswith(RUN_GAIN) else result.doubtful
+        if severity == "error" and not is_shared(len(concerned), alike):
+            result.unusable.update(concerned | result.unusable)
+        elif severity != "note":
+            gathered = warnings if severity == "warning" else result.shared
+            for run, problem in concerned.items():
+                gathered.setdefault(run, []).append(problem)
     return result

@@ -1,4 +1,4 @@
-"""What a record shows of its excitation: by the phasors of identification; strong lines of a band; other lines."""
+"""What a record shows of its excitation: by the phasors of identification; strong lines of a band."""
 
 from __future__ import annotations
 
@@ -102,21 +102,6 @@ def steady_level(values: FloatArray, rate: float, frequencies: Sequence[float]) 
     return RecordLines(fit.mean[0], np.full(values.shape[1], np.nan), fit.scale[0])
 
 
-def other_line(phasors: RunPhasors, astray: Sequence[int] = ()) -> float:
-    """Frequency of the line that nobody mentioned and that is strongest in the cells [Hz]; NaN where there is none.
-
-    Excitation lines that are `astray`, by number, are not where they were said to be: nobody mentioned them either.
-    """
-    strongest, frequency = 0.0, float("nan")
-    for k, line in enumerate(phasors.lines.excitation + phasors.lines.nuisance):
-        if line.name == "found" or k in astray:
-            sizes = np.linalg.norm(phasors.cell_force.phasors[:, k], axis=1)
-            size = float(np.max(sizes, initial=0.0, where=np.isfinite(sizes)))
-            if size > strongest:
-                strongest, frequency = size, line.frequency
-    return frequency
-
-
 def band_lines(run: Run, level: RecordLines, values: FloatArray, force: Sequence[int]) -> RecordLines:
     """The level of a run with strong lines of its excitation over a band, and what noise makes of a line.
 
@@ -126,17 +111,16 @@ def band_lines(run: Run, level: RecordLines, values: FloatArray, force: Sequence
     `values` (n, m), `force`: places of the cells.
     """
     finite = np.isfinite(values)
-    if run.band is None or not len(force) or len(values) < 64 or not finite.any(axis=0).all():
+    if run.band is None or not len(force) or not finite.any(axis=0).all():
         return level
     window = np.hanning(len(values))
     centred = np.where(finite, values - np.nanmedian(values, axis=0), 0.0)
     spectrum = np.fft.rfft(centred * window[:, None], axis=0) * (2 / window.sum())
     frequency = np.fft.rfftfreq(len(values), 1 / run.sample_rate)
     free = np.ones(len(frequency), dtype=bool)
-    for line in (run.point.shaft_speed_hz, *MAINS_FREQUENCIES):
-        if line > 0:
-            nearest = line * np.maximum(np.round(frequency / line), 1)
-            free &= np.abs(frequency - nearest) > _CLEAR_OF * frequency[1]
+    for line in filter(None, (run.point.shaft_speed_hz, *MAINS_FREQUENCIES)):
+        nearest = line * np.maximum(np.round(frequency / line), 1)
+        free &= np.abs(frequency - nearest) > _CLEAR_OF * frequency[1]
     inside = np.flatnonzero(free & (frequency >= run.band[0]) & (frequency <= run.band[1]))
     above = free & (frequency > _ABOVE * run.band[1]) & (frequency < 0.45 * run.sample_rate)
     if len(inside) < _BAND_LINES or above.sum() < _BAND_LINES:

@@ -12,33 +12,30 @@ from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
-from rigdata.vector import directions
+from rigdata.vector import directions, plane_vector
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.lines import (
     RecordLines,
     band_lines,
     excitation_line,
-    other_line,
     shaft_force,
     shaft_line,
     steady_level,
 )
-from tpjb_ident.check.signals import check_clock, check_signal, needed
+from tpjb_ident.check.signals import ALWAYS_NEEDED, check_clock, check_signal, needed
 from tpjb_ident.check.wiring import plane_of
+from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.phasors.bad_samples import white_noise
 from tpjb_ident.phasors.reading_cache import with_kept_beginning
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.run_phasors import run_phasors
 from tpjb_ident.phasors.windows import RecordTooShortError
-from tpjb_ident.terms.mains import MAINS_ON_LINE
 
 #: Samples read at a time; signs and lines are judged on the first block [samples].
 _BLOCK = 2**19
 _FITTED = 2**16
 _DECIMATED = 4000
-#: Share of the set point by which an excitation may be off.
-OFF_SET_POINT = 0.02
 #: Key of the finding that a record was computed without noise.
 NO_NOISE = "no noise"
 #: Samples that tell the quantiles of a channel, and whether it has noise.
@@ -63,11 +60,10 @@ class Observation:
     samples: FloatArray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
     digest: str = ""
     speed: float = math.nan
-    other_line: float = math.nan
     #: (m,): size of what turns with the shaft, SI; empty where nothing tells it
     shaft_line: FloatArray = field(default_factory=lambda: np.empty(0), repr=False)
     shaft_force: float = math.nan  #: of the 1X force, see `tpjb_ident.check.lines`
-    on_mains: bool = False  #: whether mains, of another phase in every run, stand on its excitation line
+    conditions: tuple[Condition, ...] = ()  #: of its phasors
 
     def pick(self, quantity: str) -> list[int]:
         """Places of the channels of `quantity` in `channels`."""
@@ -83,16 +79,15 @@ class Observation:
 
     def mean(self, quantity: str) -> FloatArray:
         """X, Y of a quantity's mean (2,); NaN where its channels do not tell it."""
-        return np.asarray(plane_of(self.of(quantity)) @ self.lines.mean[self.pick(quantity)] + self._unknown(quantity))
+        return self._vector(quantity, np.asarray(self.lines.mean, complex)).real
 
     def line(self, quantity: str) -> ComplexArray:
         """X, Y of a quantity at the excitation line (2,); NaN where its channels do not tell it."""
-        phasor = self.lines.phasor[self.pick(quantity)]
-        return np.asarray(plane_of(self.of(quantity)) @ phasor + self._unknown(quantity))
+        return self._vector(quantity, self.lines.phasor)
 
-    def _unknown(self, quantity: str) -> float:
-        """NaN, to be added to a vector that no channel tells."""
-        return 0.0 if self.pick(quantity) else math.nan
+    def _vector(self, quantity: str, values: ComplexArray) -> ComplexArray:
+        along = directions([channel.axis or 0.0 for channel in self.of(quantity)])
+        return plane_vector(along, values[self.pick(quantity)])
 
     def film_force(self, mass: float) -> ComplexArray:
         """Force phasor of the film on the housing, F_cell + m_h a_h (2,) [N]; of the cells alone where a is unknown."""
@@ -135,20 +130,18 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0, mass: fl
     for name in first:
         if not (name in at_rest and statistics[name].constant):
             check_signal(report, run.channels[name], statistics[name], noise_free, alive)
-    speeds = [first[n] for n, c in run.channels.items() if n in first and c.quantity == "speed"]
+    speeds = [first[channel.name] for channel in run.of("speed") if channel.name in first]
     speed = next((float(np.nanmedian(values)) for values in speeds if np.isfinite(values).any()), math.nan)
-    observation = Observation(run, report, digest=digest, speed=speed)
     if not timed:
-        return observation
-    thin = slice(None, None, max(1, min(length, _BLOCK) // _DECIMATED))
-    observation = replace(observation, channels=live, lines=lines, spread=_spread(used))
-    if run.kind == "clearance":
-        observation = replace(observation, samples=used[thin])
+        return Observation(run, report, digest=digest, speed=speed)
+    samples = used[:: max(1, len(used) // _DECIMATED)] if run.kind == "clearance" else np.empty((0, 0))
+    observation = Observation(run, report, live, lines, _spread(used), samples, digest, speed)
     if phasors is None:
         return observation
-    astray = [k for k in range(len(phasors.lines.excitation)) if not _near_set_point(run, phasors, k)]
-    observation = replace(observation, shaft_line=shaft_line(phasors, live), shaft_force=shaft_force(phasors))
-    return replace(observation, other_line=other_line(phasors, astray), on_mains=MAINS_ON_LINE in phasors.conditions)
+    shown, stated = phasors.lines.excitation[line].frequency, run.point.excitation_hz
+    report.ask("other frequency", abs(shown / stated - 1), shown=shown, stated=stated)
+    turning, force = shaft_line(phasors, live), shaft_force(phasors)
+    return replace(observation, shaft_line=turning, shaft_force=force, conditions=phasors.conditions)
 
 
 def _is_timed(report: Reporter, run: Run, length: int) -> bool:
@@ -166,20 +159,19 @@ def _scan(report: Reporter, run: Run, length: int) -> tuple[dict[str, ChannelSta
     """Read all blocks: statistics per channel, the first block in SI, a digest of the main readings."""
     channels = {n: c for n, c in run.channels.items() if c.quantity != "time"}
     statistics = {name: ChannelStatistics() for name in channels}
-    digests = {n: hashlib.sha256() for n, c in channels.items() if c.quantity in {"displacement", "force"}}
-    first: dict[str, FloatArray] = {}
+    digest, first = hashlib.sha256(), dict[str, FloatArray]()
     for start in range(0, length, _BLOCK):
         blocks = _read_block(report, run, channels, start, min(start + _BLOCK, length))
         channels = {n: channels[n] for n in blocks}
         for name, block in blocks.items():
             statistics[name].add(block)
-            if name in digests:
-                digests[name].update(block.tobytes())
+            if channels[name].quantity in ALWAYS_NEEDED:
+                digest.update(block.tobytes())
             if start == 0:
                 first[name] = channels[name].to_si(block)
     first = {n: v for n, v in first.items() if n in channels}
-    digest_text = "".join(digests[n].hexdigest() for n in first if n in digests)
-    return statistics, first, hashlib.sha256(digest_text.encode()).hexdigest() if digest_text else ""
+    shown = any(channels[name].quantity in ALWAYS_NEEDED for name in first)
+    return statistics, first, digest.hexdigest() if shown else ""
 
 
 def _read_block(
@@ -222,7 +214,7 @@ def _at_rest(phasors: RunPhasors, mass: float) -> frozenset[str]:
 
 def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: RecordLines) -> bool:
     """Whether noise stays below the converter's steps, as in records computed without noise."""
-    main = [i for i, c in enumerate(live) if c.quantity in {"displacement", "force"}]
+    main = [i for i, c in enumerate(live) if c.quantity in ALWAYS_NEEDED]
     for index in main:
         column = used[:_SPREAD, index]
         column = column[np.isfinite(column)]
@@ -251,23 +243,16 @@ def _phasors(report: Reporter, run: Run) -> RunPhasors | None:
 def _lines(
     run: Run, channels: Sequence[Channel], values: FloatArray, phasors: RunPhasors | None, line: int
 ) -> RecordLines:
-    """Excitation line of a sine, nothing where it is not near its set point; level of other running tests."""
+    """Excitation line of a sine; level of other running tests."""
     if phasors is not None:
-        lines = excitation_line(phasors, line, channels)
-        return lines if _near_set_point(run, phasors, line) else replace(lines, rows=np.zeros_like(lines.rows))
+        return excitation_line(phasors, line, channels)
     is_band = run.kind == "dynamic" and run.excitation_kind != "sine"
     if not is_band and run.kind != "locus":
         return RecordLines.none(len(channels))
     speed = run.point.shaft_speed_hz
     level = steady_level(values, run.sample_rate, [speed, 2 * speed, 50.0])
     force = [i for i, c in enumerate(channels) if c.quantity == "force"]
-    return band_lines(run, level, values, force) if is_band else level
-
-
-def _near_set_point(run: Run, phasors: RunPhasors, line: int) -> bool:
-    """Whether a run is excited where it is said to be: a generator is not off by hertz."""
-    set_point = run.point.excitation_hz
-    return abs(phasors.lines.excitation[line].frequency - set_point) <= OFF_SET_POINT * max(set_point, 1e-9)
+    return band_lines(run, level, values, force)
 
 
 def _spread(values: FloatArray) -> FloatArray:

@@ -31,16 +31,16 @@ _UNKNOWN = np.full((2, 2), np.nan + 0j)
 
 @dataclass(frozen=True)
 class PointRuns:
-    """Readings of the n runs of one operating point, SI: of two probes and two cells."""
+    """Readings of the n runs of one operating point, SI: of two probes and, as a rule, two cells."""
 
-    phasors: ComplexArray  #: (n, 4): X and Y in place of the cells where the runs have not the same two
+    phasors: ComplexArray  #: (n, 4)
     means: FloatArray  #: (n, 4)
     inertia: ComplexArray  #: (n, 2), N: housing mass times acceleration, X and Y
     probe_plane: FloatArray  #: `probe_plane`, `cell_plane` (2, 2): from the two readings to X and Y
     cell_plane: FloatArray
     turning: FloatArray  #: (n, 4): size of what turns with the shaft; NaN where that is not told
     observations: tuple[Observation, ...] = field(default=(), repr=False)
-    channels: tuple[Channel, ...] = ()  #: the probes, and the cells where there are two in all runs
+    channels: tuple[Channel, ...] = ()  #: probes and cells
 
     def __len__(self) -> int:
         return len(self.phasors)
@@ -61,11 +61,10 @@ class PointRuns:
         NaN where they move along one line.
         """
         D, F = self.displacement[list(runs)], self.force[list(runs)]
-        sizes = np.linalg.norm(D, axis=1)
+        sizes = np.linalg.norm(D, axis=1, keepdims=True)
         if len(sizes) < 2 or not np.all(sizes > 0):
             return _UNKNOWN
-        unit = D / sizes[:, None]
-        solution, _, _, singular = np.linalg.lstsq(unit, F / sizes[:, None], rcond=None)
+        solution, _, _, singular = np.linalg.lstsq(D / sizes, F / sizes, rcond=None)
         return np.asarray(solution.T) if singular[-1] >= _ONE_LINE * singular[0] else _UNKNOWN
 
     def misfits(self, stiffness: ComplexArray) -> FloatArray:
@@ -83,11 +82,7 @@ class PointRuns:
         pairs = [h for h in tried if np.isfinite(h).all()]
         if not pairs:
             return _UNKNOWN
-        medians = [float(np.median(self.misfits(h))) for h in pairs]
-        least = int(np.argmin(medians))
-        close = np.flatnonzero(self.misfits(pairs[least]) <= max(3 * medians[least], 1e-9))
-        refined = self.stiffness(close.tolist())
-        return refined if np.isfinite(refined).all() else pairs[least]
+        return min(pairs, key=lambda h: float(np.median(self.misfits(h))))
 
     def without(self, outliers: Collection[int]) -> list[int]:
         """Runs that are none of some outliers."""
@@ -95,7 +90,7 @@ class PointRuns:
 
 
 def point_runs(observations: Sequence[Observation], mass: float) -> list[PointRuns]:
-    """Dynamic runs by operating point: of those that show what two probes and the cells answer."""
+    """Dynamic runs by operating point and channels: of those that show what two probes and the cells answer."""
     groups: dict[object, list[Observation]] = {}
     for observation in observations:
         point, probes = observation.run.point, observation.of("displacement")
@@ -104,25 +99,19 @@ def point_runs(observations: Sequence[Observation], mass: float) -> list[PointRu
         is_clear &= observation.shows("force") and observation.shows("displacement")
         measured = np.array([observation.film_force(mass), observation.line("displacement")])
         if is_clear and len(probes) == 2 and "force" not in observation.report.doubts and np.isfinite(measured).all():
-            groups.setdefault((point, *((c.name, c.axis) for c in probes)), []).append(observation)
+            named = ((channel.name, channel.axis) for channel in [*probes, *observation.of("force")])
+            groups.setdefault((point, *named), []).append(observation)
     return [_readings(group, mass) for group in groups.values()]
 
 
 def _readings(runs: Sequence[Observation], mass: float) -> PointRuns:
     """Readings of all runs of a point, by channel."""
     probes, cells = runs[0].of("displacement"), runs[0].of("force")
-    force = np.array([run.film_force(mass) for run in runs])
-    if len(cells) == 2 and all(run.names("force") == runs[0].names("force") for run in runs):
-        plane = plane_of(cells)
-        places = [[*run.pick("displacement"), *run.pick("force")] for run in runs]
-        phasors = np.array([run.lines.phasor[k] for run, k in zip(runs, places)])
-        means = np.array([run.lines.mean[k] for run, k in zip(runs, places)])
-        turning = np.array([run.shaft_line[k] for run, k in zip(runs, places)])
-    else:
-        cells, plane = [], np.eye(2)
-        phasors = np.hstack([[run.lines.phasor[run.pick("displacement")] for run in runs], force])
-        means, turning = np.zeros((2, len(runs), 4))
-    inertia = np.asarray(force - phasors[:, 2:] @ plane.T, dtype=complex)
+    places = [[*run.pick("displacement"), *run.pick("force")] for run in runs]
+    rows = [(run.lines.phasor[k], run.lines.mean[k], run.shaft_line[k]) for run, k in zip(runs, places)]
+    phasors, means, turning = map(np.array, zip(*rows))
+    plane = plane_of(cells)
+    inertia = np.asarray([run.film_force(mass) for run in runs] - phasors[:, 2:] @ plane.T, dtype=complex)
     return PointRuns(phasors, means, inertia, plane_of(probes), plane, turning, tuple(runs), (*probes, *cells))
 
 

@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
 from tpjb_ident.check.findings import far
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import explanation, repairs
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
+from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, Sensor, film_force, stacked, vector
 from tpjb_ident.estimate.scatter import Scatter
-from tpjb_ident.estimate.sensors import alive, axes_of, found_mount, sensors_of
+from tpjb_ident.estimate.sensors import alive, axes_of, campaign_rig, sensors_of
 from tpjb_ident.estimate.shape import free_force
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.terms.axis import Axis
@@ -48,10 +48,8 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
         return None
     sensors = sensors_of(campaign)
     blocks = _blocks(sensors, clear)
-    mass = float(np.nan_to_num(campaign.housing_mass))
-    rig = Rig(sensors, mass, mount=found_mount(sensors, blocks, campaign.mount, 1.0), static=static)
-    force = vector(rig, blocks, "force") + mass * np.nan_to_num(vector(rig, blocks, "acceleration"))
-    shape, start = free_force(vector(rig, blocks, "displacement"), force)
+    rig = campaign_rig(campaign, sensors, blocks, float(static), RigStiffness())
+    shape, start = free_force(vector(rig, blocks, "displacement"), film_force(rig, blocks))
     if np.isfinite(start).all(axis=(1, 2)).sum() < _MIN_BLOCKS:
         return None
     shape = replace(shape, scatter=replace(Scatter.none(len(blocks), len(blocks)), together=True))
@@ -64,7 +62,7 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
     learnt = learnt_rig(rig, solution)
     if learnt is not rig:
         solution = solver(learnt).run()
-    _check_accelerometers(observations, learnt.of("acceleration"), blocks, solution)
+    _check_accelerometers(observations, learnt, blocks, solution)
     return solution
 
 
@@ -80,29 +78,25 @@ def _blocks(sensors: Sequence[Sensor], runs: Sequence[Observation]) -> Blocks:
         for omega, line in zip(observation.lines.omega, observation.lines.rows):
             z = np.append(line, np.nan)[places]
             present = np.isfinite(z) & np.isfinite(floor)
-            noise = np.diag(np.where(present, floor, 0.0) ** 2)
-            b = len(rows)
-            row = {"point": b, "run": b, "omega": omega, "z": np.where(present, z, 0.0), "present": present}
-            rows.append(row | {"along": along, "noise": noise, "dof": _FREEDOM})
+            row = {"point": len(rows), "run": len(rows), "omega": omega, "present": present, "along": along}
+            noise = np.diag(np.nan_to_num(floor) ** 2)
+            rows.append(row | {"z": np.where(present, z, 0.0), "noise": noise, "dof": _FREEDOM})
             points.append(replace(observation.run.point, static_load=0.0))
             names.append(observation.run.id)
     blocks = stacked(points, names, len(sensors), rows)
     return replace(blocks, present=blocks.present & alive(sensors, np.abs(blocks.z).max(axis=0), _DEAD))
 
 
-def _check_accelerometers(
-    observations: Sequence[Observation], rows: IntArray, blocks: Blocks, solution: Solution
-) -> None:
+def _check_accelerometers(observations: Sequence[Observation], rig: Rig, blocks: Blocks, solution: Solution) -> None:
     """Name the runs whose acceleration is not what springs, or the floating housing, make of it in the others."""
     housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
+    rows = rig.of("acceleration")
     if len(rows) != 2 or housing is None or housing.is_on_foundation(solution.fitted[housing.name]):
         return
     moved = housing.acceleration(blocks, solution.fitted[housing.name])
-    inverse = np.linalg.pinv(blocks.along[:, rows])
-    shown = np.einsum("naj,nj->na", inverse, blocks.z[:, rows])
-    size = np.linalg.norm(blocks.z[:, rows], axis=1)
+    shown = vector(rig, blocks, "acceleration")
     noise = np.sqrt(blocks.noise_power(rows))
-    judged = np.flatnonzero(np.isfinite(moved).all(axis=1) & (size > _CLEAR * noise))
+    judged = np.flatnonzero(np.isfinite(moved).all(axis=1) & (np.linalg.norm(shown, axis=1) > _CLEAR * noise))
     off = _off(shown, moved)[judged]
     for b in judged[far(off, _OFF, _MANY, _MIN_BLOCKS)]:
         _report(observations[b], shown[b], moved[b])

@@ -20,7 +20,7 @@ from scipy.special import fdtri, stdtr
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.findings import far
-from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.observation import NO_NOISE, Observation
 from tpjb_ident.check.response import PointRuns
 from tpjb_ident.check.wiring import explanation, repairs
 
@@ -47,15 +47,14 @@ _AGREE = 3.0
 _LEAST, _MOST_PART = 0.01, 0.9
 #: Another channel explains a run as well if it leaves no more than this: a thousandth of the likelihood.
 _AS_WELL = 2 * math.log(1e3)
+#: Variance of what is not known; keeps divisions by no information finite.
+_UNKNOWN, _NOTHING = 1e30, 1e-300
 #: Variance of a probe's mean that may have moved by anything [m^2], and what that must leave less of the squares: ln of
 #: the equations, times one more unknown.
 _ANYWHERE, _FREE = 1.0, 2.0
 #: Logarithm by which what turns with the shaft differs in one run, at one load and at others, over the median one, and
 #: runs that tell it.
 _SAME_LINE, _LIKE_LINE, _MANY_LINES, _MIN_LINES = 0.06, 0.5, 6.0, 5
-#: Distance from the median of all runs in ranges of the middle 80 % of them, and the least: a smaller one is no jump
-#: [m], dry runs press the shaft against pads on all sides; runs that tell it.
-_FAR, _MIN_JUMP, _MIN_PLACES = 3.0, {("dynamic", "locus"): 100e-6, ("dry_pivot", "clearance"): 300e-6}, 5
 #: Distance from the median of an operating point, over the runs' median one, and the least [m]: a probe that drifts by
 #: 1.5 % of a gap of 1 mm was touched, or its amplifier was.
 _STEP, _LEAST_STEP, _MIN_STEPS = 9.0, 15e-6, 4
@@ -70,58 +69,19 @@ class WrongGain(NamedTuple):
     chance: float
 
 
-class Evidence(NamedTuple):
-    """Evidence of a part 1 - 1/g; what is independent adds up, field by field."""
-
-    weighted: float  #: estimate of the part times the information
-    information: float
-    doubt: float  #: variance of the information over it, by the freedom of the noise
-
-    @property
-    def part(self) -> float:
-        """Estimate."""
-        return self.weighted / self.information if self.information > 0 else 0.0
-
-    @property
-    def error(self) -> float:
-        """Standard error."""
-        return 1 / math.sqrt(self.information) if self.information > 0 else math.inf
-
-    @property
-    def chance(self) -> float:
-        """Probability of so large a part where there is none: two-sided, by the freedom of Welch and Satterthwaite."""
-        freedom = min(self.information**2 / max(self.doubt, 1e-300), 1e9)  # infinite freedom is the normal distribution
-        return float(2 * stdtr(freedom, -abs(self.part) / self.error)) if freedom > 0 else 1.0
-
-
 class Difference(NamedTuple):
     """How one run differs from what its fellows foretell, with its covariance."""
 
-    residual: FloatArray  #: (m,)
-    noise: FloatArray  #: (m, m): covariance that the others' scatter tells
-    honest: FloatArray  #: (m, m): covariance of what honest runs differ by beyond it
+    residual: FloatArray  #: (4,)
+    noise: FloatArray  #: (4, 4): covariance that the others' scatter tells
+    honest: FloatArray  #: (4, 4): covariance of what honest runs differ by beyond it
     spare: int
-
-    def evidence(self, pattern: FloatArray) -> Evidence:
-        """What the difference says of the part of a pattern (m,) in it."""
-        weight = np.linalg.solve(self.noise + self.honest, pattern)
-        information = float(pattern @ weight)
-        return Evidence(
-            float(weight @ self.residual), information, float(weight @ self.noise @ weight) ** 2 / self.spare
-        )
-
-    def misfit(self, pattern: FloatArray, part: float) -> float:
-        """Squared distance of the residual from `part` times the pattern, in units of its covariance."""
-        remaining = self.residual - part * pattern
-        return float(remaining @ np.linalg.solve(self.noise + self.honest, remaining))
 
 
 def check_agreement(runs: PointRuns) -> None:
     """Name runs that answer otherwise than their fellows, with the wiring fault or the gain that explains it."""
     gains = deviating_runs(runs)
-    stiffness = runs.stiffness(runs.without(gains)) if gains else runs.robust_stiffness
-    if not np.isfinite(stiffness).all():
-        stiffness = runs.robust_stiffness
+    stiffness = runs.stiffness(runs.without(gains))
     misfits = runs.misfits(stiffness)
     for run, gain in gains.items():
         report, hint = runs.observations[run].report, _miswired(runs, run, stiffness)
@@ -161,7 +121,7 @@ def deviating_runs(runs: PointRuns) -> dict[int, WrongGain | None]:
     deviating = set(np.flatnonzero(clear).tolist())
     while len(deviating) + 1 <= _MOST * len(runs) and len(runs) - len(deviating) >= _MIN_RUNS:
         remaining = runs.without(deviating)
-        oddness = [_oddness(runs, run, [fellow for fellow in remaining if fellow != run]) for run in remaining]
+        oddness = [_oddness(runs, run, runs.without({*deviating, run})) for run in remaining]
         if max(oddness) < 1.0:
             break
         deviating.add(remaining[int(np.argmax(oddness))])
@@ -175,13 +135,10 @@ def _oddness(runs: PointRuns, run: int, fellows: list[int]) -> float:
     The residual's square over its variance, by the fellows' scatter, follows an F distribution.
     """
     stiffness = runs.stiffness(fellows)
-    dynamic = dynamic_difference(runs, run, fellows, stiffness)
-    if dynamic is None:
-        return 0.0
-    gain = gain_of_run(runs, run, fellows)
+    dynamic, gain = dynamic_difference(runs, run, fellows, stiffness), gain_of_run(runs, run, fellows)
     # each run is tried with two cells and two probes
-    by_gain = 0.0 if gain is None else _CHANCE / (4 * (len(fellows) + 1)) / max(gain.chance, 1e-300)
-    if runs.misfits(stiffness)[run] < _LEAST_MISFIT:
+    by_gain = 0.0 if gain is None else _CHANCE / (4 * (len(fellows) + 1)) / max(gain.chance, _NOTHING)
+    if dynamic is None or runs.misfits(stiffness)[run] < _LEAST_MISFIT:
         return by_gain
     ratio = float(np.mean(dynamic.residual**2 / np.diag(dynamic.noise)))
     return max(by_gain, ratio / float(fdtri(4, dynamic.spare, 1 - _CHANCE)))
@@ -196,34 +153,44 @@ def gain_of_run(runs: PointRuns, run: int, fellows: Sequence[int]) -> WrongGain 
     dynamic = dynamic_difference(runs, run, fellows, stiffness)
     if dynamic is None or len(runs.channels) != 4:
         return None
-    static, turning = static_difference(runs, run, fellows, stiffness), turning_difference(runs, run, fellows)
+    sources = dynamic, static_difference(runs, run, fellows, stiffness), turning_difference(runs, run, fellows)
+    residual, noise, honest, spare = (np.array(values) for values in zip(*sources))
     forces = np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]  # of every channel
     tried = []
     for channel, selector in enumerate(np.eye(4)):
         is_probe = channel < 2
-        mean = static._replace(honest=static.honest + np.diag(selector * _ANYWHERE * is_probe))
         load = selector * runs.means[run] * (not is_probe)
-        patterns = _stacked(forces[:, channel]), load, selector * np.nan_to_num(runs.turning[run])
-        pairs = list(zip((dynamic, mean, turning), patterns))
-        evidence = [difference.evidence(pattern) for difference, pattern in pairs]
-        joint = Evidence(*np.sum(evidence, axis=0))
-        misfits = [difference.misfit(pattern, joint.part) for difference, pattern in pairs]
-        if _is_consistent(evidence) and max(misfits) <= 4 * _STRANGE:
-            tried.append((sum(misfits) + _FREE * is_probe, channel, joint))
-    least, _, best = min(tried, default=(0.0, 0, Evidence(0.0, 0.0, 0.0)))
-    if abs(best.part) < _LEAST or best.chance > _CHANCE:
+        pattern = np.array([_stacked(forces[:, channel]), load, selector * np.nan_to_num(runs.turning[run])])
+        covariance = noise + honest
+        covariance[1] += np.diag(selector * _ANYWHERE * is_probe)
+        weight = np.einsum("sab,sb->sa", np.linalg.inv(covariance), pattern)
+        scatter = np.einsum("sa,sab,sb->s", weight, noise, weight)
+        evidence = np.array([np.sum(weight * residual, axis=1), np.sum(weight * pattern, axis=1), scatter**2 / spare])
+        part, error, chance = _estimated(*evidence)
+        joint = _estimated(*evidence.sum(axis=1)).tolist()
+        remaining = residual - joint[0] * pattern
+        misfits = np.einsum("sa,sab,sb->s", remaining, np.linalg.inv(covariance), remaining)
+        is_consistent = np.all(np.abs(part - part[0]) <= _AGREE * np.hypot(error, error[0]))
+        if is_consistent and chance[0] <= _PHASORS_SHOW and part[0] <= _MOST_PART and misfits.max() <= 4 * _STRANGE:
+            tried.append((misfits.sum() + _FREE * is_probe, channel, joint))
+    least, _, (part, error, chance) = min(tried, default=(0.0, 0, (0.0, 0.0, 1.0)))
+    if abs(part) < _LEAST or chance > _CHANCE:
         return None
     alike = [channel for misfit, channel, _ in sorted(tried) if misfit < least + _AS_WELL]
-    gain = 1 / (1 - best.part)
-    return WrongGain(tuple(alike), gain, gain**2 * best.error, best.chance)
+    gain = 1 / (1 - part)
+    return WrongGain(tuple(alike), gain, gain**2 * error, chance)
 
 
-def _is_consistent(evidence: Sequence[Evidence]) -> bool:
-    """Whether the phasors show a part, the first, and nothing else contradicts it."""
-    shown, *others = evidence
-    if shown.chance > _PHASORS_SHOW or shown.part > _MOST_PART:
-        return False
-    return all(abs(e.part - shown.part) <= _AGREE * math.hypot(e.error, shown.error) for e in others)
+def _estimated(weighted: FloatArray, information: FloatArray, doubt: FloatArray) -> FloatArray:
+    """Part 1 - 1/g, its standard error, and the probability of so large a one where there is none, (3, ..).
+
+    By its sum weighted with the information, the information, and this one's variance over it by the freedom of the
+    noise; what is independent adds up. Two-sided, by the freedom of Welch and Satterthwaite.
+    """
+    information = np.maximum(information, _NOTHING)
+    part, error, square = weighted / information, 1 / np.sqrt(information), information**2 + _NOTHING
+    freedom = square / np.maximum(doubt, 1e-9 * square)  # infinite freedom is the normal distribution
+    return np.array([part, error, 2 * stdtr(freedom, -np.abs(part) / error)])
 
 
 def dynamic_difference(runs: PointRuns, run: int, fellows: Sequence[int], stiffness: ComplexArray) -> Difference | None:
@@ -262,33 +229,32 @@ def static_difference(runs: PointRuns, run: int, fellows: Sequence[int], stiffne
     positions wander by besides is their scatter. Means tell nothing where the stiffness cannot carry a load.
     """
     means = runs.means[list(fellows)]
-    residual = runs.means[run] - means.mean(axis=0)
+    mean = means.mean(axis=0)
+    residual, others = runs.means[run] - mean, means - mean
     if np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
-        return Difference(residual, np.zeros((4, 4)), 1e30 * np.eye(4), 1)
+        return Difference(residual, np.zeros((4, 4)), _UNKNOWN * np.eye(4), 1)
     compliance = np.linalg.inv(stiffness.real)
-    loads, places = means[:, 2:] @ runs.cell_plane.T, means[:, :2] @ runs.probe_plane.T
-    misses = loads - loads.mean(axis=0)
-    wander = places - places.mean(axis=0) - misses @ compliance.T
+    misses = others[:, 2:] @ runs.cell_plane.T
+    wander = others[:, :2] @ runs.probe_plane.T - misses @ compliance.T
     spare = 2 * (len(means) - 1)
-    size = float(np.linalg.norm(loads.mean(axis=0)))
+    size = float(np.linalg.norm(runs.cell_plane @ mean[2:]))
     to_probes, to_cells = np.linalg.inv(runs.probe_plane), np.linalg.inv(runs.cell_plane)
     by_load = np.vstack([to_probes @ compliance, to_cells])
     by_place = np.vstack([to_probes, np.zeros((2, 2))])
-    squares = [float(np.sum(x**2)) / spare * y @ y.T for x, y in ((misses, by_load), (wander, by_place))]
-    least = np.diag([_LEAST_POSITION**2] * 2 + [max((_LEAST_LOAD * size) ** 2, 1e-12)] * 2)
-    honest = (_HONEST * size) ** 2 * by_load @ by_load.T + least
-    return Difference(residual, (1 + 1 / len(means)) * (squares[0] + squares[1]), honest, spare)
+    squares = np.sum(misses**2) * by_load @ by_load.T + np.sum(wander**2) * by_place @ by_place.T
+    least = np.array([_LEAST_POSITION] * 2 + [max(_LEAST_LOAD * size, 1e-6)] * 2)
+    honest = (_HONEST * size) ** 2 * by_load @ by_load.T + np.diag(least**2)
+    return Difference(residual, (1 + 1 / len(means)) / spare * squares, honest, spare)
 
 
 def turning_difference(runs: PointRuns, run: int, fellows: Sequence[int]) -> Difference:
     """Size of what turns with the shaft in `run` minus that in the others, by channel (4,) [m, N]."""
     sizes = runs.turning[[run, *fellows]]
     known = np.isfinite(sizes).all(axis=0)
-    residual, others = np.where(known, sizes[0] - sizes[1:].mean(axis=0), 0.0), sizes[1:, known]
-    scatter, honest = np.zeros(4), np.full(4, 1e30)
-    scatter[known] = (1 + 1 / len(others)) * others.var(axis=0, ddof=1)
-    honest[known] = (_HONEST_TURNING * others.mean(axis=0)) ** 2 + np.finfo(float).tiny
-    return Difference(residual, np.diag(scatter), np.diag(honest), len(others) - 1)
+    size, *others = np.where(known, sizes, 0.0)
+    mean, scatter = np.mean(others, axis=0), (1 + 1 / len(others)) * np.var(others, axis=0, ddof=1)
+    honest = np.where(known, (_HONEST_TURNING * mean) ** 2 + _NOTHING, _UNKNOWN)
+    return Difference(size - mean, np.diag(scatter), np.diag(honest), len(others) - 1)
 
 
 def _stacked(vector: ComplexArray) -> FloatArray:
@@ -297,45 +263,33 @@ def _stacked(vector: ComplexArray) -> FloatArray:
 
 
 def check_positions(runs: Sequence[Observation]) -> None:
-    """Mean readings of the probes (gap voltage included) run against run."""
-    for kinds, least in _MIN_JUMP.items():
-        alike = [run for run in runs if run.run.kind in kinds]
-        for key, values in _by_probe(alike, type, _middle).items():
-            low, high = np.quantile([value for _, value in values], [0.1, 0.9])
-            for name, observation, off in _outlying({key: values}, max(_FAR * (high - low), least), 0.0, _MIN_PLACES):
-                observation.report.ask("position", 1.0, name, off=1e6 * off)
-                observation.report.doubts.add("displacement")
-    dynamic = [run for run in runs if run.run.kind == "dynamic" and "displacement" not in run.report.doubts]
-    points = _by_probe(dynamic, attrgetter("run.point"), _middle)
-    for name, observation, off in _outlying(points, _LEAST_STEP, _STEP, _MIN_STEPS):
+    """Mean readings of the probes (gap voltage included) of dynamic runs, run against run."""
+
+    def middle(observation: Observation, place: int) -> float:
+        return float(observation.spread[1, place])
+
+    for name, observation, off in _outlying(runs, "run.point", middle, (_LEAST_STEP, _STEP, _MIN_STEPS)):
         observation.report.ask("step", 1.0, name, off=1e6 * off)
 
 
-def _middle(observation: Observation, place: int) -> float:
-    return float(observation.spread[1, place])
-
-
-def _by_probe(
-    runs: Sequence[Observation], key: Callable[[Observation], object], value: Callable[[Observation, int], float]
-) -> dict[tuple[str, object], list[tuple[Observation, float]]]:
-    """Every probe's values by its name and by what is alike of their runs."""
+def _outlying(
+    runs: Sequence[Observation],
+    alike: str,
+    value: Callable[[Observation, int], float],
+    limits: tuple[float, float, int],
+) -> Iterator[tuple[str, Observation, float]]:
+    """Probe, run and distance from the median of probe and what is `alike` of values that lie `far` off."""
     groups: dict[tuple[str, object], list[tuple[Observation, float]]] = {}
     for observation in runs:
         for index in observation.pick("displacement"):
             shown = value(observation, index)
             if np.isfinite(shown):
-                groups.setdefault((observation.channels[index].name, key(observation)), []).append((observation, shown))
-    return groups
-
-
-def _outlying(
-    groups: dict[tuple[str, object], list[tuple[Observation, float]]], least: float, many: float, count: int
-) -> Iterator[tuple[str, Observation, float]]:
-    """Probe, run and distance from its group's median of values that lie `far` off."""
+                key = observation.channels[index].name, attrgetter(alike)(observation)
+                groups.setdefault(key, []).append((observation, shown))
     for (name, _), values in groups.items():
-        off = np.array([value for _, value in values])
+        off = np.array([shown for _, shown in values])
         off -= np.median(off)
-        for k in np.flatnonzero(far(np.abs(off), least, many, count)):
+        for k in np.flatnonzero(far(np.abs(off), *limits)):
             yield name, values[k][0], float(off[k])
 
 
@@ -344,11 +298,13 @@ def check_shaft_lines(runs: Sequence[Observation]) -> None:
 
     Whole operating points are told so in which a channel has another gain: their runs have no fellow without it.
     """
-    shown = [observation for observation in runs if len(observation.shaft_line)]
+    # what computed records without noise show beside their lines is rounding
+    shown = [run for run in runs if len(run.shaft_line) and NO_NOISE not in run.report.keys]
+
+    def size(observation: Observation, place: int) -> float:
+        return math.log(max(np.nan_to_num(observation.shaft_line[place]), 1e-300))
+
     for alike, least in (("run.point.static_key", _SAME_LINE), ("run.point.spin", _LIKE_LINE)):
-        sizes = _by_probe(
-            shown, attrgetter(alike), lambda run, k: math.log(max(np.nan_to_num(run.shaft_line[k]), 1e-300))
-        )
-        for name, observation, off in _outlying(sizes, least, _MANY_LINES, _MIN_LINES):
+        for name, observation, off in _outlying(shown, alike, size, (least, _MANY_LINES, _MIN_LINES)):
             if f"shaft line {name}" not in observation.report.keys:
                 observation.report.ask("shaft line", math.exp(off), name)

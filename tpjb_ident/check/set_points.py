@@ -10,7 +10,10 @@ from rigdata.operating_point import ROTATIONS, OperatingPoint
 from tpjb_ident.check.findings import far
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import explanation, pointing, repairs
+from tpjb_ident.phasors.run_data import complex_median
 
+#: Condition of phasors that names the lines beside the stated ones.
+_UNEXPECTED = "unexpected lines"
 #: Angle [deg] from a stated direction within which a wiring fault brings a force when it is mended.
 _MENDED = 8.0
 #: A mean force below this share of the set point is none, if it is not clearly there.
@@ -32,22 +35,22 @@ def check_static_loads(observations: Sequence[Observation]) -> bool:
     Cells that show no static force in any run are of a kind that shows none: that is a note, and nothing is held
     against them; it is False then.
     """
-    shown: list[tuple[Observation, complex]] = []
+    shown, shares = [], []
     for observation in observations:
         point, mean = observation.run.point, observation.mean("force")
         if observation.run.kind in {"dynamic", "locus"} and point.static_load > 0 and np.isfinite(mean).all():
-            turn = np.exp(-1j * point.static_load_direction)
-            shown.append((observation, complex(complex(*mean) / point.static_load * turn)))
-    ratios = np.array([ratio for _, ratio in shown], dtype=complex)
+            shown.append(observation)
+            shares.append(mean @ [1, 1j] / point.static_load * np.exp(-1j * point.static_load_direction))
+    ratios = np.array(shares, dtype=complex)
     if without_static_part(ratios):
-        for observation, _ in shown:
+        for observation in shown:
             observation.report.ask("no static force")
         return False
     if not shown:
         return True
-    middle = complex(np.median(ratios.real), np.median(ratios.imag))
+    middle = complex(complex_median(ratios))
     outlying = far(np.abs(ratios - middle) / max(abs(middle), 1e-12), _LOAD_OFF, _MANY)
-    for (observation, ratio), is_apart in zip(shown, outlying):
+    for observation, ratio, is_apart in zip(shown, ratios.tolist(), outlying):
         severities = [_check_size(observation, abs(ratio))]
         if abs(ratio) >= _NO_STATIC[1]:
             severities.append(_check_direction(observation, math.degrees(np.angle(ratio))))
@@ -116,16 +119,15 @@ def check_excitation(runs: Sequence[Observation], mass: float) -> None:
     for run in runs:
         strength = float(np.linalg.norm(run.film_force(mass)))
         if np.isfinite(strength):
-            shown = strength if run.shows("force") else 0.0
-            measured.append((run, shown))
-            strengths.setdefault(run.run.point, []).extend([shown] if shown > 0 else [])
-    directed: list[Observation] = []
-    for run, shown in measured:
+            measured.append((run, strength))
+            strengths.setdefault(run.run.point, []).extend([strength] if run.shows("force") else [])
+    directed = []
+    for run, strength in measured:
         present = strengths[run.run.point]
         least = 0.1 * float(np.median(present)) if len(present) > 3 else 0.0
-        if shown <= 0 or shown < least:
-            hint = f"; the strongest other line is near {run.other_line:.3g} Hz" if np.isfinite(run.other_line) else ""
-            run.report.ask("no excitation", hint=hint, stated=run.run.point.excitation_hz)
+        if strength < least or not run.shows("force"):
+            others = "".join(f"; there are {c.detail}" for c in run.conditions if c == _UNEXPECTED)
+            run.report.ask("no excitation", stated=run.run.point.excitation_hz, others=others)
             run.report.doubts.add("force")
         elif "force" not in run.report.doubts and run.run.excitation_direction is not None:
             directed.append(run)
@@ -136,7 +138,7 @@ def _turn(run: Observation, vector: ComplexArray) -> float:
     """Angle [deg] of the long axis of an ellipse from the stated excitation; NaN where it is nearly a circle."""
     sizes, axes = np.linalg.eigh(np.real(np.outer(vector, vector.conj())))
     shown = math.degrees(math.atan2(axes[1, 1], axes[0, 1])) if sizes[0] < 0.25 * sizes[1] else math.nan
-    return (shown - math.degrees(run.run.excitation_direction or 0.0) + 90.0) % 180.0 - 90.0
+    return math.remainder(shown - math.degrees(run.run.excitation_direction or 0.0), 180.0)
 
 
 def _check_directions(runs: Sequence[Observation], mass: float) -> None:

@@ -12,6 +12,8 @@ from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.phasors.slow_samples import converter_step, is_spare, stands_still
 
+#: Quantities without which no run says anything.
+ALWAYS_NEEDED = ("displacement", "force")
 _CELSIUS = 273.15
 #: Film and housing temperatures of a rig that is not on fire [degC].
 _COLDEST, _HOTTEST = -50.0, 300.0
@@ -24,8 +26,7 @@ _LEAST_HELD, _HELD_OVER_BESIDE = 20, 4
 
 def needed(run: Run, channel: Channel) -> bool:
     """Whether `run` says nothing without `channel`."""
-    always = channel.quantity in {"displacement", "force"}
-    return always or (channel.quantity == "acceleration" and run.kind == "dynamic")
+    return channel.quantity in ALWAYS_NEEDED or (channel.quantity == "acceleration" and run.kind == "dynamic")
 
 
 def check_signal(

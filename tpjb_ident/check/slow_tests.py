@@ -83,8 +83,8 @@ def _refuse(observation: Observation, record: DryRecord, problem: Problem) -> No
             names = observation.names(quantity)
             report.ask("aside", 1.0, *names, hint=hint, grave=problem.severity, what=problem.what)
             return
-    if hint:
-        report.doubts.add(quantity)
+    if hint and is_force:
+        report.doubts.add("force")
     key = f"{problem.place}{hint}" if hint else problem.what
     report.note(key, problem.severity, problem.place, problem.what + hint, problem.cure)
 
@@ -105,20 +105,18 @@ def check_sweeps(runs: Sequence[Observation]) -> None:
 def _check_sweep(observation: Observation) -> None:
     """Judge the movement under a load that goes around, and the axis of every probe that it shows."""
     cells, probes = observation.pick("force"), observation.pick("displacement")
-    finite = np.isfinite(observation.samples[:, [*cells, *probes]]).all(axis=1)
-    if min(len(cells), len(probes)) < 2 or finite.sum() < 20:
+    samples = observation.samples[np.isfinite(observation.samples[:, [*cells, *probes]]).all(axis=1)]
+    if min(len(cells), len(probes)) < 2 or len(samples) < 20:
         return
-    load = observation.samples[finite][:, cells] @ plane_of(observation.of("force")).T
-    readings = observation.samples[finite][:, probes]
+    load, readings = samples[:, cells] @ plane_of(observation.of("force")).T, samples[:, probes]
     gain = _gain(load, readings @ plane_of(observation.of("displacement")).T)
     if gain is None or not _is_pushed(observation, gain):
         return
     load = load - load.mean(axis=0)
     design = np.column_stack([load / np.linalg.norm(load, axis=1, keepdims=True), np.ones(len(load))])
-    answer = np.linalg.lstsq(design, readings, rcond=None)[0][:2].T
-    along = directions([channel.axis or 0.0 for channel in observation.of("displacement")])
-    turned = along[:, 0] * answer[:, 1] - along[:, 1] * answer[:, 0]
-    turns = np.degrees(np.arctan2(turned, np.sum(along * answer, axis=1)))
+    answer = np.array([1.0, 1.0j]) @ np.linalg.lstsq(design, readings, rcond=None)[0][:2]
+    axes = np.array([channel.axis or 0.0 for channel in observation.of("displacement")])
+    turns = np.degrees(np.angle(answer * np.exp(-1j * axes)))
     common, names = float(np.median(turns)), observation.names("displacement")
     if abs(common) > _TURNED:
         observation.report.ask("turned", abs(common), *names, angle=common)
@@ -150,7 +148,7 @@ def check_locus(runs: Sequence[Observation]) -> None:
     """Locus runs together: mean positions follow the directions of the loads."""
     groups: dict[object, list[Observation]] = {}
     for run in runs:
-        means = np.array([run.mean("force"), run.mean("displacement")])
+        means = run.mean("force"), run.mean("displacement")
         if np.isfinite(means).all() and len(run.of("displacement")) == 2 and "force" not in run.report.doubts:
             groups.setdefault((run.run.point.static_load, run.run.point.spin), []).append(run)
     for group in groups.values():
@@ -178,15 +176,12 @@ def _check_labels(runs: Sequence[Observation], shown: Sequence[float]) -> None:
     numbers = _arranged(pads, angles)
     for k, (run, pad, number) in enumerate(zip(runs, pads, numbers)):
         near = np.abs((angles[:k] - angles[k] + 180.0) % 360.0 - 180.0) < _SAME_PAD
-        contradicted = np.flatnonzero((near != (pads[:k] == pad)) & np.array_equal(numbers, pads))
-        if number != pad:
-            run.report.ask(
-                "pad", pad=pad, shown=shown[k], beside=f"; by the directions of the other runs it is pad {number}"
-            )
-        elif len(contradicted):
-            first = int(contradicted[0])
-            text = f", pad {pads[first]} toward {shown[first]:.0f} deg in run {runs[first].run.id}"
-            run.report.ask("pad", pad=pad, shown=shown[k], beside=text)
+        beside = f"; by the directions of the other runs it is pad {number}" if number != pad else ""
+        if np.array_equal(numbers, pads):
+            for first in np.flatnonzero(near != (pads[:k] == pad))[:1]:
+                beside = f", pad {pads[first]} toward {shown[first]:.0f} deg in run {runs[first].run.id}"
+        if beside:
+            run.report.ask("pad", pad=pad, shown=shown[k], beside=beside)
 
 
 def _arranged(pads: IntArray, shown: FloatArray) -> IntArray:

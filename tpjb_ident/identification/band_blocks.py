@@ -12,10 +12,10 @@ from tpjb_ident.bands.film_products import film_products
 from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_noise, stands_out
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
-from tpjb_ident.estimate.sensors import alive, axes_of
+from tpjb_ident.estimate.sensors import alive
 from tpjb_ident.estimate.term import worth_stating
 from tpjb_ident.identification.band_point import BandPoint
-from tpjb_ident.identification.campaign_blocks import calibration_numbers
+from tpjb_ident.identification.campaign_blocks import channel_columns
 from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.runs.static_load import missed_load
 from tpjb_ident.terms.distortion import band_change, line_scatter
@@ -52,41 +52,41 @@ def band_blocks(
     turn: int = 0,
 ) -> BandBlocks:
     """Responses of all runs; without an instrument of the runs, to the one or the other by `turn`."""
-    plans = [point.plan for point in points]
-    groups = np.cumsum([0, *(len(plan.bins) for plan in plans)])
-    lines = np.cumsum([0, *(len(plan.frequencies) for plan in plans)])
     rows: list[dict[str, object]] = []
     calibrations: list[list[Hashable]] = [[] for _ in sensors]
     operating: list[OperatingPoint] = []
     runs: list[str] = []
     films = [_film(point, clearance) for point in points]
-    for b, (point, miss, (_, uneven, _)) in enumerate(zip(points, misses, films)):
+    for point, miss, (_, uneven, _) in zip(points, misses, films):
+        first = len(operating)
         operating += [replace(point.point, excitation=2 * np.pi * round(f, 2)) for f in point.plan.middles.tolist()]
         for members in point.members:
             spectra = [point.spectra[r] for r in members]
             names = [s.phasors.run for s in spectra]
             warmth = temperatures.get(names[0], np.nan)
             channels = _described(spectra[0], sensors)
-            row = {"calibration": calibration_numbers(channels, calibrations), "along": axes_of(channels)}
+            row = channel_columns(channels, calibrations)
             row |= {"run": len(runs), "temperature": warmth, "miss": missed_load(miss, members)}
             for place, response in enumerate(_run_rows(point, spectra, channels, warmth, turn)):
                 bins = point.plan.bins[place]
-                at = {"point": groups[b] + place, "omega": 2 * np.pi * point.plan.middles[place]}
+                at = {"point": first + place, "omega": 2 * np.pi * point.plan.middles[place]}
                 at["uneven"] = uneven[members[0], bins].mean(axis=0)
                 is_driven = spectra[0].driven[bins].any()
                 rows += [values | row | at for values in response if is_driven]
             runs.append(", ".join(names))
     blocks = stacked(operating, runs, len(sensors), rows)
-    line = np.concatenate([plan.line + first for plan, first in zip(plans, lines)])
-    driven = np.zeros(lines[-1], dtype=bool)
-    np.logical_or.at(driven, line[blocks.point], np.array([row["stands"] for row in rows], dtype=bool))
-    coherent = np.concatenate([[c.coherence.min() for c in point.classic] for point in points])
-    strong = _strengths(Rig(sensors, 1.0), blocks, line[blocks.point], len(driven)) > STRONG
-    band = np.repeat(np.arange(len(points)), np.diff(lines))
+    plans = [point.plan for point in points]
+    band = np.repeat(np.arange(len(plans)), [len(plan.frequencies) for plan in plans])
+    line = np.concatenate([plan.line + np.searchsorted(band, b) for b, plan in enumerate(plans)])
+    line_of = line[blocks.point]
+    stands = np.array([row["stands"] for row in rows], dtype=bool)
+    driven = np.isin(np.arange(len(band)), line_of[stands])
+    coherent = np.array([classic.coherence.min() for point in points for classic in point.classic])
+    strong = _strengths(Rig(sensors, 1.0), blocks, line_of, len(band)) > STRONG
     quiet = np.array([point.method == "hv" for point in points])[band]
     bent, _, turning = zip(*films)
     return BandBlocks(
-        blocks.part(np.flatnonzero(driven[line[blocks.point]])),
+        blocks.part(np.flatnonzero(driven[line_of])),
         2 * np.pi * np.concatenate([plan.middles for plan in plans]),
         line,
         band,
@@ -132,26 +132,23 @@ def _run_rows(
     point: BandPoint, runs: Sequence[RunSpectra], channels: Sequence[Channel | None], temperature: float, turn: int
 ) -> list[list[dict[str, object]]]:
     """Columns of the responses of one run, group by group."""
-    m = len(channels)
     names = [channel.name for channel in runs[0].phasors.channels]
-    order = [names.index(channel.name) for channel in channels if channel is not None]
     present = np.array([channel is not None for channel in channels])
-    warm = None if np.isnan(temperature) else temperature
-    gain = np.array([1.0 if c is None else warm_gain(c, warm) for c in channels])
+    places = [-1 if channel is None else names.index(channel.name) for channel in channels]
+    gain = np.array([1.0 if c is None else warm_gain(c, temperature) for c in channels])
     responses = [line_response(runs, bins, point.instruments[turn], point.open) for bins in point.plan.bins]
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
     time = 0.5 * len(runs[0].phasors.start) * runs[0].phasors.length
     groups = []
     for response, noise, freedom in zip(responses, *pooled_noise(responses)):
-        single = np.zeros((m, m), complex)
-        single[np.ix_(present, present)] = (noise + response.count * np.diag(least**2))[np.ix_(order, order)]
-        single /= np.outer(gain, gain)
+        # a sensor without a channel has the last place, where there is nothing
+        single = np.pad(noise + response.count * np.diag(least**2), (0, 1))[np.ix_(places, places)]
+        single = single / np.outer(gain, gain)
         covariance = np.asarray(single / response.count, complex)
-        z, slope = np.zeros((2, len(response.z), m), complex)
-        z[:, present], slope[:, present] = response.z[:, order], response.slope[:, order]
-        row = {"present": present, "noise": covariance, "dof": freedom, "time": time, "windows": response.repeats}
-        row["stands"] = stands_out(np.asarray(z / gain), covariance, freedom, present)
-        moving = zip(z / gain, slope / gain, response.slope_size)
+        z, slope = (np.pad(rows, ((0, 0), (0, 1)))[:, places] / gain for rows in (response.z, response.slope))
+        row = {"noise": covariance, "dof": freedom, "time": time, "windows": response.repeats}
+        row["stands"] = stands_out(z, covariance, freedom, present)
+        moving = zip(z, slope, response.slope_size)
         groups.append([row | {"z": a, "slope": change, "slope_noise": single * size} for a, change, size in moving])
     return groups
 

@@ -19,7 +19,6 @@ from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.shape import MODELS, Shape, nearest, over_frequency
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.estimate.statistics import student_widening
-from tpjb_ident.estimate.term import Term
 from tpjb_ident.identification.band_blocks import BandBlocks, line_products
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.distortion import Distortion
@@ -35,7 +34,7 @@ _ROUNDS = 3
 #: A line whose h goes this far from least squares, of its size, is not told from noise.
 _RUN_AWAY = 3.0
 #: Condition number of a line's motions from which its runs move the shaft along one line.
-_ONE_LINE = 1e6
+ONE_LINE = 1e6
 
 
 @dataclass(frozen=True)
@@ -65,12 +64,12 @@ class BandSolution:
 def solve_bands(rig: Rig, data: BandBlocks, correct: bool, taken_off: Mapping[str, float]) -> BandSolution:
     """Solve all bands; `taken_off`: rates of clocks."""
     crude, condition = _crude(rig, data)
-    used = data.driven & (condition < _ONE_LINE)
+    used = data.driven & (condition < ONE_LINE)
     usable = used & data.clear
-    curve = _curve(data, used, crude, usable)
+    curve = _curve(data, crude, usable)
     bend = curve(data.band[data.line], data.omega) - curve(data.band, data.line_omega)[data.line]
     start = np.where(usable[data.line][:, None, None], crude[data.line] + bend, np.nan)
-    task = _Task(rig, data, (), correct, taken_off, None)
+    task = _Task(rig, data, correct, taken_off, np.zeros(len(data.blocks.runs)))
     solution, task, size = _lines(task, start, used)
     h = np.full((len(data.band), 2, 2), np.nan + 0j)
     # at the first point of every line
@@ -82,15 +81,9 @@ def solve_bands(rig: Rig, data: BandBlocks, correct: bool, taken_off: Mapping[st
     return BandSolution(task.rig, h, solution, parts, part_h, part, condition, used, size)
 
 
-def _curve(
-    data: BandBlocks, used: BoolArray, h: ComplexArray, chosen: BoolArray
-) -> Callable[[IntArray, FloatArray], ComplexArray]:
+def _curve(data: BandBlocks, h: ComplexArray, chosen: BoolArray) -> Callable[[IntArray, FloatArray], ComplexArray]:
     """K-C-M over every band, nearest to h (L, 2, 2) of chosen lines (L,): H at frequencies of some bands."""
-    middle = np.ones(int(data.band.max(initial=-1)) + 1)
-    for b in range(len(middle)):
-        omega = data.line_omega[used & (data.band == b)]
-        if len(omega):
-            middle[b] = np.sqrt(omega.min() * omega.max())
+    middle = np.full(len(data.bent), np.median(data.line_omega))
     chosen = chosen & np.isfinite(h).all(axis=(1, 2))
     numbers = nearest(over_frequency("K-C-M", data.band, data.line_omega, middle), h, chosen.astype(float))
     numbers[~np.isin(np.arange(len(middle)), data.band[chosen])] = np.nan
@@ -103,24 +96,21 @@ class _Task:
 
     rig: Rig
     data: BandBlocks
-    terms: tuple[Term, ...]
     correct: bool
     taken_off: Mapping[str, float]  #: rates of devices' clocks, put right before
-    held: Solution | None  #: whose scatter, weights and shared parameters stay
+    gains: FloatArray  #: (number of runs,): deviation of their gains
+    held: Solution | None = None  #: whose scatter, weights and shared parameters stay
 
     def solved(self, start: ComplexArray, shape: Shape) -> Solution:
         """One solve from a start (P, 2, 2), NaN where points take no part."""
+        rig, blocks = self.rig, self.data.blocks
+        film = Distortion(rig, blocks, self.data.bent, self.data.band[self.data.line])
+        prepared = [RunGain(rig, blocks, self.gains), film, Clock(rig, blocks, self.taken_off)]
         if self.held is not None:
             scatter = self.held.scatter
             shape = replace(shape, scatter=scatter.fixed(shape.groups, scatter.weights), held=self.held.fitted)
-        return Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape).run()
-
-    def with_gains(self, deviation: FloatArray) -> _Task:
-        """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
-        rig, blocks = self.rig, self.data.blocks
-        film = Distortion(rig, blocks, self.data.bent, self.data.band[self.data.line])
-        prepared = [RunGain(rig, blocks, deviation), film, Clock(rig, blocks, self.taken_off)]
-        return replace(self, terms=tuple(campaign_terms(rig, blocks, self.correct, prepared)))
+        terms = campaign_terms(rig, blocks, self.correct, prepared)
+        return Solver(rig, blocks, terms, start, self.correct, shape).run()
 
 
 def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution, _Task, float]:
@@ -133,16 +123,15 @@ def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution,
     shape = Shape(data.line, count=lines, scatter=scatter)
     size, freedom = _FIRST, np.inf
     for _ in range(_ROUNDS if spare.any() else 0):
-        task = task.with_gains(np.hypot(by_load, size * spare))
+        task = replace(task, gains=np.hypot(by_load, size * spare))
         solution = task.solved(start, shape)
-        term = next(t for t in task.terms if isinstance(t, RunGain))
+        term = next(t for t in solution.terms if isinstance(t, RunGain))
         size, freedom = term.scatter(solution.fitted[term.name], by_load, _USUAL)
-    wide = student_widening(freedom)
-    task = task.with_gains(np.hypot(by_load, size * wide * spare))
+    task = replace(task, gains=np.hypot(by_load, size * student_widening(freedom) * spare))
     solution = task.solved(start, shape)
     rig = learnt_mass(learnt_rig(task.rig, solution), data.blocks, data.line, solution)
     if rig is not task.rig:
-        task = replace(task, rig=rig).with_gains(np.hypot(by_load, size * wide * spare))
+        task = replace(task, rig=rig)
         solution = task.solved(start, shape)
     return solution, task, size * float(spare.any())
 
@@ -174,7 +163,7 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
     DD, FD = (line_products(line, rows[usable], D[usable], lines) for rows in (D, F))
     condition = np.sqrt(np.linalg.cond(DD))
     h = np.full((lines, 2, 2), np.nan + 0j)
-    regular = condition < _ONE_LINE
+    regular = condition < ONE_LINE
     h[regular] = FD[regular] @ np.linalg.inv(DD[regular])
     return h - rig.bare.at(data.line_omega), condition
 
@@ -182,7 +171,7 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
 def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[BandPart, ...]:
     """Parts of all bands; few tones are no band: each that is told is a point."""
     parts = []
-    for b in range(int(data.band.max(initial=-1)) + 1):
+    for b in range(len(data.bent)):
         lines = np.flatnonzero(used & (data.band == b))
         if len(lines) < 2 * MODELS["K-C-M"]:
             groups = [lines[k : k + 1] for k in np.flatnonzero(usable[lines])]
@@ -197,7 +186,7 @@ def _part_solution(
 ) -> tuple[Solution, ComplexArray]:
     """The solve of the parts, and h of each at its frequency (Q, 2, 2); `h` (L, 2, 2) of the lines."""
     data = task.data
-    curve = _curve(data, used, h, used)
+    curve = _curve(data, h, used)
     start = curve(data.band[data.line], data.omega)
     part_h = curve(np.array([part.band for part in parts], dtype=np.intp), np.array([part.omega for part in parts]))
     of_line = np.full(len(data.band), -1, dtype=np.intp)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.bands.classic import ClassicLine
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.shape import MODELS, real_numbers
@@ -35,7 +36,7 @@ class SolvedBands:
     loads: StaticLoads
     data: BandBlocks
     solutions: tuple[BandSolution, ...]
-    excluded: tuple[ExcludedRun, ...] = ()
+    excluded: tuple[ExcludedRun, ...]
 
     @property
     def first(self) -> BandSolution:
@@ -56,6 +57,11 @@ class SolvedBands:
     def solution(self) -> Solution:
         """Of the lines."""
         return self.first.lines
+
+    @property
+    def classic(self) -> list[ClassicLine]:
+        """All lines by the methods of analysers."""
+        return [line for point in self.points for line in point.classic]
 
     def usable(self, b: int) -> IntArray:
         """Lines of a band with an answer."""
@@ -118,17 +124,15 @@ def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
     """One line by the method that counts, and by the others."""
     h = np.array([s.h[k] for s in solved.solutions])
     best, budget = solved.estimate(solved.solution, k, np.array([k]), h, point.method)
-    classic = point.classic[k - int(np.searchsorted(solved.data.band, solved.data.band[k]))]
+    classic = solved.classic[k]
     alternatives = {name: value - solved.rig.bare.at(np.array([best.omega]))[0] for name, value in classic.h.items()}
     if _BRACKET in budget:
         alternatives |= {"h1": h[0], "h2": h[-1]}
     free, shared = np.full(8, classic.freedom), total(sources_of(solved.solution, k)[1].values())
     table = {point.method: best}
     for name, value in alternatives.items():
-        alternative = DynamicStiffness(
-            value, best.omega, classic.covariance, free, name, best.weights, systematic=shared
-        )
-        table.setdefault(name, alternative)
+        figures = value, best.omega, classic.covariance, free, name, best.weights
+        table.setdefault(name, DynamicStiffness(*figures, systematic=shared))
     return BandLine(best.omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
 
 

@@ -1,6 +1,7 @@
 """Rig and blocks of a campaign from the means of its points."""
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def campaign_blocks(
     noises, freedoms = _pooled_noise(means, [data.runs[0].length for data in points])
     names: list[str] = []
     calibrations: list[list[Hashable]] = []
-    rows: list[dict[str, object]] = []
+    rows: list[dict[str, Any]] = []
     for p, (data, point, miss) in enumerate(zip(points, means, misses)):
         w = point.means
         for g, (run, line) in enumerate(zip(data.runs, data.lines)):
@@ -58,15 +59,12 @@ def campaign_blocks(
             loads = loads[np.isfinite(loads).all(axis=1)]
             # standard error of the size of the run's mean cell force
             error = float(np.linalg.norm(loads.std(axis=0, ddof=1)) / np.sqrt(len(loads))) if len(loads) > 1 else 0.0
-            present = np.array([channel is not None for channel in channels])
-            row: dict[str, object] = {
+            row = channel_columns(channels, calibrations)
+            row |= {
                 "point": p,
                 "run": len(names),
                 "omega": 2 * np.pi * run.lines.driven[line],
-                "z": w.mean[g] * present,
-                "present": present,
-                "along": axes_of(channels),
-                "calibration": calibration_numbers(channels, calibrations),
+                "z": w.mean[g] * row["present"],
                 "noise": noises[p] / w.count[g],
                 "dof": freedoms[p],
                 "slope": w.slope[g],
@@ -75,7 +73,7 @@ def campaign_blocks(
                 "time": w.time[g],
                 "temperature": temperatures.get(run.run, np.nan),
                 "miss": missed_load(miss, [g]),
-                "miss_error": error / max(load, 1e-9) if load > 0 else _LOAD_ERROR,
+                "miss_error": error / load if load > 0 else _LOAD_ERROR,
                 "shaft": point.shaft[g],
             }
             names.append(run.run)
@@ -83,15 +81,15 @@ def campaign_blocks(
     return stacked([data.point for data in points], names, len(means[0].channels[0]), rows, bent)
 
 
-def calibration_numbers(channels: Sequence[Channel | None], tables: list[list[Hashable]]) -> list[int]:
-    """Numbers of the channels' calibrations (m,); `known` holds those of each sensor, new ones join it."""
+def channel_columns(channels: Sequence[Channel | None], tables: list[list[Hashable]]) -> dict[str, Any]:
+    """What a block's channels (m,) are; `tables` holds the calibrations of each sensor, new ones join it."""
     numbers = []
     for channel, calibrations in zip(channels, tables):
-        calibration = None if channel is None else channel.calibration
-        if channel is not None and calibration not in calibrations:
-            calibrations.append(calibration)
-        numbers.append(0 if channel is None else calibrations.index(calibration))
-    return numbers
+        if channel is not None and channel.calibration not in calibrations:
+            calibrations.append(channel.calibration)
+        numbers.append(0 if channel is None else calibrations.index(channel.calibration))
+    present = np.array([channel is not None for channel in channels])
+    return {"present": present, "along": axes_of(channels), "calibration": numbers}
 
 
 def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tuple[list[ComplexArray], FloatArray]:
@@ -99,27 +97,19 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
 
     What points share is the noise's density: that of a window goes with one over its length [s].
     """
-    densities: list[tuple[float, ComplexArray]] = []
-    for p, length in zip(means, lengths):
-        if p.means is not None and p.means.spare > 0:
-            densities.append((p.means.spare, np.asarray(length * p.means.noise, complex)))
+    densities = [(p.means.spare, length * p.means.noise) for p, length in zip(means, lengths) if p.means is not None]
     if sum(spare for spare, _ in densities) < _FREEDOM:
         # too few windows in all the campaign: what the lines leave of the records tells the noise
-        densities += [(p.residual[1], p.residual[0]) for p in means if p.residual[1] > 0]
+        densities += [(spare, noise) for noise, spare in (p.residual for p in means)]
     total = sum(spare for spare, _ in densities)
-    m = densities[0][1].shape[0] if densities else 1
-    density = np.zeros((m, m), complex)
-    for spare, noise in densities:
-        density += spare * noise / max(total, 1.0)
+    density = np.asarray(sum(spare * noise for spare, noise in densities) / max(total, 1.0), complex)
     noises: list[ComplexArray] = []
     freedoms: list[float] = []
     for p, length in zip(means, lengths):
-        spare = 0.0 if p.means is None else p.means.spare
+        spare, single = (0.0, density) if p.means is None else (p.means.spare, length * p.means.noise)
         more = min(max(_FREEDOM - spare, 0.0), total - spare)
-        pool: ComplexArray = np.asarray(density / max(length, 1e-9), dtype=np.complex128)
-        single: ComplexArray = pool if p.means is None else p.means.noise
         freedom = max(spare + more, 1.0)
-        noise = (spare * single + more * pool) / freedom
+        noise = np.asarray((spare * single + more * density) / freedom / length, complex)
         noises.append(unbiased_noise(noise, freedom))
         freedoms.append(freedom)
     return noises, np.array(freedoms)

@@ -100,12 +100,14 @@ def solve_campaign(
         again = solver(learnt, blocks, start, rates).run()
         last = replace(last, rig=learnt, solution=again)
     force = force_pickup([digest.mains_force for digest in digests])
-    pickup, fits = _mains(points, digests, last, force) if correct else (None, {})
+    on_line = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE) and p in blocks.point]
+    pickup, fits = _mains(on_line, digests, last, force) if correct and on_line else (None, {})
     if fits:
         shift = _mains_readings(last.rig, blocks, fits)
         again = solver(last.rig, replace(blocks, z=blocks.z - shift), start, rates).run()
         last = replace(last, solution=again, mains_shift=shift, pickup=pickup, mains=fits)
-    in_cells = _in_cells(points, last.rig, blocks, force)
+    D = vector(last.rig, blocks, "displacement")
+    in_cells = {p: force_pickup_spread(D[blocks.point == p], force) for p in on_line if force.any()}
     return replace(last, in_cells=in_cells, cell_pickup=float(np.linalg.norm(force)))
 
 
@@ -115,26 +117,23 @@ def _film(data: PointData, point: PointMeans) -> FilmChange:
 
 
 def _mains(
-    points: Sequence[PointData], digests: Sequence[RunDigest], solved: CampaignSolution, force: FloatArray
+    points: Sequence[int], digests: Sequence[RunDigest], solved: CampaignSolution, force: FloatArray
 ) -> tuple[Pickup | None, dict[int, MainsFit]]:
-    """Angles of the mains at every point on whose line it is; `force` (2,): mains in the cells [N]."""
+    """Angles of the mains at the points on whose line it is; `force` (2,): mains in the cells [N]."""
     rig, blocks, solution = solved.rig, solved.blocks, solved.solution
-    coincident = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE)]
-    if not coincident:
-        return None, {}
     across = blocks.along[0, rig.of("displacement")]
     pickup = mains_pickup([digest.mains for digest in digests], np.arctan2(across[:, 1], across[:, 0]))
     if pickup is None:
         return None, {}
     D, F = at_set_point(rig, blocks, solution)
-    free = ~np.isin(blocks.point, coincident) & np.isfinite(F).all(axis=1)
+    free = ~np.isin(blocks.point, points) & np.isfinite(F).all(axis=1)
     residual = F - np.einsum("nij,nj->ni", solution.h[blocks.point], D)
     share = np.sum(np.abs(residual) ** 2, axis=1) / 2 / np.sum(np.abs(F) ** 2, axis=1)
     typical = float(np.sqrt(np.nanmedian(share[free]) / np.log(2))) if free.any() else _LEAST_SCATTER
     fits = {}
-    for p in coincident:
+    for p in points:
         mine = blocks.point == p
-        usual = float(np.median(np.linalg.norm(F[mine], axis=1))) if mine.any() else 1.0
+        usual = float(np.median(np.linalg.norm(F[mine], axis=1)))
         in_cells = float(np.linalg.norm(force)) / usual / np.sqrt(2)
         scatter = float(np.hypot(max(typical, _LEAST_SCATTER), in_cells if in_cells > typical else 0.0))
         fit = fit_mains(D[mine], F[mine], pickup, scatter) if np.isfinite(solution.h[p]).all() else None
@@ -158,16 +157,3 @@ def _mains_readings(rig: Rig, blocks: Blocks, fits: Mapping[int, MainsFit]) -> C
         places = np.flatnonzero(blocks.point == p)
         shift[np.ix_(places, probes)] = np.einsum("nja,na->nj", blocks.along[np.ix_(places, probes)], fit.pickup)
     return shift
-
-
-def _in_cells(points: Sequence[PointData], rig: Rig, blocks: Blocks, size: FloatArray) -> dict[int, FloatArray]:
-    """Covariance (8, 8) by point of mains in the cells, whose phase is another one in every run; `size` (2,) [N]."""
-    if not size.any():
-        return {}
-    D = vector(rig, blocks, "displacement")
-    spreads = {}
-    for p, data in enumerate(points):
-        mine = blocks.point == p
-        if data.says(MAINS_ON_LINE) and mine.any():
-            spreads[p] = force_pickup_spread(D[mine], size)
-    return spreads

@@ -7,16 +7,19 @@ turn as the windows of sines do.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from scipy.special import chdtrc
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
-from tpjb_ident.estimate.solve import Solution
+from tpjb_ident.estimate.blocks import Blocks, Sensor
 from tpjb_ident.terms.clock import START, Clock
+
+if TYPE_CHECKING:
+    from tpjb_ident.identification.band_tables import SolvedBands
+    from tpjb_ident.identification.campaign_solution import CampaignSolution
 
 #: Standard errors beyond which a rate is one, and phase [rad] over a record from which it matters.
 _CLEAR, _NOTABLE = 6.0, 2e-3
@@ -29,23 +32,8 @@ _USUAL = 0.8
 _CLOCK_PASSES, _TURNED = 2, 1e-2
 
 
-class Solved(Protocol):
-    """What a solve of the records gives."""
-
-    @property
-    def rig(self) -> Rig:
-        """Its sensors, by their devices."""
-
-    @property
-    def blocks(self) -> Blocks:
-        """What the records say."""
-
-    @property
-    def solution(self) -> Solution:
-        """What the terms became."""
-
-
-Answer = TypeVar("Answer", bound=Solved)
+#: Of sines, or over bands.
+Answer = TypeVar("Answer", "CampaignSolution", "SolvedBands")
 
 
 def solved_with_clocks(
@@ -92,8 +80,7 @@ def with_found_devices(
     return tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.device else s for s in separate), rates
 
 
-@dataclass(frozen=True)
-class _Rate:
+class _Rate(NamedTuple):
     rate: float
     error: float  #: standard error
     clear: bool  #: whether it is a rate of its own
@@ -108,14 +95,13 @@ def _rate(sensors: Sequence[Sensor], blocks: Blocks, quantity: str) -> _Rate | N
         return None
     turn, turn_error = _turning(blocks, rows)
     probe, probe_error = _turning(blocks, probes)
-    rate = (probe - turn)[usable] / blocks.omega[usable]
-    error = np.hypot(turn_error, probe_error)[usable] / blocks.omega[usable]
+    rate, error = ((probe - turn) / blocks.omega)[usable], (np.hypot(turn_error, probe_error) / blocks.omega)[usable]
     # a run that slipped tells nothing of a rate
     near = np.argsort(np.abs(rate - np.median(rate)) / error)[: max(2, int(_USUAL * len(rate)))]
     weight = 1 / np.hypot(error, np.median(error)) ** 2
     middle, doubt = float(np.average(rate[near], weights=weight[near])), float(1 / np.sqrt(np.sum(weight)))
     alike = float(chdtrc(len(near), np.sum(((rate - middle)[near] / error[near]) ** 2))) > _ONE_RATE
-    turned = float(np.median(np.abs(rate) * blocks.omega[usable] * 2 * blocks.time[usable]))
+    turned = float(np.median(np.abs(rate) * 2 * (blocks.omega * blocks.time)[usable]))
     return _Rate(middle, doubt, abs(middle) > _CLEAR * doubt and turned > _NOTABLE) if alike else None
 
 

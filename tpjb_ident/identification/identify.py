@@ -112,9 +112,7 @@ def _joined(sines: Identification, bands: Identification) -> Identification:
     points = [*sines.points, *bands.points]
     names = tuple(dict.fromkeys((*sines.calibration_names, *bands.calibration_names)))
     changes = np.zeros((max(len(names), 1), len(points), 8))
-    place = {id(point): i for i, point in enumerate(points)}
-    for part in (sines, bands):
-        places = [place[id(point)] for point in part.points]
+    for part, places in ((sines, slice(len(sines.points))), (bands, slice(len(sines.points), None))):
         scale = np.sqrt(len(changes) / max(len(part.calibration_names), 1))
         for name, row in zip(part.calibration_names, part.calibration_changes):
             changes[names.index(name), places] = scale * row.reshape(-1, 8)

@@ -1,11 +1,9 @@
 """A campaign's broadband runs to h over frequency: the whole path, all operating points in one solve."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 
 import numpy as np
 
-from rigdata.arrays import IntArray
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from tpjb_ident.bands.run_spectra import is_broadband
@@ -13,9 +11,10 @@ from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import Condition, holding, merged
 from tpjb_ident.estimate.blocks import RigStiffness, Sensor
 from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
+from tpjb_ident.estimators.estimate import MIN_COHERENCE, fit_conditions
 from tpjb_ident.identification.band_blocks import STRONG, band_blocks
 from tpjb_ident.identification.band_point import BandPoint, band_groups, read_point
-from tpjb_ident.identification.band_solution import BandSolution, solve_bands
+from tpjb_ident.identification.band_solution import ONE_LINE, solve_bands
 from tpjb_ident.identification.band_tables import SolvedBands, band_results
 from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated
 from tpjb_ident.identification.clocks import solved_with_clocks
@@ -30,10 +29,6 @@ from tpjb_ident.terms.registry import cell_stiffness
 
 #: Share of the driven lines that must be told from noise.
 _LEAST_LINES = 0.5
-#: Condition number of the directions of motion from which errors are strongly amplified, and that of a line.
-_ILL_CONDITIONED, _ONE_LINE = 30.0, 1e6
-#: Coherence below which a band is doubted where no instrument speaks for it.
-_LOW_COHERENCE = 0.9
 #: Scatter of the runs' gains that is too much for one bearing.
 _TOO_MUCH = 0.05
 #: Disturbing lines that are named.
@@ -64,7 +59,15 @@ def identify_bands(
             bad += without
         if not points:
             raise bad[0].error
-        return replace(_solved(campaign, points, sensors, rates, settings, bare), excluded=tuple(bad))
+        loads = static_loads(campaign, points)
+        temperatures = run_temperatures(campaign, [(s.phasors.run, s.temperatures) for p in points for s in p.spectra])
+        data, solutions = [], []
+        # without an instrument twice: all noise the force's, then all the displacement's
+        for turn in range(2 if any(point.method == "hv" for point in points) else 1):
+            data.append(band_blocks(points, sensors, loads.misses, temperatures, settings.clearance, turn))
+            rig = campaign_rig(campaign, loads.doubted(sensors), data[-1].blocks, loads.common, bare)
+            solutions.append(solve_bands(rig, data[-1], settings.correct, rates))
+        return SolvedBands(tuple(points), loads, data[0], tuple(solutions), tuple(bad))
 
     solved = solved_with_clocks(sensors_of(campaign), min(run.sample_rate for run in runs), solve)
     points, bad = solved.points, solved.excluded
@@ -72,8 +75,9 @@ def identify_bands(
     for b, point in enumerate(points):
         of_runs = solved.loads.conditions(b), check_conditions(checked, point.runs)
         without = without_runs(point.point, bad, any_excitation=True)
-        of_band = run_conditions(point, solved.first), band_conditions(point, solved, b)
-        quality.append(merged(*of_runs, without, *of_band))
+        of_records = (spectra.phasors.conditions for spectra in point.spectra)
+        of_lines = solved.first.lines.conditions(), band_conditions(point, solved, b)
+        quality.append(merged(*of_runs, without, *of_records, *of_lines))
     results, changes, names = band_results(solved, quality, settings.clearance)
     places = [point.point for point in points]
     named = excluded_runs(bad, len(runs), places, any_excitation=True, kind="run over a band") + unstated(campaign)
@@ -82,74 +86,31 @@ def identify_bands(
     return Identification(campaign.id, settings.method, identified, changes, named, results, names, springs)
 
 
-def _solved(
-    campaign: Campaign,
-    points: Sequence[BandPoint],
-    sensors: tuple[Sensor, ...],
-    rates: Mapping[str, float],
-    settings: IdentifySettings,
-    bare: RigStiffness,
-) -> SolvedBands:
-    """All bands solved, twice where there is no instrument: all noise the force's, then all the displacement's."""
-    loads = static_loads(campaign, points)
-    temperatures = run_temperatures(campaign, [(s.phasors.run, s.temperatures) for p in points for s in p.spectra])
-    data, solutions = [], []
-    for turn in range(2 if any(point.method == "hv" for point in points) else 1):
-        data.append(band_blocks(points, sensors, loads.misses, temperatures, settings.clearance, turn))
-        rig = campaign_rig(campaign, loads.doubted(sensors), data[-1].blocks, loads.common, bare)
-        solutions.append(solve_bands(rig, data[-1], settings.correct, rates))
-    return SolvedBands(tuple(points), loads, data[0], tuple(solutions))
-
-
-def run_conditions(point: BandPoint, solution: BandSolution) -> tuple[Condition, ...]:
-    """What the records, the runs beside each other and the terms' tests say."""
-    text = "with two runs the interval holds how their repeats differ, not how runs do"
-    scatter = solution.run_scatter
-    of_runs = holding(
-        (len(point.spectra) == 2, "no-spare-direction", text),
-        (scatter > _TOO_MUCH, "runs-disagree", f"runs differ by {100 * scatter:.1f} % in force over displacement"),
-    )
-    return merged(*(s.phasors.conditions for s in point.spectra), of_runs, solution.lines.conditions())
-
-
 def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Condition, ...]:
-    """What the lines of one band say."""
+    """What the lines of one band say, and its runs beside each other."""
     driven = np.flatnonzero((solved.data.band == b) & solved.data.driven)
     usable = solved.usable(b)
     condition = float(np.median(solved.first.condition[driven])) if len(driven) else 0.0
-    alike, few = condition > _ONE_LINE, len(usable) < max(_LEAST_LINES * len(driven), 1)
+    alike, few = condition > ONE_LINE, len(usable) < max(_LEAST_LINES * len(driven), 1)
     one_line = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
     weak = f"{len(usable)} of {len(driven)} driven lines stand {STRONG:g} times (F ratio) above the noise"
-    uneven = f"condition number {condition:.0f} (median over the band)"
+    scatter = solved.first.run_scatter
     spectra = point.spectra[0]
     low, high = spectra.frequencies[0], spectra.frequencies[-1]
     held = [f"{d.name} {d.frequency:.4g} Hz" for d in spectra.disturbances if low <= d.frequency <= high]
     bare = solved.rig.bare
     unknown = int((~bare.known(solved.data.line_omega[usable])).sum()) if len(bare.omega) else 0
     uncorrected = spectra.phasors.acceleration is None and spectra.phasors.housing_mass > 0
-    return (
-        *holding(
-            (alike, "fewer-than-two-directions", one_line),
-            (few and not alike, "excitation-too-weak", weak),
-            (condition > _ILL_CONDITIONED and not (alike or few), "ill-conditioned", uneven),
-            (held, "lines-left-out", listed(held, _NAMED)),
-        ),
-        *_instrument(point, solved, usable),
-        *holding(
-            (unknown, "baseline-missing", f"at {unknown} of {len(usable)} lines of the band"),
-            (uncorrected, "inertia-not-corrected", "no accelerometers"),
-        ),
-    )
-
-
-def _instrument(point: BandPoint, solved: SolvedBands, usable: IntArray) -> tuple[Condition, ...]:
-    """How far a band without an instrument is to be believed."""
-    if point.method != "hv" or not len(usable):
-        return ()
-    first = int(np.searchsorted(solved.data.band, solved.data.band[usable[0]]))
-    low = float(np.median([point.classic[k - first].coherence.min() for k in usable]))
-    text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {low:.3f})"
-    return holding(
-        (True, "no-instrument", text),
-        (low < _LOW_COHERENCE, "low-coherence", f"{low:.2f}, median over the band"),
+    blind = point.method == "hv" and len(usable) > 0
+    coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0
+    text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"
+    return fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.spectra)) + holding(
+        (scatter > _TOO_MUCH, "runs-disagree", f"runs differ by {100 * scatter:.1f} % in force over displacement"),
+        (alike, "fewer-than-two-directions", one_line),
+        (few and not alike, "excitation-too-weak", weak),
+        (held, "lines-left-out", listed(held, _NAMED)),
+        (blind, "no-instrument", text),
+        (coherent < MIN_COHERENCE, "low-coherence", f"{coherent:.2f}, median over the band"),
+        (unknown, "baseline-missing", f"at {unknown} of {len(usable)} lines of the band"),
+        (uncorrected, "inertia-not-corrected", "no accelerometers"),
     )

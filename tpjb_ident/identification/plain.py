@@ -17,6 +17,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
 from tpjb_ident.bands.run_spectra import is_broadband
+from tpjb_ident.estimate.shape import real_numbers
 from tpjb_ident.estimators.r_matrix import r_matrix
 from tpjb_ident.estimators.rlm import RlmSettings, rlm_fit
 from tpjb_ident.phasors.extraction import extract
@@ -47,8 +48,6 @@ class PlainPoint:
     """One operating point, solved as printed."""
 
     data: PointData = field(repr=False)
-    R: ComplexArray = field(repr=False)  #: (2 n, 4) complex, m
-    f: ComplexArray = field(repr=False)  #: (2 n,) complex, N
     h: ComplexArray  #: (2, 2) complex, N/m
     standard_error: np.ndarray  #: (8,), N/m: statsmodels' own, of Re and Im of h
     status: tuple[str, ...]
@@ -66,16 +65,14 @@ def plain_points(campaign: Campaign, settings: PlainSettings) -> list[PlainPoint
 
 def _solved(data: PointData, settings: PlainSettings) -> PlainPoint:
     D, F = data.D[data.whole], data.F[data.whole]
-    R, f = r_matrix(D, F)
     if np.linalg.matrix_rank(D) < 2:
-        none = np.full((2, 2), np.nan + 0j)
-        return PlainPoint(data, R, f, none, np.full(8, np.nan), ("fewer-than-two-directions",))
+        return PlainPoint(data, np.full((2, 2), np.nan + 0j), np.full(8, np.nan), ("fewer-than-two-directions",))
     # statsmodels' tolerance is absolute: the system is brought to order one, and its answer back
     displacement, force = float(np.abs(D).max()), float(np.abs(F).max())
     fit = rlm_fit(D / displacement, F / force, RlmSettings(settings.norm))
     scale = force / displacement
     error = np.sqrt(np.diag(fit.covariance)) * scale
-    return PlainPoint(data, R, f, fit.h * scale, error, tuple(str(c) for c in fit.conditions))
+    return PlainPoint(data, fit.h * scale, error, tuple(str(c) for c in fit.conditions))
 
 
 def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.DataFrame:
@@ -87,10 +84,9 @@ def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.Dat
         point = p.data.point
         row: dict[str, object] = dict(zip(POINT_KEY, point.key))
         factor = np.repeat([1.0, 1 / point.excitation], 4)
-        values = np.concatenate([p.h.real.ravel(), p.h.imag.ravel()]) * factor
-        for name, value, error in zip(COEFFICIENT_COLUMNS, values, p.standard_error * factor):
+        for name, value, error in zip(COEFFICIENT_COLUMNS, real_numbers(p.h) * factor, p.standard_error * factor):
             row[name], row[f"{name}_se"] = value, error
-        figures = (settings.norm, settings.window, len(p.data.runs), len(p.f) // 2, quality_cell(p.status))
+        figures = (settings.norm, settings.window, len(p.data.runs), int(p.data.whole.sum()), quality_cell(p.status))
         rows.append(row | dict(zip(_FIGURES, figures)))
     columns = [c for name in COEFFICIENT_COLUMNS for c in (name, f"{name}_se")]
     return pd.DataFrame(rows, columns=[*POINT_KEY, *columns, *_FIGURES])
@@ -107,5 +103,7 @@ def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
             point = p.data.point
             group.attrs.update(zip(POINT_KEY, point.key))
             group.attrs["runs"] = [run.run for run in p.data.runs]
-            for name, values in (("R", p.R), ("f", p.f), ("run_index", p.data.run_index[p.data.whole])):
+            whole = p.data.whole
+            rows = (*r_matrix(p.data.D[whole], p.data.F[whole]), p.data.run_index[whole])
+            for name, values in zip(("R", "f", "run_index"), rows):
                 group.create_dataset(name, data=values, track_times=False)

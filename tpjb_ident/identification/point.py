@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.vector import directions
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.conditions import Condition, holding, merged
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, method_of
@@ -15,7 +16,7 @@ from tpjb_ident.identification.campaign_solution import CampaignSolution
 from tpjb_ident.identification.point_means import MeansTask, channel_windows, means_attenuation, vectors
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.identification.shared_changes import sources_of, total
-from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_data import RunPhasors, complex_median
 from tpjb_ident.results.linearity import FilmChange, amplitude_slope, change_conditions
 from tpjb_ident.results.point_result import PointResult, mean_position
 from tpjb_ident.results.quality import (
@@ -79,11 +80,10 @@ def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare
     runs, m = len(data.runs), len(solved.rig)
     shift, factor = np.zeros((runs, m), complex), np.ones((runs, m), complex)
     change, weight = np.zeros((runs, 2, 2), complex), np.zeros(runs)
-    names = [run.run for run in data.runs]
-    for b in np.flatnonzero(blocks.point == p):
-        g = names.index(blocks.runs[blocks.run[b]])
-        shift[g] = solution.shift[b] + solved.mains_shift[b]
-        factor[g], change[g], weight[g] = solution.factor[b], solution.run_change[b], solution.scatter.weights[b]
+    names, mine = [run.run for run in data.runs], np.flatnonzero(blocks.point == p)
+    g = [names.index(blocks.runs[run]) for run in blocks.run[mine]]
+    shift[g], factor[g] = (solution.shift + solved.mains_shift)[mine], solution.factor[mine]
+    change[g], weight[g] = solution.run_change[mine], solution.scatter.weights[mine]
     estimate, budget = _estimate(solved, p, weight, data)
     in_cells = solved.cell_pickup if p in solved.in_cells else 0.0
     conditions, shaft = _conditions(solved, p), bool(means.shaft_conditions)
@@ -142,12 +142,10 @@ def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> P
     """The point with every method, its uncertainties and what is to be said of it."""
     settings = task.settings
     data = _corrected(recorded, task.means, share)
-    table = phasor_table(data.D, data.F, data.run_index)
-    solved = share.estimate or estimate_table(table, data.omega, SOLVED)
-    by_method = all_methods(data, settings, {SOLVED: solved}, share.estimate)
+    by_method = all_methods(data, settings, share.estimate)
     if not settings.keep_weights:  # a verdict per window in place of its weights: 1 byte instead of 16
-        counted = {name: (est.weights.min(axis=1) >= REJECTED_WEIGHT)[:, None] for name, est in by_method.items()}
-        by_method = {name: replace(est, weights=counted[name]) for name, est in by_method.items()}
+        for name, est in by_method.items():
+            by_method[name] = replace(est, weights=(est.weights.min(axis=1) >= REJECTED_WEIGHT)[:, None])
     best = by_method[settings.method]
     weights = best.weights.min(axis=1)
     size, coherent = amplitude(data, weights), coherence(data.D, data.F, best.h, weights)
@@ -205,21 +203,18 @@ def _corrected(data: PointData, task: MeansTask, share: PointShare) -> PointData
 
 
 def all_methods(
-    data: PointData,
-    settings: IdentifySettings,
-    solved: dict[str, DynamicStiffness],
-    reference: DynamicStiffness | None,
+    data: PointData, settings: IdentifySettings, solved: DynamicStiffness | None
 ) -> dict[str, DynamicStiffness]:
-    """Every method that was asked for and applies; those of `solved` are there, scatter is that of the `reference`."""
+    """Every method that was asked for and applies; the solve's is there where it has an answer, and its scatter."""
     drive = _nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
     estimates: dict[str, DynamicStiffness] = {}
     for name in dict.fromkeys((*settings.methods, settings.method)):
         method, norm = method_of(name)
-        if name in solved:
-            estimates[name] = solved[name]
+        if name == SOLVED and solved is not None:
+            estimates[name] = solved
         elif method != "iv" or drive is not None or settings.method == "iv":
-            estimates[name] = estimate_table(table, data.omega, method, norm, reference)
+            estimates[name] = estimate_table(table, data.omega, method, norm, solved)
     return estimates
 
 
@@ -245,21 +240,14 @@ def _nominal_drive(data: PointData) -> ComplexArray | None:
     part of its own mean force along that direction has the size and phase of the command: averaged over the run's
     windows it knows next to nothing of a single window's noise, and nothing of the displacements' noise.
     """
-    angles = [run.direction for run in data.runs]
-    stated_angles = np.array([a for a in angles if a is not None])
-    if (
-        len(stated_angles) < len(angles)
-        or len(stated_angles) < 2
-        or np.abs(np.sin(stated_angles - stated_angles[0])).max() < _MIN_SINE
-    ):
+    angles = np.array([run.direction for run in data.runs], dtype=float)
+    if not np.abs(np.sin(angles - angles[0])).max() >= _MIN_SINE:  # or one is not stated
         return None
-    result = np.full(data.F.shape, np.nan + 0j)
-    for i, angle in enumerate(stated_angles):
-        selected = data.run_index == i
-        along = data.F[selected] @ np.array([np.cos(angle), np.sin(angle)])
-        along = along[np.isfinite(along)]
-        if len(along) < _MIN_WINDOWS:
+    drives = []
+    for i, along in enumerate(directions(angles)):
+        sizes = data.F[data.run_index == i] @ along
+        sizes = sizes[np.isfinite(sizes)]
+        if len(sizes) < _MIN_WINDOWS:
             return None
-        drive = np.median(along.real) + 1j * np.median(along.imag)
-        result[selected] = drive * np.array([np.cos(angle), np.sin(angle)])
-    return result
+        drives.append(complex_median(sizes) * along)
+    return np.array(drives)[data.run_index]

@@ -112,11 +112,11 @@ def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple
     first = data.runs[0].lines
     order = shaft_order(first.excitation[data.lines[0]].frequency, first.speed)
     name = f"{order}X on excitation line"
-    if not order or not any(name in run.conditions for run in data.runs):
+    if not order or not data.says(name):
         return none, ()
     s = np.array([run.shaft_phase[i] if len(run.shaft_phase) else np.nan for run, i in zip(data.runs, data.lines)])
     motion = np.full((len(data.runs), 2), np.nan + 0j)
-    if means is not None and len(means.mean) == len(s):
+    if means is not None:
         rows = task.of("displacement")
         motion = means.mean[:, rows] @ np.linalg.pinv(task.along[rows]).T
     reason = not_told(order, s, motion)
@@ -131,36 +131,25 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
 
     Off it are what clocks run ahead and, as far as it is known, the drift of a channel's gain with the temperature.
     """
-    rows: list[ComplexArray] = []
-    described: list[list[Channel | None]] = []
-    for run, line in zip(data.runs, data.lines):
-        places = {channel.name: k for k, channel in enumerate(run.channels)}
+    z = np.full((len(data.run_index), len(task.sensors)), np.nan + 0j)
+    described: list[dict[int, Channel]] = []
+    for g, (run, line) in enumerate(zip(data.runs, data.lines)):
+        table = {(channel.name, channel.quantity): k for k, channel in enumerate(run.channels)}
         least = _LEAST_WINDOWS * float(np.isfinite(run.z[:, line]).mean(axis=0).max(initial=0.0))
-        z = np.full((len(run.start), len(task.sensors)), np.nan + 0j)
-        channels: list[Channel | None] = []
+        described.append({})
         for j, sensor in enumerate(task.sensors):
-            channel = run.channels[places[sensor.name]] if sensor.name in places else None
-            values = None if channel is None else run.z[:, line, places[sensor.name]]
-            if channel is None or values is None or channel.quantity != sensor.quantity or not _usual(values, least):
-                channels.append(None)
-                continue
-            z[:, j] = values / warm_gain(channel, task.temperatures.get(run.run))
-            channels.append(channel)
-        rows.append(z)
-        described.append(channels)
-    z = _without_dead(np.concatenate(rows), task)
-    alive = np.array([np.isfinite(z[data.run_index == g]).any(axis=0) for g in range(len(data.runs))])
+            k = table.get((sensor.name, sensor.quantity))
+            if k is not None and _usual(run.z[:, line, k], least):
+                channel = described[g][j] = run.channels[k]
+                gain = warm_gain(channel, task.temperatures.get(run.run, np.nan))
+                z[data.run_index == g, j] = run.z[:, line, k] / gain
+    # channels that show nothing of what others of their quantity do
+    z[:, ~alive(task.sensors, np.abs(np.nan_to_num(z)).max(axis=0, initial=0.0))] = np.nan
     living = []
-    for g, run_channels in enumerate(described):
-        living.append(tuple(c if alive[g, j] else None for j, c in enumerate(run_channels)))
+    for g, channels in enumerate(described):
+        shown = np.isfinite(z[data.run_index == g]).any(axis=0)
+        living.append(tuple(channels.get(j) if is_shown else None for j, is_shown in enumerate(shown)))
     return z * _clock_turns(data, task), tuple(living)
-
-
-def _without_dead(z: ComplexArray, task: MeansTask) -> ComplexArray:
-    """Phasors (n, m) without channels that show nothing of what others of their quantity do."""
-    sizes = np.nanmax(np.abs(np.nan_to_num(z)), axis=0, initial=0.0)
-    z[:, ~alive(task.sensors, sizes)] = np.nan
-    return z
 
 
 def _usual(values: ComplexArray, least: float) -> bool:
@@ -169,9 +158,9 @@ def _usual(values: ComplexArray, least: float) -> bool:
     return bool(finite.mean() > least and np.abs(values[finite]).max(initial=0.0) > 0)
 
 
-def warm_gain(channel: Channel, temperature: float | None) -> float:
-    """Gain of a channel beside that of its reference temperature."""
-    if not channel.temperature_coefficient or temperature is None or channel.temperature_reference is None:
+def warm_gain(channel: Channel, temperature: float) -> float:
+    """Gain of a channel beside that of its reference temperature, which may not be known (NaN)."""
+    if not channel.temperature_coefficient or np.isnan(temperature) or channel.temperature_reference is None:
         return 1.0
     return 1 + channel.temperature_coefficient * (temperature - channel.temperature_reference)
 
