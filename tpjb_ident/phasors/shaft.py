@@ -91,14 +91,14 @@ def _by_keyphasor(run: Run, turning: float) -> ComplexArray | None:
 
 
 def _by_first_line(phasors: RunPhasors, turning: float) -> ComplexArray | None:
-    """Unit phasors at the frequency `turning` [Hz] of the forward part of the 1X line in every window."""
+    """Unit phasors at the frequency `turning` [Hz] of the forward part of the 1X line in every window that has one."""
     place = phasors.lines.place("1X")
     if place is None:
         return None
     d = phasors.displacement.phasors[:, place]
     middle = phasors.start + 0.5 * phasors.length
     z = (d[:, 0] + 1j * d[:, 1]) * np.exp(2j * np.pi * (phasors.lines.frequencies[place] - turning) * middle)
-    good = z[np.isfinite(z)]
-    if not len(good) or not abs(good.mean()) > _CLEAR * good.std() / np.sqrt(len(good)):
+    z = z[np.abs(z) > 0.0]  # a window at rest, or without the line, tells none
+    if not len(z) or not abs(z.mean()) > _CLEAR * z.std() / np.sqrt(len(z)):
         return None
     return np.asarray(z / np.abs(z))
