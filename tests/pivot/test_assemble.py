@@ -381,7 +381,8 @@ class Run:
 
     def __init__(self, n=4000, rate=500.0, pad=1, seed=1):
         rng = np.random.default_rng(seed)
-        self.id, self.file, self.pad, self.sample_rate, self.channels = "p-1-up", "p.csv", pad, rate, CHANNELS
+        self.id, self.kind, self.file, self.channels = "p-1-up", "dry_pivot", "p.csv", CHANNELS
+        self.pad, self.sample_rate = pad, rate
         self.reader = SimpleNamespace(problems=lambda: ())
         self.time = np.arange(n) / rate
         load = np.interp(self.time, *np.array([[0, 0.5, 2.5, 3, 5, 5.5, 8], [100, 1000, 1000, 2000, 2000, 3000, 3000]]))

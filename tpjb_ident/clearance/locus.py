@@ -21,6 +21,8 @@ from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.slow_noise import DRIFT_RATE, NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples
 from tpjb_ident.phasors.windows import line_design
+from tpjb_ident.pivot.blocks import time_bins
+from tpjb_ident.pivot.dry_record import refusal
 from tpjb_ident.pivot.refusals import usable_runs
 from tpjb_ident.presentation import Presented
 from tpjb_ident.rounding import listed
@@ -154,11 +156,10 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     runs = campaign.of_kind("locus")
     if not runs:
         raise refuse("campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
-    usable, problems = usable_runs(runs, _read)
-    if 2 * len(usable) <= len(runs):
+    records, problems = usable_runs(runs, _read)
+    if 2 * len(records) <= len(runs):
         raise RigDataError(problems)
-    records = [record for _, record in usable]
-    orders = np.array([runs.index(run) for run, _ in usable], dtype=float)
+    orders = np.array([runs.index(record.run) for record in records], dtype=float)
     noise = _noise(records)
     centre = np.zeros(2) if polygon is None else np.asarray(polygon.centre)
     repeats = _repeats(records, orders, noise, centre)
@@ -167,19 +168,19 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
     centre_covariance = zero if polygon is None else polygon.centre_covariance
     points = []
-    for (run, record), order, size in zip(usable, orders, moved, strict=True):
+    for record, order, size in zip(records, orders, moved, strict=True):
         position = record.position - np.nan_to_num(repeats.drift) * order - centre
         variance = noise.mean_variance(record.span) + repeats.scatter + order**2 * repeats.drift_variance
         # of a steady way the ends are as far from the mean as the halves from each other
         variance += size**2 / 4.0
         covariance = variance * np.eye(2) + centre_covariance
-        points.append(LocusPoint(run.id, record.point, record.load, record.direction, position, covariance))
+        points.append(LocusPoint(record.run.id, record.run.point, record.load, record.direction, position, covariance))
     off = np.zeros(2) if polygon is None else _off_centre(points, polygon)
     # nothing tells whether the zero moved before the sweep, after it or within: the interval holds the way
     points = [replace(p, covariance=p.covariance + np.outer(off, off)) for p in points]
     points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
     on_its_way = [
-        f"halves of {run.id} stand {1e6 * size:.2g} µm apart" for (run, _), size in zip(usable, moved) if size
+        f"halves of {record.run.id} stand {1e6 * size:.2g} µm apart" for record, size in zip(records, moved) if size
     ]
     if off.any():
         on_its_way.append(f"positions go around a place {1e6 * math.hypot(*off):.2g} µm from the polygon's centre")
@@ -191,7 +192,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
 class _Record:
     """One locus run: mean position and load, and block averages for the noise."""
 
-    point: OperatingPoint
+    run: Run
     position: FloatArray  #: (2,) [m]
     load: float  #: [N]
     direction: float  #: [rad]
@@ -217,8 +218,8 @@ def _from_down(direction: float) -> float:
 def _read(run: Run) -> _Record:
     time, force, place, good, _ = slow_samples(live_run(run))
     if good.sum() < 50 or good.mean() < 0.5:
-        what = f"locus run {run.id} has only {int(good.sum())} usable samples of {len(good)}"
-        raise refuse(run.file, "record", what, "Repeat this direction", run.id)
+        what = f"has only {int(good.sum())} usable samples of {len(good)}"
+        raise refusal(run, "record", what, "Repeat this direction")
     time, place = time[good], place[good]
     # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
     speed = run.point.shaft_speed_hz
@@ -227,7 +228,7 @@ def _read(run: Run) -> _Record:
     mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
     load = mean[-1, 2:]
     return _Record(
-        point=run.point,
+        run=run,
         position=np.asarray(mean[-1, :2], dtype=float),
         load=float(np.hypot(*load)),
         direction=float(np.arctan2(load[1], load[0])),
@@ -238,9 +239,7 @@ def _read(run: Run) -> _Record:
 
 def _blocks(time: FloatArray, place: FloatArray) -> tuple[NoiseSeries, NoiseSeries]:
     """Both components of a steady place (n, 2) [m] in blocks, of which none is half empty."""
-    label = np.floor((time - time[0]) / _BLOCK).astype(int)
-    count = np.bincount(label)
-    whole = np.flatnonzero(count > 0.5 * np.median(count[count > 0]))
+    label, whole = time_bins(time, _BLOCK)
     moment, *components = (ndimage.mean(values, label, whole) for values in (time, *place.T))
     duration, constant = np.full(len(whole), _BLOCK), np.ones((len(whole), 1))
     x, y = (NoiseSeries(moment, duration, values, constant) for values in components)
@@ -300,7 +299,7 @@ def _repeats(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, 
     of its change away from it, give or take a half of either. What two repeats or more leave beyond that and the noise
     is scatter; with few of them it is as much larger as Student's interval is wider than the normal one.
     """
-    same = np.array([[_same_set_point(a.point, b.point) for b in records] for a in records])
+    same = np.array([[_same_set_point(a.run.point, b.run.point) for b in records] for a in records])
     firsts = same.argmax(axis=0)
     count = len(records) - len(np.unique(firsts))
     if count == 0:

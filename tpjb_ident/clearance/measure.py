@@ -17,7 +17,7 @@ from tpjb_ident.conditions import Condition, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.curve import PivotCurve
-from tpjb_ident.pivot.dry_record import axial_channels, relative_calibration
+from tpjb_ident.pivot.dry_record import axial_channels, refusal, relative_calibration
 from tpjb_ident.pivot.refusals import usable_runs
 from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import TANGENT
@@ -185,9 +185,9 @@ def measure_sweeps(
     runs: Sequence[Run], pivot_angles: Sequence[float], curves: Sequence[PivotCurve] | None, most: int | None = None
 ) -> tuple[list[ClearancePolygon], list[Condition]]:
     """Polygons of sweeps, the coldest first, at `most` so many, and what is wrong with those that are of no use."""
-    measured, problems = usable_runs(coldest_first(runs), lambda run: measure_run(run, pivot_angles, curves), most)
+    polygons, problems = usable_runs(coldest_first(runs), lambda run: measure_run(run, pivot_angles, curves), most)
     refused = [Condition("runs-refused", f"{problem.run} ({problem})") for problem in problems]
-    return [polygon for _, polygon in measured], refused
+    return polygons, refused
 
 
 def measure_run(
@@ -201,7 +201,7 @@ def measure_run(
     walk = fit.noise.walk * np.sqrt(np.ptp(contact.time))
     if walk > _LARGEST_WALK:
         what = f"has a shaft that was turned, or probes that moved: their zero walks by {1e6 * walk:.1f} µm"
-        raise refuse(run.file, "record", f"clearance run {run.id} {what}", "Keep shaft and probes still", run.id)
+        raise refusal(run, "record", what, "Keep shaft and probes still")
     polygon = _polygon(run, contact, angles, fit)
     probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
     ratio, differ = _gains_differ(probes, polygon)
@@ -223,8 +223,8 @@ def _read_sides(
     contact = read_sweep(run, angles, deflection)
     pads = np.flatnonzero(np.bincount(contact.pad, minlength=len(angles)) >= _FEWEST_BLOCKS)
     if len(pads) < 3:
-        what = f"clearance run {run.id} reaches {len(pads)} of {len(angles)} pads"
-        raise refuse(run.file, "record", what, "Check pad angles and channels", run.id)
+        what = f"reaches {len(pads)} of {len(angles)} pads"
+        raise refusal(run, "record", what, "Check pad angles and channels")
     return contact, fit_sides(contact, angles, pads, curves)
 
 

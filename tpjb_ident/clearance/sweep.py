@@ -14,7 +14,6 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
-from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions
 from tpjb_ident.phasors.bad_samples import robust_deviation, white_noise
 from tpjb_ident.phasors.slow_samples import (
@@ -25,6 +24,7 @@ from tpjb_ident.phasors.slow_samples import (
     slow_samples,
     spare_slopes,
 )
+from tpjb_ident.pivot.dry_record import refusal
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run
@@ -85,76 +85,30 @@ def sweep_samples(run: Run) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Good samples of a sweep, which goes around and takes the shaft along: time (n,), load, position (n, 2)."""
     time, load, position, good, _ = slow_samples(run)
     if good.sum() < 200:
-        raise _refused(run, f"has only {int(good.sum())} usable samples", "Repeat the sweep")
+        raise refusal(run, "record", f"has only {int(good.sum())} usable samples", "Repeat the sweep")
     slopes = spare_slopes(run, np.eye(2))
     for what in contradictions(run.channels, [slopes], {"force": [0.0], "displacement": [0.0]}):
-        raise refuse(run.file, "channels", f"clearance run {run.id}: {what}", REMEDY, run.id)
+        raise refusal(run, "channels", f"cannot be used: {what}", REMEDY)
     load, position = load[good], position[good]
     _check_turn(run, load, position)
     return time[good], load, position
 
 
-def read_sweep(run: Run, angles: FloatArray, deflection: float = LARGEST_DEFLECTION) -> ContactIntervals:
-    """Read a live run of kind ``clearance``; angles (n,) [rad] of the pads, largest deflection of a pivot [m]."""
+def read_sweep(run: Run, angles: FloatArray, deflection: float) -> ContactIntervals:
+    """Average a live run of kind ``clearance`` per pad over pieces in which the same pads are touched.
+
+    Angles (n,) [rad] of the pads, largest deflection of a pivot [m].
+    """
     time, load, position = sweep_samples(run)
     # whole turns of a shaft that turns: its runout averages out
     turn = 2.0 * np.pi / run.point.shaft_speed if run.point.shaft_speed > 0.0 else _BLOCK
-    return _average(
-        time, load, position, angles, float(turn * max(round(_BLOCK / turn), 1)), _CONTACT_DEPTH + deflection
-    )
-
-
-def _refused(run: Run, what: str, cure: str) -> RigDataError:
-    return refuse(run.file, "record", f"clearance run {run.id} {what}", cure, run.id)
-
-
-def _check_turn(run: Run, load: FloatArray, position: FloatArray) -> None:
-    """Refuse a load that does not go around, and a shaft that goes elsewhere than the load."""
-    step = max(1, len(load) // 400)
-    whole = len(load) // step * step
-    pushed, place = (part[:whole].reshape(-1, step, 2).mean(axis=1) @ [1.0, 1j] for part in (load, position))
-    angle = np.angle(pushed)
-    covered = np.sort(angle[np.abs(pushed) > _RELEASED * np.median(np.abs(pushed))])
-    gap = float(np.diff(covered, append=covered[0] + 2.0 * np.pi).max())
-    if gap > _LARGEST_GAP:
-        what = f"turns its load through {360.0 - np.degrees(gap):.0f} deg only"
-        raise _refused(run, what, "Sweep the load once around, 360 deg")
-    place = place - 0.5 * (place.real.max() + place.real.min() + 1j * (place.imag.max() + place.imag.min()))
-    in_load_frame = np.mean(place * np.exp(-1j * angle))
-    lag, coherence = np.angle(in_load_frame), abs(in_load_frame) / max(np.abs(place).mean(), 1e-300)
-    if abs(lag) > _LARGEST_LAG or coherence < 0.7:
-        what = f"has a shaft that does not follow its load ({np.degrees(lag):+.0f} deg away, coherence {coherence:.2f})"
-        cure = "Check order, axes and polarity of the displacement and force channels; sweep without oil"
-        raise _refused(run, what, cure)
-
-
-def _carried(load: FloatArray, angles: FloatArray, touched: BoolArray) -> FloatArray:
-    """Load on every touched pad (n_samples, n) [N]; NaN where the touched pads cannot balance the force."""
-    n = directions(angles)
-    carried = np.full(touched.shape, np.nan)
-    count = touched.sum(axis=1)
-    single = np.flatnonzero(count == 1)
-    pad = np.argmax(touched[single], axis=1)
-    carried[single, pad] = np.sum(load[single] * n[pad], axis=1)
-    for first in range(len(angles)):
-        pads = np.array([first, (first + 1) % len(angles)])
-        pair = np.flatnonzero((count == 2) & touched[:, pads].all(axis=1))
-        share = np.linalg.solve(n[pads].T, load[pair].T).T
-        # past a pad's own direction its neighbour would have to pull: the pad carries all, friction holds the shaft
-        carried[np.ix_(pair, pads)] = np.where(share[:, ::-1] < 0.0, load[pair] @ n[pads].T, np.maximum(share, 0.0))
-    return carried
-
-
-def _average(
-    time: FloatArray, load: FloatArray, position: FloatArray, angles: FloatArray, length: float, depth: float
-) -> ContactIntervals:
-    """Average per pad over pieces of `length` [s] in which the same pads are touched, within `depth` [m]."""
+    length = turn * max(round(_BLOCK / turn), 1)
     # the shaft touches a pad within some micrometres of where it was farthest out
     period = float(time[-1] - time[0]) / (len(time) - 1)
     samples = max(round(length / period), 1)
     noisy = (max(map(white_noise, position.T)) / (0.5 * _CONTACT_DEPTH)) ** 2
     outward = uniform_filter1d(position, int(np.clip(noisy, 1, samples)), axis=0) @ directions(angles).T
-    touched = np.asarray(outward > np.quantile(outward, 0.995, axis=0) - depth)
+    touched = np.asarray(outward > np.quantile(outward, 0.995, axis=0) - _CONTACT_DEPTH - deflection)
     state = touched @ (1 << np.arange(len(angles)))
     piece = np.floor((time - time[0]) / length).astype(int)
     cuts = np.flatnonzero((np.diff(state) != 0) | (np.diff(piece) != 0)) + 1
@@ -178,6 +132,43 @@ def _average(
         push=float(np.median(np.hypot(*load.T))),
         level_error=level_error(position),
     )
+
+
+def _check_turn(run: Run, load: FloatArray, position: FloatArray) -> None:
+    """Refuse a load that does not go around, and a shaft that goes elsewhere than the load."""
+    step = max(1, len(load) // 400)
+    whole = len(load) // step * step
+    pushed, place = (part[:whole].reshape(-1, step, 2).mean(axis=1) @ [1.0, 1j] for part in (load, position))
+    angle = np.angle(pushed)
+    covered = np.sort(angle[np.abs(pushed) > _RELEASED * np.median(np.abs(pushed))])
+    gap = float(np.diff(covered, append=covered[0] + 2.0 * np.pi).max())
+    if gap > _LARGEST_GAP:
+        what = f"turns its load through {360.0 - np.degrees(gap):.0f} deg only"
+        raise refusal(run, "record", what, "Sweep the load once around, 360 deg")
+    place = place - 0.5 * (place.real.max() + place.real.min() + 1j * (place.imag.max() + place.imag.min()))
+    in_load_frame = np.mean(place * np.exp(-1j * angle))
+    lag, coherence = np.angle(in_load_frame), abs(in_load_frame) / max(np.abs(place).mean(), 1e-300)
+    if abs(lag) > _LARGEST_LAG or coherence < 0.7:
+        what = f"has a shaft that does not follow its load ({np.degrees(lag):+.0f} deg away, coherence {coherence:.2f})"
+        cure = "Check order, axes and polarity of the displacement and force channels; sweep without oil"
+        raise refusal(run, "record", what, cure)
+
+
+def _carried(load: FloatArray, angles: FloatArray, touched: BoolArray) -> FloatArray:
+    """Load on every touched pad (n_samples, n) [N]; NaN where the touched pads cannot balance the force."""
+    n = directions(angles)
+    carried = np.full(touched.shape, np.nan)
+    count = touched.sum(axis=1)
+    single = np.flatnonzero(count == 1)
+    pad = np.argmax(touched[single], axis=1)
+    carried[single, pad] = np.sum(load[single] * n[pad], axis=1)
+    for first in range(len(angles)):
+        pads = np.array([first, (first + 1) % len(angles)])
+        pair = np.flatnonzero((count == 2) & touched[:, pads].all(axis=1))
+        share = np.linalg.solve(n[pads].T, load[pair].T).T
+        # past a pad's own direction its neighbour would have to pull: the pad carries all, friction holds the shaft
+        carried[np.ix_(pair, pads)] = np.where(share[:, ::-1] < 0.0, load[pair] @ n[pads].T, np.maximum(share, 0.0))
+    return carried
 
 
 def _settled(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArray:

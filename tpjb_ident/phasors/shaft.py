@@ -87,13 +87,13 @@ def _by_keyphasor(run: Run, turning: float) -> ComplexArray:
 
 
 def _by_first_line(phasors: RunPhasors, turning: float) -> ComplexArray:
-    """Unit phasors at the frequency `turning` [Hz] of the forward part of the 1X line in the windows."""
+    """Unit phasors at the frequency `turning` [Hz] of the forward part of the 1X line in every window that has one."""
     place = phasors.lines.place("1X")
     if place is None:
         return _NO_TURNS
     d = phasors.displacement.phasors[:, place]
     middle = phasors.start + 0.5 * phasors.length
     z = (d[:, 0] + 1j * d[:, 1]) * np.exp(2j * np.pi * (phasors.lines.frequencies[place] - turning) * middle)
-    z = z[np.isfinite(z)]
+    z = z[np.abs(z) > 0.0]  # a window at rest, or without the line, tells none
     is_clear = len(z) and abs(z.mean()) > _CLEAR * z.std() / np.sqrt(len(z))
     return np.asarray(z / np.abs(z)) if is_clear else _NO_TURNS

@@ -83,12 +83,17 @@ class Blocks:
         return noise.covariance(self.time, self.duration) + quantisation**2 * np.eye(len(self))
 
 
+def time_bins(time: FloatArray, width: float) -> tuple[IntArray, IntArray]:
+    """Number (n,) of the bin of `width` [s] of each moment (n,) [s], and the bins that are not half empty."""
+    label = np.floor((time - time[0]) / width + 1e-9).astype(int)
+    count = np.bincount(label)
+    return label, np.flatnonzero(count >= 0.5 * np.median(count[count > 0]))
+
+
 def load_course(time: FloatArray, load: FloatArray, width: float, most: int) -> LoadCourse:
     """Course of a load programme, `most` medians over `width` [s]: time (n,) [s], load along the pad (n,) [N]."""
     width *= max(1.0, np.ceil((time[-1] - time[0]) / width / most))
-    label = np.floor((time - time[0]) / width + 1e-9).astype(int)
-    count = np.bincount(label)
-    whole = np.flatnonzero(count >= 0.5 * np.median(count[count > 0]))
+    label, whole = time_bins(time, width)
     moment, level = ndimage.mean(time, label, whole), ndimage.median(load, label, whole)
     return LoadCourse(moment, level, width)
 
@@ -180,19 +185,12 @@ def _edges(time: FloatArray, holds: tuple[Hold, ...], length: float) -> tuple[Fl
 def _directions(load: FloatArray) -> FloatArray:
     """Sense of the load's way (m,): it turns only when the load has come back by `_TURN` of its range."""
     if not len(load):  # a logger too slow for a single piece
-        return np.zeros(0)
-    turn = _TURN * float(np.ptp(load))
-    travel = load - load[0]
-    direction = 1.0 if travel[int(np.argmax(np.abs(travel) > turn))] >= 0.0 else -1.0
-    sense = np.full(len(load), direction)
-    farthest = 0
-    for k, way in enumerate(travel):
-        back = direction * (travel[farthest] - way)
-        if back > turn:
-            direction = -direction
-            sense[farthest + 1 :] = direction
-        if back <= 0.0 or back > turn:
-            farthest = k
+        return load
+    turn, travel = _TURN * float(np.ptp(load)), load - load[0]
+    way = 1.0 if travel[int(np.argmax(np.abs(travel) > turn))] >= 0.0 else -1.0
+    farthest, sense = _play(load, way, 0.0, turn)
+    for k in np.flatnonzero(farthest[:-1] != load[:-1])[::-1]:
+        sense[k] = sense[k + 1]
     return sense
 
 
@@ -201,16 +199,28 @@ def slid(blocks: Blocks, course: LoadCourse, friction: float) -> Blocks:
 
     Friction holds back a share of the load: until the load has come back by twice that, the pivot stays where it was.
     """
-    last, sense = course.load.copy(), np.empty(len(course.load))
-    turn, way, noise = last[0], float(blocks.branch[0]), _UNDECIDED * white_noise(course.load)
-    for k, value in enumerate(course.load.tolist()):
-        if way * (value - turn) > 0.0:
-            turn = value
-        elif way * value * (1.0 + way * friction) < way * turn * (1.0 - way * friction) - noise:
-            turn, way = value, -way
-        last[k], sense[k] = value if abs(value - turn) < _LEVEL * noise else turn, way
+    noise = white_noise(course.load)
+    last, sense = _play(course.load, float(blocks.branch[0]), friction, _UNDECIDED * noise)
+    last = np.where(np.abs(course.load - last) < _UNDECIDED * _LEVEL * noise, course.load, last)
     first, stop = np.searchsorted(course.time, blocks.time + np.multiply.outer([-0.5, 0.5], blocks.duration))
     first = np.minimum(first, len(last) - 1)
     columns = np.column_stack([last, last * sense, last != course.load])
     load, held_back, stuck = piece_means(columns, first, np.maximum(stop, first + 1)).T
     return replace(blocks, load=np.where(stuck > 0.0, load, blocks.load), branch=held_back / np.where(load, load, 1.0))
+
+
+def _play(load: FloatArray, way: float, friction: float, noise: float) -> tuple[FloatArray, FloatArray]:
+    """Loads (n,) at which a pivot last slid, and the sense in which it did, at first `way`.
+
+    It slides back where the load has come back by more than `noise`, and by the share `friction` of both loads.
+    """
+    last, sense = np.empty(len(load)), np.empty(len(load))
+    start = 0
+    while start < len(load):
+        later = load[start:]
+        turn = way * np.maximum.accumulate(way * later)
+        follows = way * (turn - later) > friction * (np.abs(turn) + np.abs(later)) + noise
+        stop = start + int(np.argmax(follows)) if follows.any() else len(load)
+        last[start:stop], sense[start:stop] = turn[: stop - start], way
+        start, way = stop, -way
+    return last, sense

@@ -217,7 +217,7 @@ class PivotCurve(Presented):
             [N/m], shape of `load`. Random errors, drift, friction and the choice of the law; calibration is
             in `relative_calibration`.
         """
-        return self._band(self.stiffness(load), load, level, secant=False)
+        return self._band(load, level, secant=False)
 
     def secant_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
         """Interval of the secant stiffness [N/m]; as `stiffness_band`.
@@ -229,9 +229,10 @@ class PivotCurve(Presented):
         level : float, optional
             Of the interval, 0 to 1.
         """
-        return self._band(self.secant(load), load, level, secant=True)
+        return self._band(load, level, secant=True)
 
-    def _band(self, value: FloatArray, load: ArrayLike, level: float, secant: bool) -> tuple[FloatArray, FloatArray]:
+    def _band(self, load: ArrayLike, level: float, secant: bool) -> tuple[FloatArray, FloatArray]:
+        value = self.secant(load) if secant else self.stiffness(load)
         factor = np.exp(_quantile(level) * self.relative_stiffness_se(load, secant))
         return np.asarray(value / factor), np.asarray(value * factor)
 

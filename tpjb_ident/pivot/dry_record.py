@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import special
 
-from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
@@ -94,18 +94,19 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
     if len(good) < _FEWEST_SAMPLES or lost > _MOST_LOST:
         what = f"has {len(good)} samples, of which {100 * lost:.0f} % are missing or glitches: fewer than it takes"
         cure = "Export every sample, not one a step; state the sample_rate of a slower device; else repeat the test"
-        raise _refusal(run, "record", what, cure)
+        raise refusal(run, "record", what, cure)
     pickup = _pickup(run, {"force": load, "displacement": place}, good, rate)
+    order = np.argsort(time, kind="stable")  # a logger may repeat or shuffle time stamps
+    time, load, place, good = (values[order] for values in (time, load, place, good))
     # an overshoot of the load, which friction remembers, is no glitch for being short
-    turns = _in_order(time, good_samples(load, max(round(_COURSE[0] * rate), 3)) & np.isfinite(time))
+    turns = good_samples(load, max(round(_COURSE[0] * rate), 3)) & np.isfinite(time)
     course = time[turns], load[turns]
-    order = _in_order(time, good)
-    time, load, place = time[order], load[order], place[order]
+    time, load, place = (values[good] for values in (time, load, place))
     push = _push(load)
     if angle is None:
         angle = math.atan2(push[1], push[0])
     if math.hypot(*push) <= max(10.0 * float(np.median(np.abs(np.diff(np.hypot(*load.T))))), 1e-9):
-        raise _refusal(run, "force", "has a load that does not rise", "Check the cells; repeat the run")
+        raise refusal(run, "force", "has a load that does not rise", "Check the cells; repeat the run")
     axes = pad_axes(angle)
     vectors = np.hstack([load @ axes.T, place @ axes.T])
     holds = find_holds(time, vectors[:, 0])
@@ -115,7 +116,7 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
     blocks = blocks.take(~loose & ~_just_unloaded(blocks))
     if len(blocks) < _FEWEST_BLOCKS:
         what = f"gives only {len(blocks)} usable averages of {BLOCK:g} s"
-        raise _refusal(run, "record", what, "Record for longer")
+        raise refusal(run, "record", what, "Record for longer")
     return DryRecord(
         run,
         run.pad or 0,
@@ -131,12 +132,6 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         slopes=spare_slopes(run, axes[:1]),
         free_load=free_load,
     )
-
-
-def _in_order(time: FloatArray, good: BoolArray) -> IntArray:
-    """Places of good samples (n,) in order of time: a logger may repeat or shuffle time stamps."""
-    order = np.flatnonzero(good)
-    return np.asarray(order[np.argsort(time[order], kind="stable")])
 
 
 def pad_axes(angle: float) -> FloatArray:
@@ -176,9 +171,9 @@ def _push(load: FloatArray) -> FloatArray:
     return np.asarray(np.median(load[order[-few:]], axis=0) - np.median(load[order[:few]], axis=0))
 
 
-def _refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
+def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
     """Error that names the run, the place, the trouble and the cure."""
-    return refuse(run.file, place, f"run {run.id} {what}", cure, run.id)
+    return refuse(run.file, place, f"{run.kind.replace('_', ' ')} run {run.id} {what}", cure, run.id)
 
 
 def with_load_zero(records: Sequence[DryRecord]) -> list[DryRecord]:

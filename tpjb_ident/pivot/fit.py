@@ -32,6 +32,7 @@ from tpjb_ident.pivot.dry_record import (
     axial_channels,
     pooled_noise,
     read_dry_run,
+    refusal,
     relative_calibration,
 )
 from tpjb_ident.pivot.law_fit import (
@@ -69,6 +70,7 @@ _ANGLE_WARNING = math.radians(4.0)
 _MISFIT_PROBABILITY = 1e-4
 _CLEAR_CHOICE = 0.5  # posterior share below which the law counts as undecided
 _MANY_LOST = 0.05
+_ROUNDS = 40  # of a fixed point
 #: Share of a difference that a curve must leave for the tests to tell it.
 _LEAST_SHARE = 1e-3
 #: Fall of the deviance from which tests of one pad differ: one in twenty sets of equal tests shows it.
@@ -110,16 +112,18 @@ def with_friction(record: DryRecord, noise: NoiseModel) -> DryRecord:
     """
     if np.ptp(slid(record.blocks, record.course, FRICTION_SHARE).branch) == 0.0:
         return record
-    likeliest, evidence, fitted = record, -math.inf, 0.0
+    data, likeliest, evidence, fitted, start = fit_data([record], noise), record, -math.inf, 0.0, None
     for times in (*_TIMES, None, None):
         share = fitted if times is None else times * FRICTION_SHARE
-        friction = share, max(share, FRICTION_SE)
-        trial = replace(record, blocks=slid(record.blocks, record.course, share), friction=friction)
-        fit = fit_law(LAWS["spline"], True, fit_data([trial], noise))
+        blocks, friction = slid(record.blocks, record.course, share), (share, max(share, FRICTION_SE))
+        trial = replace(data, load=blocks.load, branch=blocks.branch, friction=friction)
+        fit = fit_law(LAWS["spline"], True, trial, start)
+        start = fit.theta
         # nothing else tells much friction from more
         likely = fit.log_evidence - math.log1p((share / FRICTION_SHARE - 1.0) ** 2)
         if likely > evidence:
-            likeliest, evidence, fitted = trial, likely, abs(float(fit.theta[FRICTION]))
+            likeliest, evidence = replace(record, blocks=blocks, friction=friction), likely
+            fitted = abs(float(fit.theta[FRICTION]))
     return likeliest
 
 
@@ -272,12 +276,11 @@ def _read(campaign: Campaign, angles: FloatArray) -> tuple[list[DryRecord], list
 
     def read(run: Run) -> DryRecord:
         if run.pad is None or not 1 <= run.pad <= len(angles):
-            what = f"run {run.id} names pad {run.pad}, the bearing has pads 1 to {len(angles)}"
-            raise refuse(run.file, "pad", what, "Correct the manifest", run.id)
+            what = f"names pad {run.pad}, the bearing has pads 1 to {len(angles)}"
+            raise refusal(run, "pad", what, "Correct the manifest")
         return read_dry_run(run, float(angles[run.pad - 1]))
 
-    records, problems = usable_runs(runs, read)
-    return [record for _, record in records], problems
+    return usable_runs(runs, read)
 
 
 def _fit_pads(pads: Sequence[Sequence[DryRecord]], structure: str) -> list[PivotCurve]:
@@ -402,21 +405,14 @@ def contact_onset(fit: LawFit) -> tuple[float, float]:
     """
     if not fit.contact:
         return 0.0, 0.0
-    onset, gradient = _onset(fit), np.zeros(len(fit.theta))
-    if onset > 0.0:  # the compliance changes slowly: it is taken as that at the onset
-        gap, decay = float(fit.theta[-2]), math.exp(fit.theta[-1])
-        gradient[[SCALE, -2, -1]] = -decay, decay / gap, onset - decay
-    return onset, math.sqrt(float(gradient @ fit.covariance @ gradient))
-
-
-def _onset(fit: LawFit) -> float:
-    gap, decay = float(fit.theta[-2]), float(np.exp(fit.theta[-1]))
-    load = decay
-    for _ in range(60):
+    gap, decay = float(fit.theta[-2]), math.exp(fit.theta[-1])
+    onset = decay
+    for _ in range(_ROUNDS):
         # fixed point of (gap / F0) exp(-F / F0) = tolerance c(F): c changes slowly, so this contracts
-        allowed = CONTACT_TOLERANCE * float(fit.compliance(np.array(max(load, 0.05 * decay))))
-        updated = decay * math.log(max(gap / decay / allowed, 1e-300))
-        if abs(updated - load) < 1e-6 * decay:
-            break
-        load = updated
-    return max(load, 0.0)
+        allowed = CONTACT_TOLERANCE * float(fit.compliance(np.array(max(onset, 0.05 * decay))))
+        onset = decay * math.log(max(gap / decay / allowed, 1e-300))
+    if onset <= 0.0:
+        return 0.0, 0.0
+    gradient = np.zeros(len(fit.theta))  # the compliance changes slowly: it is taken as that at the onset
+    gradient[[SCALE, -2, -1]] = -decay, decay / gap, onset - decay
+    return onset, math.sqrt(float(gradient @ fit.covariance @ gradient))

@@ -209,7 +209,7 @@ def _minimise(
         hessian, gradient = jacobian.T @ jacobian, jacobian.T @ residual
         # a parameter that stands at its bound and wants to go on takes no part in the step
         free = ~((theta <= prior.low) & (gradient < 0.0) | (theta >= prior.high) & (gradient > 0.0))
-        damped = (hessian + damping * np.diag(np.diag(hessian)))[np.ix_(free, free)]
+        damped = (hessian + damping * np.diag(np.diag(hessian)))[free][:, free]
         step = np.zeros(len(theta))
         step[free] = np.linalg.solve(damped, gradient[free])
         # shapes and logarithms: a contact gap near zero leaves its decay load free to run away

@@ -27,7 +27,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import integrate
 
 from rigdata.arrays import FloatArray
 
@@ -139,6 +138,7 @@ def _bend(u: FloatArray, b: float, w: float) -> tuple[FloatArray, FloatArray, Fl
 
 NODES = np.log(np.array([0.08, 0.16, 0.3, 0.55, 1.0, 1.6, 2.4, 4.0]))  # ln(W / W_r); the one at 0 is the scale
 FIXED = 4  # the node at the reference load: its value is zero, the scale stands beside it
+_FREE = np.flatnonzero(np.arange(len(NODES)) != FIXED)
 TYPICAL_SLOPE = -0.15  # of ln(compliance) over ln(load), between linear (0) and a sphere (-1/3)
 SLOPE_SPREAD = 0.25
 BEND_SPREAD = 0.2  # change of that slope from node to node, standard deviation
@@ -148,29 +148,28 @@ def _spline_precision() -> FloatArray:
     """Precision (k, k) of the prior: a slope at the reference load, and small bends (k: free nodes)."""
     slopes = np.diff(np.eye(len(NODES)), axis=0) / np.diff(NODES)[:, None]
     bends = np.diff(slopes, axis=0) / BEND_SPREAD
-    rows = np.delete(np.vstack([bends, slopes[FIXED] / SLOPE_SPREAD]), FIXED, axis=1)
+    rows = np.vstack([bends, slopes[FIXED] / SLOPE_SPREAD])[:, _FREE]
     return np.asarray(rows.T @ rows)
 
 
 def _spline_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
     """The logarithm of the compliance is piecewise linear in that of the load; beyond the nodes its slope goes on."""
-    weights = interpolation(np.log(np.maximum(u, 1e-9)), NODES)
-    value = np.exp(weights @ np.insert(q, FIXED, 0.0))
-    return value, np.delete(weights, FIXED, axis=1) * value[:, None]
+    weights = interpolation(np.log(np.maximum(u, 1e-9)), NODES)[:, _FREE]
+    value = np.exp(weights @ q)
+    return value, weights * value[:, None]
 
 
 def _spline_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
     """Integral of the compliance, which rises with the load whatever the nodes say."""
-    logs = np.insert(q, FIXED, 0.0)
     # of d phi / d ln u on the grid: values, and their derivatives with respect to the nodes
-    columns = np.exp(_GRID + _GRID_WEIGHTS @ logs)[:, None] * _GRID_COLUMNS
+    columns = np.exp(_GRID + _GRID_COLUMNS[:, 1:] @ q)[:, None] * _GRID_COLUMNS
     # below the grid the compliance is a power of the load, integrable whatever the slope says
     gap = NODES[1] - NODES[0]
-    slope = max((logs[1] - logs[0]) / gap, -0.9)
+    slope = max((q[1] - q[0]) / gap, -0.9)
     below = columns[0] / (1.0 + slope)
     # that share changes with the slope, so with the first two nodes (both free: the fixed one lies higher up)
     below[1:3] += np.array([1.0, -1.0]) * below[0] / (1.0 + slope) / gap
-    total = below + integrate.cumulative_trapezoid(columns, dx=_GRID_STEP, axis=0, initial=0.0)
+    total = below + _GRID_STEP * (np.cumsum(columns, axis=0) - 0.5 * (columns + columns[0]))
     table = np.column_stack([np.log(total[:, 0]), total[:, 1:] / total[:, :1]])
     # between grid points, and beyond them, the integral is a power of the load: its logarithm is straight
     x = (np.log(np.maximum(u, 1e-12)) - _GRID[0]) / _GRID_STEP
@@ -194,8 +193,7 @@ def interpolation(x: FloatArray, knots: FloatArray) -> FloatArray:
 
 # ln u on which the compliance is integrated
 _GRID, _GRID_STEP = np.linspace(np.log(2e-3), np.log(25.0), 320, retstep=True)
-_GRID_WEIGHTS = interpolation(_GRID, NODES)
-_GRID_COLUMNS = np.column_stack([np.ones(len(_GRID)), np.delete(_GRID_WEIGHTS, FIXED, axis=1)])
+_GRID_COLUMNS = np.column_stack([np.ones(len(_GRID)), interpolation(_GRID, NODES)[:, _FREE]])
 
 
 def _law(name: str, phi: Shape, psi: Shape, parameters: dict[str, tuple[float, float, float, float]]) -> Law:
@@ -208,8 +206,7 @@ def _contact_law(name: str, p: float) -> Law:
     return _law(name, functools.partial(_fixed, _power_phi, p), functools.partial(_fixed, _power_psi, p), {})
 
 
-_FREE_NODES = np.delete(NODES, FIXED)
-_WIDE = np.full(len(_FREE_NODES), 4.0)  # nothing in a spline can break monotony
+_WIDE = np.full(len(_FREE), 4.0)  # nothing in a spline can break monotony
 _ALL = (
     _law("hertz-line", _line_phi, _line_psi, {"kappa": (0.08, 0.05, 0.0, 0.45)}),
     _contact_law("hertz-point", _SPHERE),
@@ -233,8 +230,8 @@ _ALL = (
         "spline",
         _spline_phi,
         _spline_psi,
-        tuple(f"ln psi({np.exp(x):.2g})" for x in _FREE_NODES),
-        TYPICAL_SLOPE * _FREE_NODES,
+        tuple(f"ln psi({np.exp(x):.2g})" for x in NODES[_FREE]),
+        TYPICAL_SLOPE * NODES[_FREE],
         _spline_precision(),
         (-_WIDE, _WIDE),
     ),

@@ -43,9 +43,9 @@ _SLACK = 0.1
 
 def usable_runs(
     runs: Sequence[Run], read: Callable[[Run], T], most: int | None = None
-) -> tuple[list[tuple[Run, T]], list[Problem]]:
-    """Runs with what is read of each, the first few where `most` is given, and why others cannot be used."""
-    records: list[tuple[Run, T]] = []
+) -> tuple[list[T], list[Problem]]:
+    """What is read of each run, of the first few where `most` is given, and why others cannot be used."""
+    records: list[T] = []
     problems: list[Problem] = []
     for run in runs:
         if len(records) == most:
@@ -54,7 +54,7 @@ def usable_runs(
             contradicted = [problem for problem in run.reader.problems() if problem.severity == "error"]
             problems += contradicted
             if not contradicted:
-                records.append((run, read(run)))
+                records.append(read(run))
         except RigDataError as error:
             problems += error.problems
     return records, problems
