@@ -72,7 +72,7 @@ def test_a_comparison_finds_its_way_past_pads_that_come_out_of_contact():
     settings = DiagnoseSettings(workers=1)
     problem = pose(noisy(planned, hidden, 7), forward, settings)
     with workers(forward, problem, 1) as run:
-        best = compare(run, problem, settings).best
+        best = compare(run, problem).best
     assert best.label == "preload_error"
     assert best.effects[0].parameters["pad_clearance_change"] == pytest.approx(-3.4e-5, rel=0.03)
 

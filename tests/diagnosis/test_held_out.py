@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
 from tpjb_ident.diagnosis.verdict.held_out import HeldOut, Touched, held_out_gap
 from tpjb_ident.diagnosis.verdict.rules import look_alikes
@@ -56,7 +56,7 @@ def test_a_gap_that_grows_out_of_the_noise_is_no_gap_closed():
 def test_each_effect_halves_the_gap_along_what_it_moves(after, along, shrunk):
     held = held_out(2.0)
     touched = sorted((Touched("x", *ends, True) for ends in along), key=lambda one: -one.remaining)
-    assert HeldOut(held.fit, np.full(2, after), tuple(touched)).is_shrunk(DiagnoseSettings()) == shrunk
+    assert HeldOut(held.fit, np.full(2, after), tuple(touched)).is_shrunk == shrunk
 
 
 def bent_case(contradicted):
@@ -90,7 +90,7 @@ def test_how_a_tolerance_bends_is_no_gap_of_an_effect(contradicted):
     fit, run = bent_case(contradicted)
     (touched,) = held_out_gap(run, fit).touched
     assert touched.unseen
-    assert (touched.remaining > DiagnoseSettings().halved ** 2) == contradicted
+    assert (touched.remaining > Deciding.halved**2) == contradicted
 
 
 def test_a_group_of_look_alikes_begins_with_the_effect_that_is_listed():

@@ -16,6 +16,7 @@ from tpjb_ident.diagnosis.diagnose import diagnose, pose
 from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.forward.nuisance import TOGETHER
 from tpjb_ident.diagnosis.forward.workers import workers
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.planned import planned_observations
 
 TRIED = frozenset({"oil_viscosity", "probe_gain", "loadcell_gain", "probe_rotation", "channel_delay"})
@@ -74,12 +75,12 @@ def campaign():
     forward = Forward(setup, planned.layout, planned.elements)
     hidden = forward.fresh()([Effect("oil_viscosity", factor=0.8)])
     skipped = frozenset(known_effects()) - TRIED
-    return forward, pose(noisy(planned, hidden, 3), forward, DiagnoseSettings(workers=1, skip=skipped)), skipped
+    return forward, pose(noisy(planned, hidden, 3), forward, DiagnoseSettings(workers=1, skip=skipped))
 
 
 def fits_of(campaign, promising=search._Search._promising, **changed):
     """Every proposal that was fitted, with the largest estimate that waited, and what came out."""
-    forward, problem, skipped = campaign
+    forward, problem = campaign
     fitted_in_order, fit = [], search._Search._fit
 
     def recorded(self, proposal):
@@ -87,11 +88,12 @@ def fits_of(campaign, promising=search._Search._promising, **changed):
         fitted_in_order.append((proposal, max(waiting, default=-np.inf)))
         fit(self, proposal)
 
-    settings = DiagnoseSettings(workers=1, skip=skipped, **changed)
     with pytest.MonkeyPatch.context() as patch, workers(forward, problem, 1) as run:
         patch.setattr(search._Search, "_fit", recorded)
         patch.setattr(search._Search, "_promising", promising)
-        return fitted_in_order, search.compare(run, problem, settings)
+        for name, value in changed.items():
+            patch.setattr(Deciding, name, value)
+        return fitted_in_order, search.compare(run, problem)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +119,7 @@ def test_what_is_left_out_would_not_have_changed_the_answer(campaign, usual):
     assert len(many) == 8 > len(few)
     assert whole.best.labels == quick.best.labels
     # beside the leader nothing is fitted whose estimate could not take the name's certainty from it
-    spare = 1.0 - DiagnoseSettings().included
+    spare = 1.0 - Deciding.included
     assert whole.probabilities[whole.best] == pytest.approx(quick.probabilities[quick.best], abs=spare)
     left_out = [f for f in whole.fits if f.labels not in {fit.labels for fit in quick.fits}]
     assert sum(whole.probabilities[fit] for fit in left_out) < spare
@@ -135,7 +137,6 @@ def test_what_a_refused_step_promised_counts_for_no_explanation_beside(monkeypat
             (straight(columns[:, 1]),),
             SimpleNamespace(errors=errors, said_by=lambda fault: {}),
         )
-        tried.settings = DiagnoseSettings()
         fit = SimpleNamespace(
             labels=frozenset(), faults=(), linear=linear, strain=Strain(np.zeros((0, 5)), np.zeros(0)),
             posterior=SimpleNamespace(refused=refused),
@@ -146,7 +147,7 @@ def test_what_a_refused_step_promised_counts_for_no_explanation_beside(monkeypat
 
 @pytest.mark.slow
 def test_without_an_effect_in_the_library_none_is_below_the_floor_or_named(campaign):
-    forward, problem, _ = campaign
+    forward, problem = campaign
     settings = DiagnoseSettings(workers=1, skip=frozenset(known_effects()))
     verdict = diagnose(problem.observations, forward.setup, settings).verdict
     assert (verdict.verdict, verdict.effects, verdict.below_floor) == ("unexplained", (), ())
@@ -171,7 +172,7 @@ def test_only_what_a_campaign_could_not_tell_from_a_fault_of_the_leader_is_fitte
 
 
 def test_what_tolerances_say_together_is_their_derivatives_beside_a_fit(campaign):
-    forward, problem, _ = campaign
+    forward, problem = campaign
     base, step = problem.scaled(problem.base), 0.01
     for name in ("probe_gain", "loadcell_gain"):
         fault = next(fault for fault in problem.faults if fault.name == name)
@@ -185,7 +186,7 @@ def test_what_tolerances_say_together_is_their_derivatives_beside_a_fit(campaign
 def stub_search(total, estimate, labels=frozenset("a")):
     """A search led by a right fit, some nats above its score."""
     tried = object.__new__(search._Search)
-    tried.settings, tried.estimates, tried.fits = DiagnoseSettings(), {labels: estimate}, {}
+    tried.estimates, tried.fits = {labels: estimate}, {}
     leader = stub_fit(total, labels)
     tried._leader = lambda: leader
     tried._log_prior = lambda faults: 0.0

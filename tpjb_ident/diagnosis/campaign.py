@@ -131,7 +131,7 @@ def diagnose_campaign(
     setup = _before(bearing, baseline, laws, _instruments(campaign, identification))
     # curves that the model was given cannot testify about it
     curves = () if from_dry_tests else static.curves
-    observations = observe(identification, curves, static.locus, static.clearance, settings.tolerance)
+    observations = observe(identification, curves, static.locus, static.clearance, settings.tolerances["model"])
     layout = replace(observations.layout, temperature_position=_sensor_positions(campaign, bearing))
     result = diagnose(
         replace(observations, layout=layout), setup, settings,
@@ -180,7 +180,7 @@ def diagnose_table(
     if baseline.pivots == "measured":
         raise BadInputError("--pivots measured: a table holds no dry tests. Give kirk, rigid or a pivots.toml.")
     settings = replace(settings, tolerances=settings.tolerances.layered(bearing))
-    observations = observe_table(path, reading_error, settings.tolerance)
+    observations = observe_table(path, reading_error, settings.tolerances["model"])
     bearing = as_it_turns(bearing, {rotation_of(test.speed) for test in observations.layout.dynamic})
     setup = _before(bearing, baseline, None, Instruments())
     result = diagnose(observations, setup, settings, lambda text, share: report(text, int(100 * share), 100))

@@ -64,8 +64,8 @@ def diagnose(
     forward = Forward(quick, observations.layout, observations.elements)
     problem = pose(observations, forward, settings)
     with workers(forward, problem, settings.workers) as run:
-        comparison = compare(run, problem, settings, progress)
-        decision = decide(run, problem, comparison, settings)
+        comparison = compare(run, problem, progress)
+        decision = decide(run, problem, comparison, settings.tolerances)
         campaign = quick, observations.layout
         words = _next_test(run, decision.verdict, comparison, decision.model, campaign, settings)
     return Diagnosis(replace(decision.verdict, next_test=words), problem, comparison, decision.after)
@@ -74,7 +74,7 @@ def diagnose(
 def pose(observations: Observations, forward: Forward, settings: DiagnoseSettings) -> Problem:
     """Set a campaign beside a model: baseline, nuisances, candidates."""
     base = forward()
-    trusted = loosened(observations, forward.pad_shares(), settings.tolerance)
+    trusted = loosened(observations, forward.pad_shares())
     listed = nuisances(trusted.elements, forward.setup, settings.tolerances)
     # without a cold polygon the clearance of the file and that of the running bearing are one
     unseen = frozenset() if observations.layout.push_load is not None else frozenset({"clearance_error"})

@@ -7,7 +7,7 @@ import numpy as np
 
 from model.setup import Setup
 from tpjb_ident.diagnosis.forward.forward import Forward
-from tpjb_ident.diagnosis.observations.constants import Tolerance
+from tpjb_ident.diagnosis.observations.constants import TRUSTED, Deciding
 from tpjb_ident.diagnosis.observations.observe import (
     DryTest,
     DynamicTest,
@@ -26,11 +26,10 @@ _NOISE = {"h": 0.001, "temperature": 0.05, "locus": 0.1e-6, "clearance": 0.1e-6,
 
 def planned_observations(setup: Setup, layout: Layout) -> Observations:
     """What the baseline predicts for a layout, with the covariance one may expect."""
-    tolerance = Tolerance()
     elements = all_elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
     value = Forward(setup, layout, elements)()
-    noise = by_family(elements, value, {**_NOISE, "load": tolerance.load_miss})
-    return Observations(layout, value, np.diag(noise**2), stated_sigma(elements, value, tolerance), elements)
+    noise = by_family(elements, value, {**_NOISE, "load": Deciding.missed[0]})
+    return Observations(layout, value, np.diag(noise**2), stated_sigma(elements, value, TRUSTED["h"]), elements)
 
 
 def dynamic(

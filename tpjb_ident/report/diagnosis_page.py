@@ -13,7 +13,6 @@ import jinja2
 
 from tpjb_ident.columns import size, symbol
 from tpjb_ident.compare.effect_words import Estimate, amount, finding, label_in_words, shown_unit, words_of
-from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.observations.constants import Deciding
@@ -236,7 +235,7 @@ def _rivals(verdict: Verdict) -> list[str]:
     listed = verdict.candidates
     named = [c for c in listed if {label.split()[0] for label in c.parameters} - set(TERMS) == names][:1]
     probability = named[0].probability if named else 0.0
-    odds = DiagnoseSettings.included / (1.0 - DiagnoseSettings.included)
+    odds = Deciding.included / (1.0 - Deciding.included)
     notes = []
     for rival in listed:
         if rival not in named and rival.probability * odds > probability:

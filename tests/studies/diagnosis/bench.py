@@ -112,8 +112,8 @@ def noise(observations: Observations, value: FloatArray, rng: np.random.Generato
 def solve(problem: Problem, forward: Forward, settings: DiagnoseSettings) -> tuple[Decision, Comparison]:
     """Compare and decide in this process, whatever stands behind the model; without a next test."""
     with workers(forward, problem, 1) as run:
-        comparison = compare(run, problem, settings)
-        return decide(run, problem, comparison, settings), comparison
+        comparison = compare(run, problem)
+        return decide(run, problem, comparison, settings.tolerances), comparison
 
 
 def hidden(drawn: Drawn) -> dict[str, Any]:

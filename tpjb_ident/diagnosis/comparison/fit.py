@@ -100,10 +100,11 @@ class Fit:
         out = (theta <= unknowns.low + near) | (theta >= unknowns.high - near)
         return any(out[at].any() for at in unknowns.slices)
 
-    def needs_more(self, settings: Deciding) -> bool:
+    @property
+    def needs_more(self) -> bool:
         """Whether the data speak for a larger model error than right models leave: more than its prior does."""
         errors = self.problem.errors
-        wrong = errors.scales > settings.right
+        wrong = errors.scales > Deciding.right
         return float(self.posterior.weights[wrong].sum()) > float(np.exp(errors.log_weights[wrong]).sum())
 
     @functools.cached_property

@@ -13,7 +13,7 @@ from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
 from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, TOGETHER, Nuisance
-from tpjb_ident.diagnosis.observations.constants import Deciding, Tolerance
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import held_out
 from tpjb_ident.diagnosis.observations.model_error import model_error
 from tpjb_ident.diagnosis.observations.observe import Observations
@@ -140,8 +140,8 @@ class Problem:
         return np.asarray(vector / (self.sigma if vector.ndim == 1 else self.sigma[:, None]))
 
 
-def loosened(observations: Observations, shares: FloatArray, tolerance: Tolerance) -> Observations:
+def loosened(observations: Observations, shares: FloatArray) -> Observations:
     """Trust no temperature of a pad that hardly carries in the baseline; `shares` (n,)."""
     idle = np.nan_to_num(shares, nan=1.0) < Deciding.idle
-    noise = np.where(idle, tolerance.idle_temperature, 0.0)
+    noise = np.where(idle, Deciding.idle_temperature, 0.0)
     return replace(observations, covariance=observations.covariance + np.diag(noise**2))

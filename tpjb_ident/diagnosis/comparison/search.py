@@ -20,7 +20,6 @@ from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores, separations
-from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import SLOW, Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
@@ -58,16 +57,16 @@ class Comparison:
         return {name: sum(p for fit, p in self.probabilities.items() if name in fit.names) for name in names}
 
 
-def compare(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Progress | None = None) -> Comparison:
+def compare(run: Map, problem: Problem, progress: Progress | None = None) -> Comparison:
     """Compare explanations with no fault and with up to three; without any where the baseline is good enough."""
-    return _Search(run, problem, settings, progress or (lambda text, share: None)).result()
+    return _Search(run, problem, progress or (lambda text, share: None)).result()
 
 
 class _Search:
     """Fits and proposals of one campaign."""
 
-    def __init__(self, run: Map, problem: Problem, settings: DiagnoseSettings, report: Progress) -> None:
-        self.run, self.problem, self.settings, self.report = run, problem, settings, report
+    def __init__(self, run: Map, problem: Problem, report: Progress) -> None:
+        self.run, self.problem, self.report = run, problem, report
         self.fits: dict[frozenset[str], Fit] = {}
         self.tried = 0
         self.estimates: dict[frozenset[str], float] = {}
@@ -85,17 +84,17 @@ class _Search:
         self.report("every effect of the library", 0.1)
         self._propose_singles()
         baseline, best = self.fits[frozenset()], max((p.estimate for p in self.proposals.values()), default=-math.inf)
-        if baseline.posterior.promised + self._log_prior(()) > best - self.settings.worth_derivatives:
+        if baseline.posterior.promised + self._log_prior(()) > best - Deciding.worth_derivatives:
             self.fits[frozenset()] = baseline = self._renewed(baseline)
         self._propose_neighbours(baseline)  # from where its tolerances have gone, as from every other fit
         while (proposal := self._next()) is not None:
-            self.report(f"fits, {len(self.fits)}", min(0.9, 0.2 + 0.7 * len(self.fits) / self.settings.most_fits))
+            self.report(f"fits, {len(self.fits)}", min(0.9, 0.2 + 0.7 * len(self.fits) / Deciding.most_fits))
             self._fit(proposal)
         return self._weighed()
 
     def _next(self) -> Start | None:
         """The likeliest proposal; None where none comes near the leader."""
-        if self.tried >= self.settings.most_fits:
+        if self.tried >= Deciding.most_fits:
             return None
         if not (self.whole or self._passed or any(map(self._comes_first, self.proposals.values()))):
             self._ask_whole_paths()
@@ -103,7 +102,7 @@ class _Search:
         promising = [p for p in self.proposals.values() if leader is None or self._promising(p, leader)]
         if promising:
             return self.proposals.pop(max(promising, key=lambda p: (self._comes_first(p), p.estimate)).labels)
-        if leader is None or leader.posterior.scale > self.settings.right:
+        if leader is None or leader.posterior.scale > Deciding.right:
             return None
         return self._look_alike(leader) or self._passed_over(leader)
 
@@ -150,7 +149,7 @@ class _Search:
     @property
     def _passed(self) -> bool:
         """Whether a fit, tenable or not, has found its way past the jumps of K and C."""
-        return any(fit.posterior.scale <= self.settings.suspect for fit in self.fits.values())
+        return any(fit.posterior.scale <= Deciding.suspect for fit in self.fits.values())
 
     def _comes_first(self, proposal: Start) -> bool:
         """Whether a start is coarse, and has no clearly better ones: once a fit is past the jumps these have been."""
@@ -165,15 +164,15 @@ class _Search:
 
     def _promising(self, proposal: Start, leader: Fit) -> bool:
         """Whether a proposal may change the answer: as a rival of a leader, or by a fault beside a right one."""
-        total, near, mistaken = self._log_probability(leader), self.settings.near, self.settings.mistaken
-        if leader.posterior.scale > self.settings.right:
+        total, near, mistaken = self._log_probability(leader), Deciding.near, Deciding.mistaken
+        if leader.posterior.scale > Deciding.right:
             slow = any(fault.name in SLOW for fault in proposal.faults)  # only where they promise to lead
             return proposal.coarse or proposal.estimate > (total if slow else total - near - mistaken)
         plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
         if proposal.coarse:
             return plain
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
-            return proposal.estimate > total + math.log(1.0 - self.settings.included)
+            return proposal.estimate > total + math.log(1.0 - Deciding.included)
         rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
         if len(proposal.faults) > len(leader.faults) and not plain:  # scored beside a fit that has risen already
             rise = 0.0
@@ -193,10 +192,10 @@ class _Search:
             before, fit = fit, self._renewed(fit)
             if fit is before:  # refused once, they would be refused again
                 return fit
-        right = min(f.posterior.scale for f in (leader or fit, fit)) <= self.settings.right
+        right = min(f.posterior.scale for f in (leader or fit, fit)) <= Deciding.right
         # where a fit keeps what its start foretold, derivatives of its own would say the same
         worth = min(Deciding.worth_derivatives, Deciding.foretold * abs(self._log_probability(fit) - start.estimate))
-        nats = self.settings.mistaken if start.coarse else worth if right else 0.0
+        nats = Deciding.mistaken if start.coarse else worth if right else 0.0
         tenable_first = right and leader is None  # whether it is tenable tells none that has not arrived
         if not (tenable_first or self._near(fit, fit.posterior.promised, nats)):
             return fit
@@ -214,7 +213,7 @@ class _Search:
             self.begun[proposal.labels] = proposal.estimate
         if fit is None:
             return
-        wrong = fit.posterior.refused > Deciding.better or fit.needs_more(self.settings)
+        wrong = fit.posterior.refused > Deciding.better or fit.needs_more
         # what stands beside one that was begun coarsely is past its jumps
         passed = not fit.faults or any(labels <= proposal.labels for labels in self.begun)
         if wrong and not passed and self._near(fit, fit.posterior.promised, 0.0):
@@ -227,7 +226,7 @@ class _Search:
         self.fits[proposal.labels] = fit
         self.estimates[proposal.labels] = math.inf if proposal.coarse else proposal.estimate
         # one cause that does most of it is far behind until what stands beside it is there too
-        if fit.faults and (proposal.coarse or self._near(fit, fit.posterior.total, self.settings.near)):
+        if fit.faults and (proposal.coarse or self._near(fit, fit.posterior.total, Deciding.near)):
             self._propose_neighbours(fit)
 
     def _near(self, fit: Fit, total: float, nats: float) -> bool:
@@ -237,7 +236,7 @@ class _Search:
 
     def _leader(self) -> Fit | None:
         """The most probable tenable fit so far."""
-        rows = [fit for fit in self.fits.values() if _tenable(fit, self.settings)]
+        rows = [fit for fit in self.fits.values() if _tenable(fit)]
         return max(rows, key=self._log_probability, default=None)
 
     def _log_probability(self, fit: Fit) -> float:
@@ -246,14 +245,14 @@ class _Search:
     def _log_prior(self, faults: Sequence[Fault]) -> float:
         """Log prior of an explanation: by its number of faults, spread over names, then over a name's places."""
         sets = max(1, math.comb(len(self.places), len(faults)))
-        spread = sets * math.prod(self.places[fault.name] for fault in faults) / self.settings.prior[len(faults)]
-        return sum(fault.is_term for fault in faults) * math.log(self.settings.term) - math.log(spread)
+        spread = sets * math.prod(self.places[fault.name] for fault in faults) / Deciding.prior[len(faults)]
+        return sum(fault.is_term for fault in faults) * math.log(Deciding.term) - math.log(spread)
 
     def _propose_singles(self) -> None:
         """Every fault by itself, from the baseline as stated; the paths of those that lead are asked for further on."""
         self.paths = lay_paths(self.run, self.problem)
         self._follow(self._singles())
-        if self._propose_alone() > self.settings.suspect:  # a jump hides what lies behind it
+        if self._propose_alone() > Deciding.suspect:  # a jump hides what lies behind it
             self.whole = False
             self._follow(self._singles(coarse=True))
             self._propose_alone()
@@ -277,7 +276,7 @@ class _Search:
         """Scores of every fault beside the baseline as stated; coarse: every element off by itself, tolerances held."""
         errors, linear = self.problem.errors, self._stated
         if coarse:
-            errors, linear = errors.coarse, replace(linear, width=self.settings.held * linear.width)
+            errors, linear = errors.coarse, replace(linear, width=Deciding.held * linear.width)
         return scores(errors, linear, self.paths, self.fits[frozenset()].strain)
 
     def _propose_alone(self) -> float:
@@ -286,17 +285,17 @@ class _Search:
         scale = singles[0].scale if singles else 0.0
         for score in singles:
             self._propose(score, (), self._stated)
-        if scale > self.settings.suspect:
+        if scale > Deciding.suspect:
             # a path that was never followed shows no jump
             rough = [score for score in self._singles(coarse=True) if score.path.nodes is not None]
-            for score in rough[: self.settings.coarse]:
+            for score in rough[: Deciding.coarse]:
                 self._propose(score, (), self._stated, coarse=True)
-            self.clear = max((score.total for score in rough), default=-math.inf) - self.settings.mistaken
+            self.clear = max((score.total for score in rough), default=-math.inf) - Deciding.mistaken
         return scale
 
     def _propose_neighbours(self, fit: Fit) -> None:
         """One fault more, and one less."""
-        if len(fit.faults) < len(self.settings.prior) - 1:
+        if len(fit.faults) < len(Deciding.prior) - 1:
             further = [self._beside(path, fit) for path in self.paths if path.fault.label not in fit.labels]
             for score in scores(self.problem.errors, fit.linear, further, fit.strain):
                 self._propose(replace(score, total=score.total - fit.posterior.refused), fit.faults, fit.linear)
@@ -323,8 +322,8 @@ class _Search:
         fault = score.path.fault.turned()
         faults = (*faults, fault)
         estimate = score.total + self._log_prior(faults)
-        if score.p < self.settings.untenable:  # it would have to be a step on the way
-            estimate -= self.settings.near
+        if score.p < Deciding.untenable:  # it would have to be a step on the way
+            estimate -= Deciding.near
         theta, jacobian, unknowns = linear.theta, linear.jacobian, Unknowns(self.problem, faults)
         if fault.own < 0:
             first = len(theta) - len(self.problem.nuisances)
@@ -373,7 +372,7 @@ class _Search:
     def _weighed(self) -> Comparison:
         """Probabilities among the tenable fits; among all where none is."""
         rows = list(self.fits.values())
-        tenable = frozenset(fit for fit in rows if _tenable(fit, self.settings))
+        tenable = frozenset(fit for fit in rows if _tenable(fit))
         logs = np.array([self._log_probability(fit) for fit in rows])
         counted = np.where([fit in tenable for fit in rows], logs, -np.inf) if tenable else logs
         probabilities = np.exp(counted - logsumexp(counted))
@@ -381,5 +380,5 @@ class _Search:
         return Comparison({rows[i]: float(probabilities[i]) for i in order}, tenable, self.paths)
 
 
-def _tenable(fit: Fit, settings: DiagnoseSettings) -> bool:
-    return fit.p >= settings.untenable and not fit.on_bound
+def _tenable(fit: Fit) -> bool:
+    return fit.p >= Deciding.untenable and not fit.on_bound

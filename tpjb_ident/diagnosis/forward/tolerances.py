@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from model.bearing import Bearing
 from rigdata.near_names import hint
 from rigdata.units import UnitError, parse_quantity
+from tpjb_ident.diagnosis.observations.constants import TRUSTED
 from tpjb_ident.errors import BadInputError
 
 
@@ -40,7 +41,7 @@ DEFAULTS: dict[str, tuple[float, str]] = {
     "pad_arc": (0.01, "ratio"),
     "probe_gain": (0.005, "ratio"),
     "cell_gain": (0.002, "ratio"),
-    "model": (0.015, "ratio"),
+    "model": (TRUSTED["h"], "ratio"),
 }
 
 

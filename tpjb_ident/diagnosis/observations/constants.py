@@ -1,46 +1,48 @@
 """Constants: every number that decides what a diagnosis says, in one table with what set it."""
 
 import math
-from dataclasses import dataclass
+
+#: Stated model tolerances of `outputs.md` by family, one standard deviation: of K and omega C where none is stated. How
+#: much of them a campaign really needs is summed over (`comparison.evidence`).
+TRUSTED = {
+    "h": 0.015, "temperature": 0.5, "locus": 0.5e-6, "load": 0.003, "dry": 0.02, "clearance": 0.5e-6,
+    "side_angle": 0.003,
+}  # fmt: skip
 
 
-@dataclass(frozen=True)
 class Deciding:
-    """How a diagnosis decides; the method is in `docs/diagnosis.md`, its studies in `tests/studies/diagnosis`.
-
-    What has a type can be set for one diagnosis; what has none is the same for all.
-    """
+    """How a diagnosis decides; the method is in `docs/diagnosis.md`, its studies in `tests/studies/diagnosis`."""
 
     #: Prior of no fault, of one, two and three, the most that are sought: with 30 names a second fault needs 3.5 nats
     #: beyond its Occam factor.
-    prior: tuple[float, float, float, float] = (0.5, 0.35, 0.15, 0.064)
+    prior = 0.5, 0.35, 0.15, 0.064
     #: What a generic term counts beside an effect: one with three numbers lies 1 to 2 nats behind the effect in it.
-    term: float = 0.05
+    term = 0.05
     #: Probability below which a tolerance is too far out for its model to stay. Clean faults that a tolerance does the
     #: work of are at 7e-8 to 6e-3, right models at 0.04 and more. The one constant that decides.
-    untenable: float = 0.01
+    untenable = 0.01
     #: Probability from which a name is listed, alone or as a family; right names reach 0.976 and more.
-    included: float = 0.95
+    included = 0.95
     #: Probability of no fault at all from which none is sought.
-    nothing: float = 0.05
+    nothing = 0.05
     #: Names in a family of look-alikes: a longer list says nothing.
-    family: int = 3
+    family = 3
     #: Scale of the model's error that right models reach. Its prior has 0.90 above; right models have 0.00 to 0.64 of
     #: their probability there (some 500 campaigns), data that tell nothing 0.9, and wrong models 0.97 and more, but
     #: for those that fit as well as right ones.
-    right: float = 0.2
+    right = 0.2
     #: Held-out gap of the baseline below which nothing is compared: nothing off gives 0.07 to 0.13.
-    quiet: float = 0.2
+    quiet = 0.2
     #: Gap above noise along what an effect moves, after over before, that its name takes; right ones reach 0 to 0.45.
-    halved: float = 0.5
+    halved = 0.5
     #: Squared held-out gap above noise with tolerances free, after over before: effects explain the larger part.
-    rest: float = 0.2
+    rest = 0.2
     #: Rise of the log evidence from which an effect's size drifts [nats]: odds of 150.
-    drifting: float = 5.0
+    drifting = 5.0
     #: Log evidence behind the leader at which explanations are no longer fitted [nats].
-    near: float = 10.0
+    near = 10.0
     #: Explanations that are fitted at the most: right ones come among the first ten.
-    most_fits: int = 24
+    most_fits = 24
 
     # Priors and errors.
     #: Prior of an amplitude in the library's typical sizes: three of them are no surprise in a bearing that has the
@@ -78,6 +80,10 @@ class Deciding:
     held = 0.2
 
     # Observations.
+    #: Of the temperature of a pad that hardly carries [K].
+    idle_temperature = 1.0
+    #: By which a load misses its set point: share and angle [rad].
+    missed = 0.003, 0.0035
     #: Frequencies at one load from which each is a block of its own; sectors of load directions that a locus is split
     #: into, and the one that is held out: the middle one.
     sweep, sectors, sector = 4, 5, 3
@@ -111,21 +117,3 @@ class Deciding:
     enough = 5.0
     #: Other explanations that a confirming test is chosen against.
     impostors = 2
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """Stated model tolerances of `outputs.md`, one standard deviation: the sigma in which the gap is told.
-
-    How much of it a campaign really needs is summed over (`comparison.evidence`).
-    """
-
-    stiffness: float = 0.015
-    position: float = 0.5e-6
-    temperature: float = 0.5
-    dry: float = 0.02
-    angle: float = 0.003
-    load: float = 0.003
-    idle_temperature: float = 1.0
-    load_miss: float = 0.003
-    direction_miss: float = 0.0035

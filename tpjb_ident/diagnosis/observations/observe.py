@@ -6,6 +6,7 @@ their angles), ``dry`` (tangent compliance of every pivot), ``temperature``.
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,7 +20,7 @@ from rigdata.vector import directions
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.compare.coefficient_table import ERRORS, VALUES, points_of, read_coefficients
-from tpjb_ident.diagnosis.observations.constants import Deciding, Tolerance
+from tpjb_ident.diagnosis.observations.constants import TRUSTED, Deciding
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.results.point_result import PointResult
@@ -160,15 +161,15 @@ class Observations:
 
 def direct_scale(elements: Sequence[Element], value: FloatArray) -> FloatArray:
     """Mean direct coefficient of every element's point and part (k or omega c), of all where none is direct, (n,)."""
-    parts = [(e.observable[0], e.where) if e.family == "h" else None for e in elements]
-    sums: dict[object, list[float]] = {}
-    for direct in (True, False):
-        present = set(sums)
-        for e, part, v in zip(elements, parts, value, strict=True):
-            if part not in present and direct == (e.observable[1] == e.observable[2]):
-                sums.setdefault(part, []).append(abs(float(v)))
-    sums[None] = [1.0]
-    return np.array([float(np.mean(sums[part])) for part in parts])
+    parts = defaultdict[tuple[str, Where], list[int]](list)
+    for row, e in enumerate(elements):
+        if e.family == "h":
+            parts[e.observable[0], e.where].append(row)
+    scale = np.ones(len(elements))
+    for rows in parts.values():
+        direct = [row for row in rows if elements[row].observable[1] == elements[row].observable[2]]
+        scale[rows] = np.mean(np.abs(value[direct or rows]))
+    return scale
 
 
 def by_family(elements: Sequence[Element], value: FloatArray, sizes: Mapping[str, float]) -> FloatArray:
@@ -177,13 +178,9 @@ def by_family(elements: Sequence[Element], value: FloatArray, sizes: Mapping[str
     return np.array(rows) * direct_scale(elements, value)
 
 
-def stated_sigma(elements: Sequence[Element], value: FloatArray, tolerance: Tolerance) -> FloatArray:
-    """Stated model tolerance of every element, (n,)."""
-    sizes = {
-        "h": tolerance.stiffness, "temperature": tolerance.temperature, "locus": tolerance.position,
-        "load": tolerance.load, "dry": tolerance.dry, "clearance": tolerance.position, "side_angle": tolerance.angle,
-    }  # fmt: skip
-    return by_family(elements, value, sizes)
+def stated_sigma(elements: Sequence[Element], value: FloatArray, model: float) -> FloatArray:
+    """Stated model tolerance of every element; `model`: of K and omega C, (n,)."""
+    return by_family(elements, value, {**TRUSTED, "h": model})
 
 
 @dataclass
@@ -197,11 +194,10 @@ class _Builder:
         self.value += list(value[finite])
         self.elements += [e for e, k in zip(elements, finite, strict=True) if k]
         self.covariance.append(covariance[np.ix_(finite, finite)])
-        self.kept = finite
 
-    def observed(self, layout: Layout, tolerance: Tolerance) -> Observations:
+    def observed(self, layout: Layout, model: float) -> Observations:
         value, elements = np.array(self.value), tuple(self.elements)
-        sigma = stated_sigma(elements, value, tolerance)
+        sigma = stated_sigma(elements, value, model)
         return Observations(layout, value, block_diag(*self.covariance), sigma, elements)
 
 
@@ -210,17 +206,16 @@ def observe(
     curves: Sequence[PivotCurve] = (),
     locus: Locus | None = None,
     polygon: ClearancePolygon | None = None,
-    tolerance: Tolerance | None = None,
+    model: float = TRUSTED["h"],
 ) -> Observations:
     """Gather a campaign's results into one vector."""
-    tolerance = tolerance or Tolerance()
     builder = _Builder()
     dynamic = _add_dynamic(builder, identification)
-    locus_tests = _add_locus(builder, locus, identification, tolerance) if locus is not None else ()
+    locus_tests = _add_locus(builder, locus, identification) if locus is not None else ()
     usable = [c for c in curves if c.valid_from < c.valid_to < math.inf]
     dry = tuple(_add_dry(builder, curve) for curve in usable)
     push = _add_clearance(builder, polygon) if polygon is not None else None
-    return builder.observed(Layout(dynamic, locus_tests, dry, push), tolerance)
+    return builder.observed(Layout(dynamic, locus_tests, dry, push), model)
 
 
 def _add_dynamic(builder: _Builder, identification: Identification) -> tuple[DynamicTest, ...]:
@@ -261,12 +256,10 @@ def _add_stiffness(builder: _Builder, result: PointResult, place: Where) -> None
     builder.add(elements, value, covariance)
 
 
-def _add_locus(
-    builder: _Builder, locus: Locus, identification: Identification, tolerance: Tolerance
-) -> tuple[LocusTest, ...]:
+def _add_locus(builder: _Builder, locus: Locus, identification: Identification) -> tuple[LocusTest, ...]:
     """Positions and load readings; a load that misses its set point moves both, so they share an error."""
     out = []
-    spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
+    spread = np.diag(np.square(Deciding.missed))
     points = [p.point for p in locus.points]
     tests = [LocusTest(point.static_load, point.static_load_direction, point.spin) for point in points]
     chosen, moved = _spread(tests), moved_by_miss(locus, identification)
@@ -300,8 +293,9 @@ def _add_dry(builder: _Builder, curve: PivotCurve) -> DryTest:
     value = -np.log(np.asarray(curve.stiffness(load), float))
     covariance = curve.relative_stiffness_covariance(load)
     covariance = covariance + np.diag(Deciding.dry_shape**2 * np.diag(covariance))
-    builder.add(_dry_elements(DryTest(curve.pad, tuple(load))), value, covariance)
-    return DryTest(curve.pad, tuple(map(float, load[builder.kept])))
+    test = DryTest(curve.pad, tuple(load.tolist()))
+    builder.add(_dry_elements(test), value, covariance)
+    return test
 
 
 def _add_clearance(builder: _Builder, polygon: ClearancePolygon) -> float:
@@ -317,8 +311,6 @@ def _add_clearance(builder: _Builder, polygon: ClearancePolygon) -> float:
 
 #: Load directions per load and speed that are enough: the locus of five pads has five waves, two directions to each.
 _DIRECTIONS = 10
-#: Harmonics of the load's direction that a locus of many directions is described by.
-_HARMONICS = 3
 
 
 def moved_by_miss(locus: Locus, identification: Identification) -> list[FloatArray]:
@@ -341,34 +333,15 @@ def _stiffness(identification: Identification, load: float) -> float:
 
 
 def _turned(point: LocusPoint, locus: Locus) -> FloatArray:
-    """Change of a position with the load's direction: slope of the locus itself, through its harmonics (2,)."""
-    alike = [
-        p for p in locus.points
-        if (p.point.static_load, p.point.spin) == (point.point.static_load, point.point.spin)
-    ]  # fmt: skip
-    angle = np.array([p.point.static_load_direction for p in alike])
-    place = np.array([p.position for p in alike])
-    count = len(np.unique(np.round(np.exp(1j * angle), 6)))
-    orders = np.arange(1, min(_HARMONICS, (count - 1) // 2) + 1)
-    if not len(orders) or _largest_gap(angle) > math.pi / orders[-1]:
-        # too few directions: as if the whole locus turned about its middle, or about the zero where that is all
-        middle = place.mean(axis=0) if count > 2 else np.zeros(2)
-        x, y = point.position - middle
-        return np.array([-y, x])
-    at = point.point.static_load_direction
-    design = np.column_stack([np.ones_like(angle), np.cos(np.outer(angle, orders)), np.sin(np.outer(angle, orders))])
-    fitted = np.linalg.lstsq(design, place, rcond=None)[0]
-    slope = np.concatenate([[0.0], -orders * np.sin(at * orders), orders * np.cos(at * orders)])
-    return np.asarray(slope @ fitted)
+    """Change of a position with the load's direction: as the locus turns about its middle, or the zero, (2,)."""
+    place = (point.point.static_load, point.point.spin)
+    alike = [p for p in locus.points if (p.point.static_load, p.point.spin) == place]
+    several = len({p.point.static_load_direction for p in alike}) > 2
+    x, y = point.position - np.mean([p.position for p in alike], axis=0) * several
+    return np.array([-y, x])
 
 
-def _largest_gap(angle: FloatArray) -> float:
-    """Largest angle between neighbouring directions."""
-    around = np.sort(np.mod(angle, 2 * math.pi))
-    return float(np.diff(np.append(around, around[0] + 2 * math.pi)).max())
-
-
-def observe_table(path: Path, reading_error: float | None = None, tolerance: Tolerance | None = None) -> Observations:
+def observe_table(path: Path, reading_error: float | None = None, model: float = TRUSTED["h"]) -> Observations:
     """Read a table of coefficients."""
     builder = _Builder()
     tests: dict[tuple[float, float, float], list[float]] = {}
@@ -384,4 +357,4 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
         least = Deciding.axis * (reading_error or 0.0) * direct_scale(elements, value)
         builder.add(elements, value, np.diag(np.maximum(error, least) ** 2))
     layout = Layout(tuple(DynamicTest(*key, tuple(lines)) for key, lines in tests.items()))
-    return builder.observed(layout, tolerance or Tolerance())
+    return builder.observed(layout, model)

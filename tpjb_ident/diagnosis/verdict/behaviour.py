@@ -114,7 +114,7 @@ class Drift:
         return {renamed.get(name, name): value for name, value in vars(self).items()}
 
 
-def drifts(fit: Fit, notable: float) -> tuple[Drift, ...]:
+def drifts(fit: Fit) -> tuple[Drift, ...]:
     """Look for drifts of the first amplitude of every effect of a fit, the most telling per effect."""
     out = []
     for fault, at in zip(fit.faults, fit.unknowns.slices, strict=True):
@@ -122,7 +122,7 @@ def drifts(fit: Fit, notable: float) -> tuple[Drift, ...]:
             continue
         rows = [_over(fit, fault, at.start, row) for row in Deciding.over]
         best = max((row for row in rows if row is not None), key=lambda row: row[0], default=None)
-        if best is not None and best[0] > notable:
+        if best is not None and best[0] > Deciding.drifting:
             out.append(best[1])
     return tuple(out)
 

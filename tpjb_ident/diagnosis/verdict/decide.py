@@ -12,9 +12,10 @@ from tpjb_ident.compare.effect_words import Estimate
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.search import Comparison
-from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.nuisance import Nuisance
+from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import contradictions, gap, gap_by_observable, localise, noise_floor
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.verdict.behaviour import behaviours
@@ -57,10 +58,10 @@ class Decision:
     after: FloatArray = field(repr=False)  #: (n,)
 
 
-def decide(run: Map, problem: Problem, comparison: Comparison, settings: DiagnoseSettings) -> Decision:
+def decide(run: Map, problem: Problem, comparison: Comparison, known: Tolerances) -> Decision:
     """Turn a comparison into a verdict."""
     observations, rows = problem.observations, problem.held
-    judgement = judge(run, comparison, settings)
+    judgement = judge(run, comparison)
     held, model = judgement.held, judgement.held.fit
     effects = _effects(comparison, judgement) if judgement.has_effects else ()
     after = unseen = problem.base
@@ -73,7 +74,7 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
         verdict=judgement.name,
         effects=effects,
         indistinguishable=(judgement.family,) if judgement.family else (),
-        below_floor=_below_floor(problem, comparison, settings),
+        below_floor=_below_floor(problem, comparison),
         next_test="",
         candidates=_ranked(comparison),
         disagreement=localise(observations, problem.base),
@@ -95,7 +96,7 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
         ),
         behaves_like=() if judgement.name in {"consistent", "named"} else behaviours(model),
         drift=judgement.drift,
-        assumptions=_assumptions(problem, model, settings),
+        assumptions=_assumptions(problem, model, known),
         reasons=judgement.reasons,
         beforehand=contradictions(observations, problem.base),
     )  # fmt: skip
@@ -136,15 +137,15 @@ def parameters_of(fit: Fit, index: int) -> dict[str, Estimate]:
     return out
 
 
-def _below_floor(problem: Problem, comparison: Comparison, settings: DiagnoseSettings) -> tuple[str, ...]:
+def _below_floor(problem: Problem, comparison: Comparison) -> tuple[str, ...]:
     """Effects that this campaign could not have seen at a typical size."""
     paths = [path for path in comparison.paths if not path.fault.is_term]
-    typical = [problem.sigma * (path.neutral_slope @ path.fault.width) / settings.width for path in paths]
+    typical = [problem.sigma * (path.neutral_slope @ path.fault.width) / Deciding.width for path in paths]
     factor = usual_factor(problem.observations, problem.columns)
     white = np.linalg.solve(factor, np.reshape(typical, (-1, len(factor))).T)
-    seen = np.linalg.norm(white, axis=0) >= settings.visible
+    seen = np.linalg.norm(white, axis=0) >= Deciding.visible
     names, best = [path.fault.name for path in paths], comparison.best
-    beyond = {d.name for d in best.tolerances if abs(d.significance) > settings.visible}
+    beyond = {d.name for d in best.tolerances if abs(d.significance) > Deciding.visible}
     told = {n.effect.split()[0] for n in problem.nuisances if n.label in beyond and n.effect} | best.names
     return tuple(sorted({*names} - {name for name, is_seen in zip(names, seen, strict=True) if is_seen} - told))
 
@@ -164,10 +165,10 @@ def _ranked(comparison: Comparison) -> tuple[RankedCandidate, ...]:
     return tuple(out[:_MOST_LISTED])
 
 
-def _assumptions(problem: Problem, fit: Fit, settings: DiagnoseSettings) -> tuple[Assumption, ...]:
+def _assumptions(problem: Problem, fit: Fit, known: Tolerances) -> tuple[Assumption, ...]:
     """Every tolerance that took part, with what the fit made of it, and how far out its farthest number is."""
     farthest = {d.name.split(" ")[0]: d.significance for d in reversed(fit.tolerances)}
-    tolerances, fitted = settings.tolerances.stated, defaultdict[Nuisance, list[float]](list)
+    tolerances, fitted = known.stated, defaultdict[Nuisance, list[float]](list)
     firsts: dict[str, Nuisance] = {}
     for nuisance, size in zip(problem.nuisances, fit.sizes, strict=True):
         fitted[firsts.setdefault(nuisance.name, nuisance)].append(float(size * nuisance.sigma))
@@ -176,6 +177,6 @@ def _assumptions(problem: Problem, fit: Fit, settings: DiagnoseSettings) -> tupl
         source = tolerances[first.name].source if first.name in tolerances else "default"
         value = values if len(values) > 1 else values[0]
         out.append(Assumption(first.name, first.sigma, value, first.unit, source, farthest.get(first.name, 0.0)))
-    stated = settings.tolerance.stiffness
+    stated = known["model"]
     learnt = stated * fit.posterior.scale
     return (*out, Assumption("model", stated, learnt, "1", tolerances["model"].source))

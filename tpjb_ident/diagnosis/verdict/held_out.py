@@ -67,9 +67,10 @@ class HeldOut:
         first = vars(self.touched[0]) if self.touched else {}
         return {f"touched_{name}": float(value) for name, value in first.items() if name != "label"}
 
-    def is_shrunk(self, settings: Deciding) -> bool:
+    @property
+    def is_shrunk(self) -> bool:
         """Whether every fault halves the gap along what it moves, and the gap over everything does not grow."""
-        halved = all(one.remaining <= settings.halved**2 for one in self.touched)
+        halved = all(one.remaining <= Deciding.halved**2 for one in self.touched)
         return bool(self.touched) and halved and self.as_stated < self.before + _ALIKE
 
 

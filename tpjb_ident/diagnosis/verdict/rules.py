@@ -1,12 +1,12 @@
-"""Rules: what a comparison says, in their order. Constants and what set them: `settings.DiagnoseSettings`."""
+"""Rules: what a comparison says, in their order. Constants and what set them: `Deciding`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.search import Comparison
-from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.workers import Map
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.verdict.behaviour import Drift, drifts
 from tpjb_ident.diagnosis.verdict.held_out import HeldOut, held_out_gap
 from tpjb_ident.diagnosis.verdict.verdict import VerdictName
@@ -28,43 +28,41 @@ class Judgement:
         return self.name in {"named", "ambiguous", "partly-explained"}
 
 
-def judge(run: Map, comparison: Comparison, settings: DiagnoseSettings) -> Judgement:
+def judge(run: Map, comparison: Comparison) -> Judgement:
     """Apply the rules in their order."""
     nothing = comparison.nothing
     held = held_out_gap(run, nothing)
-    likely = nothing in comparison.tenable and comparison.probabilities[nothing] >= settings.nothing
-    if held.before <= settings.quiet or likely:
-        return _without_effects(held, settings)
-    sure = frozenset(name for name, share in comparison.shares.items() if share >= settings.included)
-    model = _exactly(comparison, sure, settings) or comparison.best
-    held, drift = held_out_gap(run, model), drifts(model, settings.drifting)
-    return replace(_of_model(comparison, sure, held, drift, settings), drift=drift)
+    likely = nothing in comparison.tenable and comparison.probabilities[nothing] >= Deciding.nothing
+    if held.before <= Deciding.quiet or likely:
+        return _without_effects(held)
+    sure = frozenset(name for name, share in comparison.shares.items() if share >= Deciding.included)
+    model = _exactly(comparison, sure) or comparison.best
+    held, drift = held_out_gap(run, model), drifts(model)
+    return replace(_of_model(comparison, sure, held, drift), drift=drift)
 
 
-def _of_model(
-    comparison: Comparison, sure: frozenset[str], held: HeldOut, drift: Sequence[Drift], settings: DiagnoseSettings
-) -> Judgement:
+def _of_model(comparison: Comparison, sure: frozenset[str], held: HeldOut, drift: Sequence[Drift]) -> Judgement:
     """What is said of the model that counts: the one with exactly the sure names, or the most probable one."""
     model = held.fit
-    if model.needs_more(settings):
+    if model.needs_more:
         reason = (
             f"the best explanation ({model.label}) leaves a model error of {model.posterior.scale:.2f} times the "
-            f"stated one; right ones need {settings.right:g} at the most"
+            f"stated one; right ones need {Deciding.right:g} at the most"
         )
     elif model not in comparison.tenable:
         reason = _untenable(model)
     elif model.names != sure:
-        return look_alikes(held, _family(comparison, sure, settings))
+        return look_alikes(held, _family(comparison, sure))
     elif model.faults and all(fault.is_term for fault in model.faults):
         reason = "what describes it is a term that no effect of the library stands for"
     else:
-        return _named(held, drift, settings)
+        return _named(held, drift)
     return Judgement("unexplained", held, (reason,))
 
 
-def _without_effects(held: HeldOut, settings: DiagnoseSettings) -> Judgement:
+def _without_effects(held: HeldOut) -> Judgement:
     nothing = held.fit
-    if held.before <= settings.quiet or not nothing.needs_more(settings):
+    if held.before <= Deciding.quiet or not nothing.needs_more:
         reason = f"no disagreement beyond noise and stated tolerances (p = {nothing.p:.2g})"
         return Judgement("consistent", held, (reason,))
     reason = (
@@ -74,19 +72,19 @@ def _without_effects(held: HeldOut, settings: DiagnoseSettings) -> Judgement:
     return Judgement("unexplained", held, (reason,))
 
 
-def _exactly(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSettings) -> Fit | None:
+def _exactly(comparison: Comparison, sure: frozenset[str]) -> Fit | None:
     """The most probable tenable fit with exactly these names, unless it is as sure that one of a few stands beside."""
     fit = next((f for f in comparison.fits if sure and f.names == sure and f in comparison.tenable), None)
-    beside = fit is not None and comparison.probabilities[fit] <= 1.0 - settings.included
-    return None if beside and _family(comparison, sure, settings) else fit
+    beside = fit is not None and comparison.probabilities[fit] <= 1.0 - Deciding.included
+    return None if beside and _family(comparison, sure) else fit
 
 
-def _family(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSettings) -> tuple[str, ...]:
+def _family(comparison: Comparison, sure: frozenset[str]) -> tuple[str, ...]:
     """Names that only together have the probability that a name takes; none where these are too many."""
     rest = {name: share for name, share in comparison.shares.items() if name not in sure}
-    names = sorted(rest, key=lambda name: -rest[name])[: settings.family]
+    names = sorted(rest, key=lambda name: -rest[name])[: Deciding.family]
     for count in range(2, len(names) + 1):
-        if sum(rest[name] for name in names[:count]) >= settings.included:
+        if sum(rest[name] for name in names[:count]) >= Deciding.included:
             return tuple(names[:count])
     return ()
 
@@ -100,17 +98,17 @@ def look_alikes(held: HeldOut, family: tuple[str, ...]) -> Judgement:
     return Judgement("ambiguous", held, (_shrunk(held),), listed_first)
 
 
-def _named(held: HeldOut, drift: Sequence[Drift], settings: DiagnoseSettings) -> Judgement:
+def _named(held: HeldOut, drift: Sequence[Drift]) -> Judgement:
     """Named where each effect halves the gap along what it moves, and no effect changes over the operating range."""
     terms = held.fit.has_terms
-    if held.is_shrunk(settings) and not (drift or terms):
+    if held.is_shrunk and not (drift or terms):
         return Judgement("named", held, (_shrunk(held),))
     reason = f"{_shrunk(held)}: a name leaves half of the first above noise at the most, and the second no larger"
     if drift:
         reason = f"the size of {drift[0].effect} {drift[0].words}, so its name is not the whole story"
     if terms:
         reason = f"{_shrunk(held)}; beside it stands a term that no effect of the library stands for"
-    partly = held.remaining(held.free) <= settings.rest
+    partly = held.remaining(held.free) <= Deciding.rest
     return Judgement("partly-explained" if partly else "unexplained", held, (reason,))
 
 
