@@ -1,11 +1,14 @@
 """What one amplitude does over its whole range, and fits that start far from the answer."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from model.effects import Effect, known_effects
 from model.setup import Mesh
 from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
+from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
 from tpjb_ident.diagnosis.comparison.fit import Start, fitted
 from tpjb_ident.diagnosis.comparison.paths import path_through
 from tpjb_ident.diagnosis.comparison.search import compare
@@ -103,3 +106,20 @@ def test_a_start_without_an_equilibrium_is_taken_nearer_to_what_is_stated():
         assert next(iter(run(prediction, [((fault,), theta)]))) is None
         fit = fitted(run, problem, Start((fault,), theta, jacobian))
     assert abs(fit.linear.theta[0]) <= np.radians(1.0)
+
+
+def test_a_fit_goes_on_while_its_steps_pay():
+    """Numbers that bend what they do: four steps on the first derivatives do not come near where they lead."""
+    rng = np.random.default_rng(3)
+    straight, bent = rng.normal(size=(40, 6)), 0.6 * rng.normal(size=(40, 6))
+    errors = ErrorModel(0.02**2 * np.eye(40), 1e-4 * np.eye(40), np.ones(1))
+    nuisances = tuple(SimpleNamespace(column=None) for _ in range(6))
+    truth = np.array([1.5, -1.0, 2.0, -1.5, 1.0, -2.0])
+
+    def shown(theta):
+        return straight @ theta + bent @ theta**2
+
+    problem = SimpleNamespace(measured=shown(truth), errors=errors, nuisances=nuisances)
+    fit = fitted(lambda task, jobs: [shown(theta) for _, theta in jobs], problem, Start((), np.zeros(6), straight))
+    assert fit.linear.theta == pytest.approx(truth, abs=0.05)
+    assert fit.posterior.refused < 1.0

@@ -106,9 +106,9 @@ def test_the_likeliest_explanation_is_fitted_first_and_no_hopeless_one_at_all(us
     order, comparison = usual
     assert comparison.best.names == {"oil_viscosity"}
     assert [sorted(p.labels) for p, _ in order[:2]] == [[], ["oil_viscosity"]]
-    exchanged = [p for p, _ in order if len(p.labels) == 1 and p.labels != {"oil_viscosity"}]  # at last, for the leader
-    assert len(exchanged) <= 1
-    assert all(p.estimate >= waiting for p, waiting in order[1 : len(order) - len(exchanged)] if not p.coarse)
+    last = [p for p, _ in order[2:] if p.labels != {"oil_viscosity"}]  # no fault, from the leader, and one in its place
+    assert [len(p.labels) for p in last] in ([], [0], [1], [0, 1])
+    assert all(p.estimate >= waiting for p, waiting in order[1 : len(order) - len(last)] if not p.coarse)
     assert len(order) <= 4
 
 
@@ -143,6 +143,24 @@ def test_what_a_refused_step_promised_counts_for_no_explanation_beside(monkeypat
         )  # fmt: skip
         tried._propose_neighbours(fit)
     assert totals[0] - totals[1] == pytest.approx(7.0)
+
+
+def test_no_fault_at_all_is_proposed_from_where_a_single_one_leads(monkeypatch):
+    errors, linear, _ = linear_case([1.0])
+    monkeypatch.setattr(search, "Unknowns", lambda problem, faults: SimpleNamespace(width=linear.width))
+    fault, proposals = SimpleNamespace(label="own", own=2), []
+    tried = object.__new__(search._Search)
+    tried.paths, tried.problem, tried._offer = (), SimpleNamespace(errors=errors), proposals.append
+    tried._log_prior = lambda faults: 0.0
+    tried._propose_neighbours(
+        SimpleNamespace(
+            labels=frozenset({"own"}), faults=(fault,), linear=linear, strain=None,
+            unknowns=SimpleNamespace(slices=[slice(2, 3)]), posterior=posterior(errors, linear),
+        )
+    )  # fmt: skip
+    (nothing,) = proposals
+    assert nothing.faults == ()
+    assert np.array_equal(nothing.theta, linear.theta)
 
 
 @pytest.mark.slow

@@ -18,8 +18,8 @@ from tpjb_ident.diagnosis.comparison.unknowns import SLOW, Unknowns, derivatives
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 
-#: Steps on one set of derivatives, which every step corrects.
-_STEPS = 4
+#: Steps on one set of derivatives, which every step corrects, at the most; and the fall of chi-square that pays one.
+_STEPS, _LEAST = 12, 1.0
 #: Parts of a step or of a start that are tried.
 _SHARES = (1.0, 0.4, 0.1)
 #: Share of its deviation within which a number has arrived.
@@ -243,7 +243,7 @@ def _renewed(run: Map, unknowns: Unknowns, linear: Linear, asked: Sequence[int],
 
 
 def _stepped(run: Map, unknowns: Unknowns, linear: Linear, errors: ErrorModel) -> Linear:
-    """Steps to the most probable point; each is solved, and corrects the derivatives."""
+    """Steps to the most probable point while they pay; each is solved, and corrects the derivatives."""
     for _ in range(_STEPS):
         state = posterior(errors, linear)
         target = np.clip(state.mean, unknowns.low, unknowns.high)
@@ -258,7 +258,9 @@ def _stepped(run: Map, unknowns: Unknowns, linear: Linear, errors: ErrorModel) -
         moved = _step(run, unknowns, linear, target, cost)
         if moved is None:
             return linear
-        linear = moved
+        gain, linear = cost(linear) - cost(moved), moved
+        if gain < _LEAST:
+            return linear
     return linear
 
 

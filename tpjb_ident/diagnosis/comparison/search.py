@@ -83,10 +83,7 @@ class _Search:
         self._fit(Start((), self._stated.theta, self._stated.jacobian))
         self.report("every effect of the library", 0.1)
         self._propose_singles()
-        baseline, best = self.fits[frozenset()], max((p.estimate for p in self.proposals.values()), default=-math.inf)
-        if baseline.posterior.promised + self._log_prior(()) > best - Deciding.worth_derivatives:
-            self.fits[frozenset()] = baseline = self._renewed(baseline)
-        self._propose_neighbours(baseline)  # from where its tolerances have gone, as from every other fit
+        self._propose_neighbours(self.fits[frozenset()])  # from where its tolerances have gone
         while (proposal := self._next()) is not None:
             self.report(f"fits, {len(self.fits)}", min(0.9, 0.2 + 0.7 * len(self.fits) / Deciding.most_fits))
             self._fit(proposal)
@@ -174,7 +171,7 @@ class _Search:
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
             return proposal.estimate > total + math.log(1.0 - Deciding.included)
         rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
-        if len(proposal.faults) > len(leader.faults) and not plain:  # scored beside a fit that has risen already
+        if len(proposal.faults) != len(leader.faults) and not plain:  # scored beside a fit that has risen already
             rise = 0.0
         return proposal.estimate > total - near - rise
 
@@ -186,8 +183,8 @@ class _Search:
     def _reached(self, start: Start) -> Fit | None:
         """Where a start leads; steps that fail on derivatives from elsewhere say nothing: what they promise counts."""
         fit, leader = fitted(self.run, self.problem, start), self._leader()
-        if fit is None or not fit.faults:
-            return fit
+        if fit is None:
+            return None
         if start.coarse:  # derivatives from before a jump led here, and say little of what lies behind it
             before, fit = fit, self._renewed(fit)
             if fit is before:  # refused once, they would be refused again
@@ -206,7 +203,7 @@ class _Search:
         return self._renewed(fit)
 
     def _fit(self, proposal: Start) -> None:
-        """Fit a proposal; one that leads and is surely wrong, or stopped at a jump, once more with a coarse start."""
+        """Fit a proposal; one that should lead and is wrong, or stopped at a jump, once more with a coarse start."""
         fit = self._reached(proposal)
         self.tried += 1
         if proposal.coarse:
@@ -216,7 +213,8 @@ class _Search:
         wrong = fit.posterior.refused > Deciding.better or fit.needs_more
         # what stands beside one that was begun coarsely is past its jumps
         passed = not fit.faults or any(labels <= proposal.labels for labels in self.begun)
-        if wrong and not passed and self._near(fit, fit.posterior.promised, 0.0):
+        promised = max(fit.posterior.promised, proposal.estimate - self._log_prior(fit.faults))
+        if wrong and not passed and self._near(fit, promised, 0.0):
             self.begun[proposal.labels] = -math.inf
             coarse = self._reached(Start(fit.faults, fit.linear.theta, fit.linear.jacobian, coarse=True))
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
@@ -226,7 +224,7 @@ class _Search:
         self.fits[proposal.labels] = fit
         self.estimates[proposal.labels] = math.inf if proposal.coarse else proposal.estimate
         # one cause that does most of it is far behind until what stands beside it is there too
-        if fit.faults and (proposal.coarse or self._near(fit, fit.posterior.total, Deciding.near)):
+        if proposal.coarse or self._near(fit, fit.posterior.total, Deciding.near):
             self._propose_neighbours(fit)
 
     def _near(self, fit: Fit, total: float, nats: float) -> bool:
@@ -299,9 +297,8 @@ class _Search:
             further = [self._beside(path, fit) for path in self.paths if path.fault.label not in fit.labels]
             for score in scores(self.problem.errors, fit.linear, further, fit.strain):
                 self._propose(replace(score, total=score.total - fit.posterior.refused), fit.faults, fit.linear)
-        if len(fit.faults) > 1:
-            for fault in fit.faults:
-                self._propose_without(fit, fault)
+        for fault in fit.faults:
+            self._propose_without(fit, fault)
 
     def _beside(self, path: Path, fit: Fit) -> Path:
         """A path beside a fit: what tolerances say has their derivatives there, which large faults change."""
