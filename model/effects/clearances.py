@@ -138,6 +138,35 @@ def pad_arc_error(setup: Setup, factor: float) -> Setup:
 
 @effect_on(
     "bearing",
+    Parameter("factor", "1", "ratio", 1.0, 0.5, 1.5, 0.05),
+    source="Chamfers at the ends of a pad take 1 to 3 % of its length",
+    finding="the pads are {factor:size} {factor:longer|shorter} along the shaft than the bearing file says",
+    physics="A shorter film leaks more at its ends and carries less. Every pad is off alike, the loaded ones most.",
+    on_the_rig="Clearances agree with the drawing; stiffness and damping are off alike at all loads.",
+    check="the pads' length along the shaft's axis against the drawing, chamfers taken off",
+)
+def pad_length_error(setup: Setup, factor: float) -> Setup:
+    """The axial length of all pads times factor."""
+    return setup.change(bearing=replace(setup.bearing, length=setup.bearing.length * factor))
+
+
+@effect_on(
+    "bearing",
+    PAD,
+    Parameter("angle_change", "rad", "angle", 0.0, -0.2, 0.2, 0.02),
+    source="Seats and pins are bored to 0.1 to 0.5 deg; a wrong pitch in a file is some degrees",
+    finding="{pad} sits {angle_change:size} {angle_change:after|before} its angle in the bearing file",
+    physics="One pad stands at another angle, so the load shares itself out anew among the pads.",
+    on_the_rig="One side of the clearance polygon is turned; cross-coupled coefficients are off.",
+    check="the pad's angle in the bearing file against the drawing, and its seat",
+)
+def pivot_angle_error(setup: Setup, pad: int, angle_change: float) -> Setup:
+    """One pad, its pivot with it, stands at this much more than its angle, counter-clockwise."""
+    return _moved(setup, "pivot_angle", angle_change, pad)
+
+
+@effect_on(
+    "bearing",
     Parameter("clearance_change", "m", "length", 0.0, -6e-05, 6e-05, 8e-06),
     source="12e-6 1/K x 66 mm x 8 K = 6 um if only the housing heats",
     finding="the running clearance is {clearance_change:size} {clearance_change:larger|smaller} than cold",

@@ -30,7 +30,7 @@ def test_the_command_line_wins_over_the_bearing_file_and_that_over_defaults():
 
 
 def test_a_bearing_file_states_every_tolerance():
-    texts = {"ratio": "2 %", "length": "3 um", "temperature difference": "1 K"}
+    texts = {"ratio": "2 %", "length": "3 um", "temperature difference": "1 K", "angle": "0.1 deg"}
     lines = [f'{name} = "{texts[dimension]}"' for name, (_, dimension) in DEFAULTS.items()]
     stated = Tolerances().layered(bearing_with("\n".join(lines))).stated
     assert {tolerance.source for tolerance in stated.values()} == {"bearing file"}

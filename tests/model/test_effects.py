@@ -38,6 +38,7 @@ NAMES = {
     "loadcell_gain", "loadcell_crosstalk", "channel_delay", "housing_mass", "structure_compliance", "uneven_pads",
     "viscosity_law", "heat_loss", "pad_conduction", "pivot_rolling", "pivot_friction", "one_probe_gain",
     "one_cell_gain", "thermometer_offset", "pad_bore", "clearance_error", "pivot_offset_error", "pad_arc_error",
+    "pad_length_error", "pivot_angle_error",
 }  # fmt: skip
 HOUSING_MASS, CELLS = 30.0, np.array([4.0e8, 6.0e8])
 

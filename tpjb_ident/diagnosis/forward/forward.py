@@ -129,7 +129,8 @@ class Forward:
         values += [_locus(test, self._solve(setup, test)) for test in self.layout.locus]
         values += [_dry(setup, dry) for dry in self.layout.dry]
         if self.layout.push_load is not None:
-            values += _clearance(setup, self.layout.push_load)
+            sides, angles = polygon_sides(setup, self.layout.push_load)
+            values += [sides, np.angle(np.exp(1j * (angles - self._drawn)))]
         return np.concatenate(values)[self._rows]
 
     def fresh(self) -> Forward:
@@ -137,9 +138,14 @@ class Forward:
         return replace(self, cache=self.cache.copy())
 
     @functools.cached_property
+    def _drawn(self) -> FloatArray:
+        """The pivots' angles in the bearing file, from which those of a polygon's sides count, (n_pads,)."""
+        return np.array([pad.pivot_angle for pad in self.setup.bearing.pads])
+
+    @functools.cached_property
     def _rows(self) -> IntArray:
         """Where the elements are among all that the layout shows; not every one was measured."""
-        shown = all_elements(self.layout, [pad.pivot_angle for pad in self.setup.bearing.pads])
+        shown = all_elements(self.layout, self._drawn.tolist())
         places = {element: row for row, element in enumerate(shown)}
         return np.array([places[element] for element in self.elements], dtype=int)
 
@@ -177,10 +183,3 @@ def _dry(setup: Setup, test: DryTest) -> FloatArray:
         forces, deflections = dry_curve(setup, test.pad, around / gain)
     rise, push = (values[len(load) :] - values[: len(load)] for values in (deflections, forces))
     return np.asarray(np.log(np.maximum(rise / push, 1e-16)))
-
-
-def _clearance(setup: Setup, push_load: float) -> list[FloatArray]:
-    """Sides of the polygon, then their angles from the pivots'."""
-    sides, angles = polygon_sides(setup, push_load)
-    turns = [math.remainder(a - p.pivot_angle, 2.0 * math.pi) for a, p in zip(angles, setup.bearing.pads, strict=True)]
-    return [np.asarray(sides), np.array(turns)]

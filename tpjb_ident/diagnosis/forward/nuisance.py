@@ -47,6 +47,8 @@ OWN_NUMBERS = {
     "preload_error": OwnNumber("pad_clearance", "m"),
     "pivot_offset_error": OwnNumber("pivot_offset"),
     "pad_arc_error": _ratio("pad_arc"),
+    "pad_length_error": _ratio("pad_length"),
+    "pivot_angle_error": OwnNumber("pivot_angle", "rad", "pad"),
     "heat_loss": OwnNumber(
         "film_heat",
         parameter=lambda change: 1.0 - math.exp(change),

@@ -39,6 +39,8 @@ DEFAULTS: dict[str, tuple[float, str]] = {
     "thermometer": (0.5, "temperature difference"),
     "pivot_offset": (0.005, "ratio"),
     "pad_arc": (0.01, "ratio"),
+    "pad_length": (0.01, "ratio"),
+    "pivot_angle": (math.radians(0.2), "angle"),
     "probe_gain": (0.005, "ratio"),
     "cell_gain": (0.002, "ratio"),
     "model": (TRUSTED["h"], "ratio"),
