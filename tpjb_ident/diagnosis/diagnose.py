@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from model.effects import apply_effects
 from model.mirror import rotation_of
 from model.setup import Setup
 from rigdata.arrays import FloatArray
@@ -99,8 +98,8 @@ def _next_test(
         worst = verdict.disagreement[0]
         return f"repeat {worst.observable} at {worst.where}, where the unknown shows most, with another sensor set"
     setup, layout = campaign
-    rivals = [fit for fit in _rivals(comparison, model) if _possible(setup, fit)]
-    if not rivals or not _possible(setup, model):
+    rivals = _rivals(comparison, model)
+    if not rivals:
         return ""
     others = [fit.effects for fit in rivals]
     options = options_for(setup, layout)
@@ -115,15 +114,6 @@ def _next_test(
 def _separated(forward: Forward, problem: Problem, *asked: Any) -> Separation | None:
     """Job: what one option would show between the first explanation and the others."""
     return separated(*asked)
-
-
-def _possible(setup: Setup, fit: Fit) -> bool:
-    """Whether the model takes the effects of a fit."""
-    try:
-        apply_effects(setup, fit.effects)
-    except ValueError:
-        return False
-    return True
 
 
 def _rivals(comparison: Comparison, model: Fit) -> list[Fit]:

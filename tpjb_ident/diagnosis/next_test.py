@@ -68,7 +68,7 @@ def designs(setup: Setup, layout: Layout) -> tuple[Design, ...]:
     """List tests on this rig that go beyond a campaign's own."""
     at = _OperatingRange.of(layout, len(setup.bearing.pads))
     return (
-        *_other_lines(at), *_other_points(at), *_other_rigs(setup, at), *_static(at), *_dry(layout, at.pads)
+        *_other_points(at), *_other_rigs(setup, at), *_static(at), *_dry(layout, at.pads)
     )  # fmt: skip
 
 
@@ -108,23 +108,19 @@ class _OperatingRange:
         return self.run(f"the load sweep repeated {words}, with pad temperatures", loads, self.lines[:1], True, faster)
 
 
-def _other_lines(at: _OperatingRange) -> list[Design]:
-    sweep = [HZ * f for f in (10.0, 20.0, 30.0, 40.0, 50.0)]
-    far = [HZ * f for f in (60.0, 90.0, 120.0, 150.0)]
-    words = f"a frequency sweep 60-150 Hz at {at.load:.0f} N, {at.shaft} shaft speed, if the actuators reach that far"
+def _other_points(at: _OperatingRange) -> list[Design]:
+    sweep, far = [HZ * f for f in (10.0, 20.0, 30.0, 40.0, 50.0)], [HZ * f for f in (60.0, 90.0, 120.0, 150.0)]
+    between = replace(at, direction=at.direction + math.pi / at.pads)
+    half, more = 0.5 * at.low, 1.25 * at.top
     return [
         *(
             at.run(f"a frequency sweep 10-50 Hz at {w:.0f} N, {at.shaft} shaft speed", [w], sweep)
             for w in (at.top, at.low)
         ),
-        at.run(words, [at.load], far),
-    ]
-
-
-def _other_points(at: _OperatingRange) -> list[Design]:
-    between = replace(at, direction=at.direction + math.pi / at.pads)
-    half, more = 0.5 * at.low, 1.25 * at.top
-    return [
+        at.run(
+            f"a frequency sweep 60-150 Hz at {at.load:.0f} N, {at.shaft} shaft speed, if the actuators reach that far",
+            [at.load], far,
+        ),
         at.run(f"dynamic tests at half the load, {half:.0f} N, {at.shaft}", [half], at.lines),
         at.run(
             f"dynamic tests at a quarter more than the highest load, {more:.0f} N, {at.shaft}", [more], at.lines, True
@@ -216,7 +212,7 @@ def options_for(setup: Setup, layout: Layout) -> tuple[Design | Check, ...]:
 def separated(
     setup: Setup, design: Design | Check, first: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Tolerances
 ) -> Separation | None:
-    """What one design would show; None where it cannot be or the model has no equilibrium."""
+    """What one design would show; None where it cannot be, or the model refuses."""
     if isinstance(design, Check):
         return Separation(design, tuple(design.separation(first, rival) for rival in rivals))
     if not design.fits(first, *rivals):
@@ -228,7 +224,7 @@ def separated(
         prediction = forward(acting)
         columns = at_baseline(forward, acting, setup, known, prediction)
         others = [forward(design.acting(rival)) for rival in rivals]
-    except NoEquilibriumError:
+    except (ValueError, NoEquilibriumError):
         return None
     white = np.linalg.solve(usual_factor(planned, columns), prediction[:, None] - np.column_stack(others))
     return Separation(design, tuple(np.linalg.norm(white, axis=0).tolist()))

@@ -162,34 +162,24 @@ _DIRECT = ["kxx", "kyy", "cxx", "cyy"]
 _FASTER = 1.5
 
 
-@dataclass(frozen=True)
-class DataSet:
-    """What one part of a campaign could tell."""
+def data_sets(setup: Setup, layout: Layout) -> tuple[pd.DataFrame, dict[str, CampaignPlan]]:
+    """Work out what every data set sees at typical sizes and mixes up at d' = 6; plans have free nuisances."""
+    import pandas as pd
 
-    name: str
-    numbers: int
-    known: CampaignPlan = field(repr=False)
-    free: CampaignPlan = field(repr=False)
-
-    def to_row(self) -> dict[str, object]:
-        """Counts, flat."""
-        row: dict[str, object] = {"data_set": self.name, "numbers": self.numbers}
-        k = len(self.known.candidates)
-        for words, part in (("known", self.known), ("free", self.free)):
-            row[f"detectable_nuisances_{words}"] = k - len(part.below_floor)
-            row[f"confusable_pairs_nuisances_{words}"] = len(part.confusable)
-            row["pairs"] = k * (k - 1) // 2
-        return {**row, "mixed_up": "; ".join(" / ".join(pair) for pair in self.free.confusable)}
-
-
-def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
-    """Work out what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free."""
     faster = tuple(replace(t, speed=_FASTER * t.speed) for t in layout.dynamic)
     shown = _shown(setup, replace(layout, dynamic=(*layout.dynamic, *faster)))
     masks = _masks(shown.observations.elements, [t.speed for t in layout.dynamic])
-    return tuple(
-        DataSet(name, int(mask.sum()), shown.by(mask, free=False), shown.by(mask)) for name, mask in masks.items()
-    )
+    rows, plans = [], {}
+    count = len(shown.candidates)
+    for name, mask in masks.items():
+        row: dict[str, object] = {"data_set": name, "numbers": int(mask.sum())}
+        for words, free in (("known", False), ("free", True)):
+            part = plans[name] = shown.by(mask, free)
+            row[f"detectable_nuisances_{words}"] = count - len(part.below_floor)
+            row[f"confusable_pairs_nuisances_{words}"] = len(part.confusable)
+            row["pairs"] = count * (count - 1) // 2
+        rows.append({**row, "mixed_up": "; ".join(" / ".join(pair) for pair in part.confusable)})
+    return pd.DataFrame(rows), plans
 
 
 def _masks(elements: Sequence[Element], planned: Sequence[float]) -> dict[str, BoolArray]:

@@ -45,8 +45,6 @@ def plan(
     and a matrix and a picture of each.
     """
     drawing = c.bearing(bearing)
-    import pandas as pd
-
     from model.pivots import pivot_laws
     from model.setup import Setup
     from tpjb_ident.diagnosis import plan as planning
@@ -62,9 +60,9 @@ def plan(
         plans = {"isolability": result}
         if data_sets:
             show("parts of the campaign", 1, 2)
-            sets = planning.data_sets(setup, tests)
-            c.table("data_sets", pd.DataFrame([data_set.to_row() for data_set in sets]))
-            plans |= {f"isolability_{data_set.name}": data_set.free for data_set in sets}  # calibration errors free
+            table, parts = planning.data_sets(setup, tests)
+            c.table("data_sets", table)
+            plans |= {f"isolability_{name}": part for name, part in parts.items()}
         c.table("effects", result.to_frame())
         for name, part in plans.items():
             c.table(name, part.matrix())

@@ -5,10 +5,11 @@ dynamic tests), ``locus``, ``load`` (the cells' mean reading against the set poi
 their angles), ``dry`` (tangent compliance of every pivot), ``temperature``.
 """
 
+import itertools
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from scipy.linalg import block_diag
 
 from rigdata.arrays import FloatArray
 from rigdata.vector import directions
-from tpjb_ident.clearance.locus import Locus, LocusPoint
+from tpjb_ident.clearance.locus import Locus
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.compare.coefficient_table import ERRORS, VALUES, points_of, read_coefficients
 from tpjb_ident.diagnosis.observations.constants import TRUSTED, Deciding
@@ -110,33 +111,21 @@ def _elements(names: Iterable[tuple[str, str]], *places: Where) -> list[Element]
     return [Element(family, observable, where) for where in places for family, observable in names]
 
 
-def _temperature_elements(where: Where, pads: Iterable[int]) -> list[Element]:
-    """One per pad."""
-    return _elements([("temperature", "pad_temperature")], *((*where, ("pad", float(pad))) for pad in pads))
-
-
-def _dry_elements(test: DryTest) -> list[Element]:
-    """One per load."""
-    places = ((("pad", float(test.pad)), ("load", float(load))) for load in test.load)
-    return _elements([("dry", "dry_compliance")], *places)
-
-
-def _clearance_elements(name: str, angles: Iterable[float]) -> list[Element]:
-    """One per side of the polygon."""
-    return _elements([("clearance", name)], *((("pad", k), ("angle", float(a))) for k, a in enumerate(angles, 1)))
-
-
 def all_elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
     """Everything that a layout of tests shows of a bearing with pivots at these angles, in the order of predictions."""
     out: list[Element] = []
     for test in layout.dynamic:
         out += _elements(_STIFFNESS, *(_at_point(*test.point, omega) for omega in test.excitation))
-        out += _temperature_elements(_at_point(*test.point), test.pads)
+        pads = ((*_at_point(*test.point), ("pad", float(pad))) for pad in test.pads)
+        out += _elements([("temperature", "pad_temperature")], *pads)
     out += _elements(_LOCUS, *(_at_point(*test.point) for test in layout.locus))
     for dry in layout.dry:
-        out += _dry_elements(dry)
+        loads = ((("pad", float(dry.pad)), ("load", load)) for load in dry.load)
+        out += _elements([("dry", "dry_compliance")], *loads)
     if layout.push_load is not None:
-        out += [*_clearance_elements("clearance_pushed", angles), *_clearance_elements("side_angle", angles)]
+        sides = [(("pad", pad), ("angle", float(angle))) for pad, angle in enumerate(angles, start=1)]
+        for observable in ("clearance_pushed", "side_angle"):
+            out += _elements([("clearance", observable)], *sides)
     return tuple(out)
 
 
@@ -183,22 +172,17 @@ def stated_sigma(elements: Sequence[Element], value: FloatArray, model: float) -
     return by_family(elements, value, {**TRUSTED, "h": model})
 
 
-@dataclass
-class _Builder:
-    value: list[float] = field(default_factory=list)
-    elements: list[Element] = field(default_factory=list)
-    covariance: list[FloatArray] = field(default_factory=list)
+#: Values of a test and their covariance, in the order of its elements; what was not measured is NaN.
+Part = tuple[FloatArray, FloatArray]
 
-    def add(self, elements: Sequence[Element], value: FloatArray, covariance: FloatArray) -> None:
-        finite = np.isfinite(value) & np.isfinite(np.diag(covariance))
-        self.value += list(value[finite])
-        self.elements += [e for e, k in zip(elements, finite, strict=True) if k]
-        self.covariance.append(covariance[np.ix_(finite, finite)])
 
-    def observed(self, layout: Layout, model: float) -> Observations:
-        value, elements = np.array(self.value), tuple(self.elements)
-        sigma = stated_sigma(elements, value, model)
-        return Observations(layout, value, block_diag(*self.covariance), sigma, elements)
+def _gathered(layout: Layout, angles: Sequence[float], parts: Sequence[Part], model: float) -> Observations:
+    """All that was measured, as one vector."""
+    value, covariance = np.concatenate([v for v, _ in parts]), block_diag(*(c for _, c in parts))
+    known = np.isfinite(value) & np.isfinite(np.diag(covariance))
+    elements, value = tuple(itertools.compress(all_elements(layout, angles), known)), value[known]
+    sigma = stated_sigma(elements, value, model)
+    return Observations(layout, value, covariance[np.ix_(known, known)], sigma, elements)
 
 
 def observe(
@@ -209,35 +193,30 @@ def observe(
     model: float = TRUSTED["h"],
 ) -> Observations:
     """Gather a campaign's results into one vector."""
-    builder = _Builder()
-    dynamic = _add_dynamic(builder, identification)
-    locus_tests = _add_locus(builder, locus, identification) if locus is not None else ()
+    parts: list[Part] = []
+    dynamic = _add_dynamic(parts, identification)
+    locus_tests = _add_locus(parts, locus, identification) if locus is not None else ()
     usable = [c for c in curves if c.valid_from < c.valid_to < math.inf]
-    dry = tuple(_add_dry(builder, curve) for curve in usable)
-    push = _add_clearance(builder, polygon) if polygon is not None else None
-    return builder.observed(Layout(dynamic, locus_tests, dry, push), model)
+    dry = tuple(_add_dry(parts, curve) for curve in usable)
+    if polygon is None:
+        return _gathered(Layout(dynamic, locus_tests, dry), (), parts, model)
+    turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
+    for value, error in ((polygon.clearance_pushed, polygon.clearance_pushed_se), (turn, polygon.fitted_angle_se)):
+        parts.append((np.asarray(value), np.diag(np.asarray(error) ** 2)))
+    layout = Layout(dynamic, locus_tests, dry, float(polygon.push_load))
+    return _gathered(layout, polygon.angles.tolist(), parts, model)
 
 
-def _add_dynamic(builder: _Builder, identification: Identification) -> tuple[DynamicTest, ...]:
-    tests: dict[tuple[float, float, float], list[int]] = {}
-    points = [p for p in identification.points if not _mains_on_excitation(p)] or list(identification.points)
-    for i, p in enumerate(points):
-        key = (p.point.static_load, p.point.static_load_direction, p.point.spin)
-        tests.setdefault(key, []).append(i)
+def _add_dynamic(parts: list[Part], identification: Identification) -> tuple[DynamicTest, ...]:
+    tests = defaultdict[tuple[float, float, float], list[PointResult]](list)
+    for p in [p for p in identification.points if not _mains_on_excitation(p)] or identification.points:
+        tests[p.point.static_load, p.point.static_load_direction, p.point.spin].append(p)
     out = []
-    for (load, direction, speed), members in tests.items():
-        place = _at_point(load, direction, speed)
-        for i in members:
-            _add_stiffness(builder, points[i], place)
-        kelvin = pad_means([points[i].temperatures for i in members])
-        temperature = {pad: t - 273.15 for pad, t in kelvin.items()}
-        names = _temperature_elements(place, temperature)
-        if temperature:
-            noise = np.eye(len(names)) * Deciding.temperature**2
-            builder.add(names, np.array(list(temperature.values())), noise)
-        out.append(
-            DynamicTest(load, direction, speed, tuple(points[i].point.excitation for i in members), tuple(temperature))
-        )
+    for static, points in tests.items():
+        parts += [_stiffness_part(p) for p in points]
+        kelvin = pad_means([p.temperatures for p in points])
+        parts.append((np.array([*kelvin.values()]) - 273.15, np.eye(len(kelvin)) * Deciding.temperature**2))
+        out.append(DynamicTest(*static, tuple(p.point.excitation for p in points), tuple(kelvin)))
     return tuple(out)
 
 
@@ -246,17 +225,16 @@ def _mains_on_excitation(result: PointResult) -> bool:
     return MAINS_ON_LINE in result.quality and MAINS_CORRECTED not in result.quality
 
 
-def _add_stiffness(builder: _Builder, result: PointResult, place: Where) -> None:
-    h = result.stiffness.h
-    elements = _elements(_STIFFNESS, (*place, ("excitation", result.point.excitation)))
+def _stiffness_part(result: PointResult) -> Part:
+    h, covariance = result.stiffness.h, np.asarray(result.stiffness.covariance)
     value = np.concatenate([h.real.ravel(), h.imag.ravel()])
-    covariance = np.asarray(result.stiffness.covariance)
     if "no-spare-direction" in result.quality:  # the interval knows repeats only, not what runs differ by
-        covariance = covariance + np.diag((Deciding.unseen * direct_scale(elements, value)) ** 2)
-    builder.add(elements, value, covariance)
+        scale = direct_scale(_elements(_STIFFNESS, ()), value)
+        covariance = covariance + np.diag((Deciding.unseen * scale) ** 2)
+    return value, covariance
 
 
-def _add_locus(builder: _Builder, locus: Locus, identification: Identification) -> tuple[LocusTest, ...]:
+def _add_locus(parts: list[Part], locus: Locus, identification: Identification) -> tuple[LocusTest, ...]:
     """Positions and load readings; a load that misses its set point moves both, so they share an error."""
     out = []
     spread = np.diag(np.square(Deciding.missed))
@@ -270,8 +248,7 @@ def _add_locus(builder: _Builder, locus: Locus, identification: Identification) 
         stacked = np.vstack([give, np.eye(2)])
         covariance = stacked @ spread @ stacked.T
         covariance[:2, :2] += p.covariance
-        value = np.array([*p.position, p.load / test.load, turn])
-        builder.add(_elements(_LOCUS, _at_point(*test.point)), value, covariance)
+        parts.append((np.array([*p.position, p.load / test.load, turn]), covariance))
         out.append(test)
     return tuple(out)
 
@@ -288,25 +265,12 @@ def _spread(tests: Sequence[LocusTest]) -> set[LocusTest]:
     return chosen
 
 
-def _add_dry(builder: _Builder, curve: PivotCurve) -> DryTest:
+def _add_dry(parts: list[Part], curve: PivotCurve) -> DryTest:
     load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in Deciding.dry_shares])
-    value = -np.log(np.asarray(curve.stiffness(load), float))
     covariance = curve.relative_stiffness_covariance(load)
     covariance = covariance + np.diag(Deciding.dry_shape**2 * np.diag(covariance))
-    test = DryTest(curve.pad, tuple(load.tolist()))
-    builder.add(_dry_elements(test), value, covariance)
-    return test
-
-
-def _add_clearance(builder: _Builder, polygon: ClearancePolygon) -> float:
-    turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
-    rows = (
-        ("clearance_pushed", polygon.clearance_pushed, polygon.clearance_pushed_se),
-        ("side_angle", turn, polygon.fitted_angle_se),
-    )
-    for name, value, error in rows:
-        builder.add(_clearance_elements(name, polygon.angles), value, np.diag(np.asarray(error) ** 2))
-    return float(polygon.push_load)
+    parts.append((-np.log(np.asarray(curve.stiffness(load), float)), covariance))
+    return DryTest(curve.pad, tuple(load.tolist()))
 
 
 #: Load directions per load and speed that are enough: the locus of five pads has five waves, two directions to each.
@@ -314,12 +278,14 @@ _DIRECTIONS = 10
 
 
 def moved_by_miss(locus: Locus, identification: Identification) -> list[FloatArray]:
-    """Change of every position with the load's size and direction, (2, 2)."""
+    """Change of every position with the load's size, and its direction: the locus turns about its middle, (2, 2)."""
     out = []
     for p in locus.points:
-        load = p.point.static_load
+        load, speed = p.point.static_load, p.point.spin
         more = load * directions(p.point.static_load_direction) / _stiffness(identification, load)
-        out.append(np.column_stack([more, _turned(p, locus)]))
+        alike = [q.position for q in locus.points if (q.point.static_load, q.point.spin) == (load, speed)]
+        x, y = p.position - np.mean(alike, axis=0)
+        out.append(np.column_stack([more, [-y, x]]))
     return out
 
 
@@ -332,29 +298,16 @@ def _stiffness(identification: Identification, load: float) -> float:
     return nearest.stiffness.direct[0]
 
 
-def _turned(point: LocusPoint, locus: Locus) -> FloatArray:
-    """Change of a position with the load's direction: as the locus turns about its middle, or the zero, (2,)."""
-    place = (point.point.static_load, point.point.spin)
-    alike = [p for p in locus.points if (p.point.static_load, p.point.spin) == place]
-    several = len({p.point.static_load_direction for p in alike}) > 2
-    x, y = point.position - np.mean([p.position for p in alike], axis=0) * several
-    return np.array([-y, x])
-
-
 def observe_table(path: Path, reading_error: float | None = None, model: float = TRUSTED["h"]) -> Observations:
     """Read a table of coefficients."""
-    builder = _Builder()
-    tests: dict[tuple[float, float, float], list[float]] = {}
+    tests = defaultdict[tuple[float, float, float], list[tuple[float, FloatArray, FloatArray]]](list)
     rows = read_coefficients(path, reading_error)
     for point, values, errors in zip(points_of(rows), rows[VALUES].to_numpy(), rows[ERRORS].to_numpy()):
-        static = (point.static_load, point.static_load_direction, point.spin)
-        tests.setdefault(static, []).append(point.excitation)
-        present = np.flatnonzero(np.isfinite(values))
-        named = _elements(_STIFFNESS, _at_point(*static, point.excitation))
-        elements = [named[i] for i in present]
-        factor = np.where(present < 4, 1.0, point.excitation)
-        value, error = factor * values[present], factor * errors[present]
-        least = Deciding.axis * (reading_error or 0.0) * direct_scale(elements, value)
-        builder.add(elements, value, np.diag(np.maximum(error, least) ** 2))
-    layout = Layout(tuple(DynamicTest(*key, tuple(lines)) for key, lines in tests.items()))
-    return builder.observed(layout, model)
+        factor = np.where(np.arange(len(values)) < 4, 1.0, point.excitation)
+        row = point.excitation, factor * values, factor * errors
+        tests[point.static_load, point.static_load_direction, point.spin].append(row)
+    dynamic = tuple(DynamicTest(*static, tuple(row[0] for row in rows)) for static, rows in tests.items())
+    parts = [(value, np.diag(error**2)) for rows in tests.values() for _, value, error in rows]
+    table = _gathered(Layout(dynamic), (), parts, model)
+    least = Deciding.axis * (reading_error or 0.0) * direct_scale(table.elements, table.value)
+    return replace(table, covariance=np.maximum(table.covariance, np.diag(least**2)))

@@ -1,7 +1,7 @@
 """Decide: from a comparison to a verdict with everything that it rests on."""
 
+import itertools
 import math
-from collections import defaultdict
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +12,6 @@ from tpjb_ident.compare.effect_words import Estimate
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.search import Comparison
-from tpjb_ident.diagnosis.forward.nuisance import Nuisance
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
@@ -168,15 +167,12 @@ def _ranked(comparison: Comparison) -> tuple[RankedCandidate, ...]:
 def _assumptions(problem: Problem, fit: Fit, known: Tolerances) -> tuple[Assumption, ...]:
     """Every tolerance that took part, with what the fit made of it, and how far out its farthest number is."""
     farthest = {d.name.split(" ")[0]: d.significance for d in reversed(fit.tolerances)}
-    tolerances, fitted = known.stated, defaultdict[Nuisance, list[float]](list)
-    firsts: dict[str, Nuisance] = {}
-    for nuisance, size in zip(problem.nuisances, fit.sizes, strict=True):
-        fitted[firsts.setdefault(nuisance.name, nuisance)].append(float(size * nuisance.sigma))
     out = []
-    for first, values in fitted.items():
-        source = tolerances[first.name].source if first.name in tolerances else "default"
+    for name, rows in itertools.groupby(zip(problem.nuisances, fit.sizes.tolist()), key=lambda row: row[0].name):
+        members = list(rows)
+        first, values = members[0][0], [size * nuisance.sigma for nuisance, size in members]
+        source = known.stated[name].source if name in known.stated else "default"
         value = values if len(values) > 1 else values[0]
-        out.append(Assumption(first.name, first.sigma, value, first.unit, source, farthest.get(first.name, 0.0)))
+        out.append(Assumption(name, first.sigma, value, first.unit, source, farthest.get(name, 0.0)))
     stated = known["model"]
-    learnt = stated * fit.posterior.scale
-    return (*out, Assumption("model", stated, learnt, "1", tolerances["model"].source))
+    return (*out, Assumption("model", stated, stated * fit.posterior.scale, "1", known.stated["model"].source))
