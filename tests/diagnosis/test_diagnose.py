@@ -186,13 +186,20 @@ def test_no_more_can_be_missing_than_a_campaign_states(setup):
 
 
 @pytest.mark.slow
-def test_arcs_that_are_short_have_their_name(setup, observations):
-    hidden = Effect("pad_arc_error", factor=0.9)
-    settings = few("pad_arc_error", "misalignment", "starvation", "pivot_offset_error")
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        Effect("pad_arc_error", factor=0.9), Effect("pad_length_error", factor=0.85),
+        Effect("pivot_angle_error", pad=2, angle_change=0.06),
+    ],
+)  # fmt: skip
+def test_what_the_file_says_of_all_pads_or_one_has_its_name(setup, observations, hidden):
+    settings = few("pad_arc_error", "pad_length_error", "pivot_angle_error", "starvation", "pivot_offset_error")
     verdict = diagnose(campaign(observations, setup, (hidden,), seed=4), setup, settings).verdict
-    assert [e.name for e in verdict.effects] == ["pad_arc_error"]
-    factor = verdict.effects[0].parameters["factor"]
-    assert factor.lo < 0.9 < factor.hi
+    assert [e.name for e in verdict.effects] == [hidden.name]
+    for name, value in hidden.parameters.items():
+        found = verdict.effects[0].parameters[name]
+        assert found.lo <= value <= found.hi
 
 
 @pytest.mark.slow
