@@ -117,7 +117,7 @@ def points_between(rows: FloatArray, rises: FloatArray) -> tuple[FloatArray, Flo
     """
     last, count = len(rows) - 1, min(4, len(rows))
     points = np.zeros((3, _BETWEEN * (last + 1) + 1))
-    warm = np.empty((points.shape[1], rises.shape[1], rises.shape[2]))
+    warm = np.zeros((points.shape[1], rises.shape[1], rises.shape[2]))
     logarithms = np.log(rows[:, 1:])
     for p in range(points.shape[1]):
         row, share = p // _BETWEEN - 1, p % _BETWEEN / _BETWEEN
@@ -132,13 +132,8 @@ def points_between(rows: FloatArray, rises: FloatArray) -> tuple[FloatArray, Flo
         for k in range(count):
             points[0, p] += by_wedge[k] * rows[first + k, 0]
             power += by_power[k] * logarithms[first + k, 1]
+            warm[p] += by_wedge[k] * rises[first + k]
         points[0, p], points[2, p] = max(points[0, p], _FARTHEST), np.exp(power)
-        for i in range(warm.shape[1]):
-            for j in range(warm.shape[2]):
-                rise = 0.0
-                for k in range(count):
-                    rise += by_wedge[k] * rises[first + k, i, j]
-                warm[p, i, j] = rise
     return points, warm
 
 
@@ -213,26 +208,20 @@ def _ahead(work: FilmWork, out: tuple[FloatArray, FloatArray], wedge: float, row
     """Curvature at a wedge, and temperatures into `work`, as rows head: from the first on, to an end; the nearest."""
     numbers, rises = out
     first, end, nearest = rows
-    weights, curvature = _weights(numbers[first:end, 1], wedge), 0.0
+    weights, curvature, rise = _weights(numbers[first:end, 1], wedge), 0.0, np.zeros(work.temperature.shape)
     for k in range(len(weights)):
         curvature += weights[k] * numbers[first + k, 0]
-    for i in range(work.temperature.shape[0]):
-        for j in range(work.temperature.shape[1]):
-            rise, last = 0.0, rises[nearest, i, j]
-            for k in range(len(weights)):
-                rise += weights[k] * rises[first + k, i, j]
-            work.temperature[i, j] = 40.0 + min(max(rise, 0.5 * last), 1.5 * last)
+        rise += weights[k] * rises[first + k]
+    last = rises[nearest]
+    work.temperature[:] = 40.0 + np.minimum(np.maximum(rise, 0.5 * last), 1.5 * last)
     most = 0.5 * (1.0 + numbers[nearest, 0])
     return max(numbers[nearest, 0] + min(max(curvature - numbers[nearest, 0], -most), most), -0.75)
 
 
 @inner
 def _keep(work: FilmWork, out: tuple[FloatArray, FloatArray], row: int, attitude: tuple[float, float, float]) -> None:
-    numbers, rises = out
-    numbers[row, 0], numbers[row, 1], numbers[row, 2] = attitude
-    for i in range(work.temperature.shape[0]):
-        for j in range(work.temperature.shape[1]):
-            rises[row, i, j] = work.temperature[i, j] - 40.0
+    out[0][row, 0], out[0][row, 1], out[0][row, 2] = attitude
+    out[1][row] = work.temperature - 40.0
 
 
 @inner

@@ -33,8 +33,7 @@ def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running,
     loss = np.empty((rows, columns))
     sources = np.empty((1, rows, columns))
     heat_sources(grid, work, running, 1.0, sources[0], loss)
-    for j in range(columns):
-        temperature[0, j] = inlet
+    temperature[0] = inlet
     return march(grid, work, running, loss, fields, between(sources))
 
 
@@ -55,13 +54,7 @@ def heat_sources(
 @inner
 def between(sources: FloatArray) -> FloatArray:
     """What stations make, (m, nt + 1, nz + 1), as what is made between them, (m, nt, nz + 1)."""
-    count, rows, columns = sources.shape
-    made = np.empty((count, rows - 1, columns))
-    for m in range(count):
-        for i in range(rows - 1):
-            for j in range(columns):
-                made[m, i, j] = 0.5 * (sources[m, i, j] + sources[m, i + 1, j])
-    return made
+    return 0.5 * (sources[:, :-1] + sources[:, 1:])
 
 
 @compiled
@@ -143,12 +136,15 @@ def warm(
     Returns the largest change asked for [K], and the change of the film's force.
     """
     change = largest(asked.reshape(-1))
-    share = limits[0] * min(1.0, limits[1] / max(change, 1e-30))
-    for i in range(asked.shape[0]):
-        for j in range(asked.shape[1]):
-            work.temperature[i, j] += share * asked[i, j]
+    work.temperature[:] += limited_share(change, limits) * asked
     radial, tangential = pressure_change(grid, work, running.speed, running.oil, shift)
     return change, radial, tangential
+
+
+@inner
+def limited_share(change: float, limits: tuple[float, float]) -> float:
+    """Share of a change of temperature [K] that is made, of two limits: a share, and kelvins."""
+    return limits[0] * min(1.0, limits[1] / max(abs(change), 1e-30))
 
 
 @inner

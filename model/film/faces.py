@@ -38,12 +38,8 @@ def film_faces(grid: FilmGrid, work: FilmWork, wedge: Wedge, speed: float) -> Fa
 @inner
 def oil_flows(work: FilmWork) -> tuple[FloatArray, FloatArray]:
     """Density over viscosity [s/m^2], and what the journal drags along, density times drag [kg/m^3], (nodes,)."""
-    density, viscosity, drag = work.density.reshape(-1), work.viscosity.reshape(-1), work.drag.reshape(-1)
-    light, dragged = np.empty(len(density)), np.empty(len(density))
-    for n in range(len(density)):
-        light[n] = density[n] / viscosity[n]
-        dragged[n] = density[n] * drag[n]
-    return light, dragged
+    density = work.density.reshape(-1)
+    return density / work.viscosity.reshape(-1), density * work.drag.reshape(-1)
 
 
 @compiled

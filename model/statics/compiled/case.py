@@ -20,8 +20,6 @@ HEATING_STEP = 15.0
 #: would change them by this times `Setup.accuracy`, 3e-5 K as a rule. That is 1e-6 of the viscosity, and of that the
 #: step leaves a tenth.
 HEAT_PER_FORCE = 300.0
-#: Kelvins beyond which a film is no film: squares would overflow.
-BOUNDLESS = 1e30
 
 
 class Case(NamedTuple):

@@ -21,11 +21,12 @@ from model.compilation import compiled, inner
 from model.film.cross_energy import cross_operator
 from model.film.cross_film import CrossFilm, CrossOperator, cross_pressure_change, set_cross_viscosity
 from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
-from model.film.dense import product, times
+from model.film.dense import BOUNDLESS, product, times
+from model.film.energy import limited_share
 from model.film.models import TURBULENT
 from model.interpolation import largest
 from model.pad.bending import PadDeformation
-from model.statics.compiled.case import BOUNDLESS, HEATING_STEP, Problem
+from model.statics.compiled.case import HEATING_STEP, Problem
 from model.statics.compiled.heat import balance_heat, note_flows, note_heat
 from model.statics.compiled.stack import BACKFLOW, JOURNAL, grid_of, work_of
 from rigdata.arrays import FloatArray
@@ -116,7 +117,7 @@ def settle_cross_temperatures(problem: Problem, across: Across, relaxation: floa
     for m in range(n):
         pad = pads.each[m]
         hotter = inlets[m] - pad.inlet
-        pad.inlet += _limited_share(hotter, limits) * hotter
+        pad.inlet += limited_share(hotter, limits) * hotter
         change = note_heat(pad, abs(hotter), (0.0, 0.0), change)
         if pad.solved:
             grid, work, cross = grid_of(problem.grids, m), work_of(problem.works, m), _film(across.films, m)
@@ -143,16 +144,10 @@ def _warm(
     asked = fields[:, :, 0] + inlet * fields[:, :, 1] + journal * fields[:, :, 2] - cells
     face = faces[0] + inlet * faces[1] + journal * faces[2] - cross.face
     change = np.maximum(largest(asked.reshape(-1)), largest(face.reshape(-1)))
-    share = _limited_share(change, limits)
+    share = limited_share(change, limits)
     cells += share * asked
     cross.face[:] += share * face
     return change
-
-
-@inner
-def _limited_share(change: float, limits: tuple[float, float]) -> float:
-    """Share of a change of temperature that is made."""
-    return limits[0] * min(1.0, limits[1] / max(abs(change), 1e-30))
 
 
 @inner
@@ -185,8 +180,7 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
     if 0.0 < largest(missing.reshape(-1)) < BOUNDLESS:
         solved = (grid, work, cross.edges, conductivity)
         tolerance = _ROUGH_TOLERANCE if pad.heating > _ROUGH else _CONDUCTION_TOLERANCE
-        more = conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
-        taken[0] += more if math.isfinite(more) else 0.0
+        taken[0] += conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
     carried = operator.carried.reshape(-1)
     for q in range(3):
         outlet[q] = product(carried, fields[-1, :, q]) / product(carried, np.ones(len(carried)))

@@ -19,13 +19,13 @@ import math
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.dense import product, residual, solve, times
+from model.film.dense import BOUNDLESS, gmres, product, solve, times
 from model.film.energy import between, heat_sources, heat_step, march, warm
 from model.film.mesh import FilmGrid
 from model.film.oil_state import edge_flows
 from model.film.resting import resting_film
 from model.interpolation import largest
-from model.statics.compiled.case import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Problem, rigid_approach
+from model.statics.compiled.case import HEAT_PER_FORCE, HEATING_STEP, Problem, rigid_approach
 from model.statics.compiled.stack import BACKFLOW, JOURNAL, BodyStack, grid_of, work_of
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 
@@ -33,7 +33,6 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 _NUSSELT = 3.0
 #: Conduction is solved to this share in every step of the equilibrium; what is left contracts with the rest.
 _CONDUCTION_TOLERANCE = 0.01
-_KRYLOV_STEPS = 12
 #: Share of the oil in the grooves that is fresh after a turn, at least.
 _LEAST_FRESH = 1e-3
 
@@ -175,9 +174,10 @@ def _conduct(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, fiel
     missing = -temperature
     for k in range(len(answers)):
         missing += hot[k] * answers[k]
-    missing = temperature + _krylov(bodies, problem, m, loss, missing)
+    held = (bodies, problem, m, loss)
+    missing = temperature + gmres(_cooled, held, missing, _CONDUCTION_TOLERANCE)
     for k in range(1, len(answers)):
-        answers[k] = _krylov(bodies, problem, m, loss, answers[k])
+        answers[k] = gmres(_cooled, held, answers[k], _CONDUCTION_TOLERANCE)
         missing -= hot[k] * answers[k]
     answers[0] = missing
 
@@ -191,30 +191,14 @@ def _into_pad(grid: FilmGrid, bodies: BodyStack, m: int, rise: FloatArray) -> Fl
 
 
 @inner
-def _krylov(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve (I + A^-1 F) T = T_alone, (nodes,), by GMRES; NaN where it grows beyond `BOUNDLESS`."""
+def _cooled(held: tuple[BodyStack, Problem, int, FloatArray], change: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A change of a film's temperature (nodes,), and A^-1 F added to it: what it would be if the pad took nothing."""
+    bodies, problem, m, loss = held
     grid, work = grid_of(problem.grids, m), work_of(problem.works, m)
-    size = math.sqrt(product(right, right))
-    answer, left, length = np.zeros(len(right)), right.copy(), size
-    steps = np.zeros((_KRYLOV_STEPS, len(right)))
-    images = np.zeros((_KRYLOV_STEPS, len(right)))
-    taken = np.zeros((1, loss.shape[0], loss.shape[1]))
-    fields = np.zeros((1, loss.shape[0], loss.shape[1]))
-    weights = np.zeros((_KRYLOV_STEPS, 1))
-    for k in range(_KRYLOV_STEPS):
-        if not length > (_CONDUCTION_TOLERANCE * size if k > 0 else 0.0):
-            break
-        steps[k] = left / length
-        taken[0] = -_into_pad(grid, bodies, m, steps[k])
-        march(grid, work, problem.case.running, loss, fields, between(taken))
-        images[k] = steps[k] - fields[0].reshape(-1)
-        if not product(images[k], images[k]) < BOUNDLESS:
-            answer[:] = math.nan
-            return answer
-        length = residual(images, k + 1, right, weights, left)
-    for k in range(_KRYLOV_STEPS):
-        answer += weights[k, 0] * steps[k]
-    return answer
+    taken, fields = np.empty((1, *loss.shape)), np.zeros((1, *loss.shape))
+    taken[0] = -_into_pad(grid, bodies, m, change)
+    march(grid, work, problem.case.running, loss, fields, between(taken))
+    return change, change - fields[0].reshape(-1)
 
 
 @compiled

@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from model.compilation import inner
-from model.film.dense import product
+from model.film.dense import BOUNDLESS, product
 from model.film.models import solve_by
 from model.film.oil_state import least_share, set_viscosity
 from model.statics.compiled.bending import axial_shape, bend_pads, change_shape
-from model.statics.compiled.case import ACROSS, BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Problem, along, rigid_approach
+from model.statics.compiled.case import ACROSS, HEAT_PER_FORCE, HEATING_STEP, Problem, along, rigid_approach
 from model.statics.compiled.heat import rest_films
 from model.statics.compiled.place import let_idle, rescue
 from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, grid_of, work_of
