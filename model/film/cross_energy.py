@@ -51,7 +51,9 @@ def cross_operator(
     for i in range(nt):
         for j in range(lines):
             _shared_flow(film, speed, i, j, flows[i, j])
-    space, made = _space(lines, cells), np.zeros((nt + 1, n))
+    shape, made = (lines, cells), np.zeros((nt + 1, n))
+    over = np.zeros((lines, cells + 1)), np.zeros((lines + 1, cells))
+    space = _Space(*over, np.zeros((4, *shape)), np.zeros(shape), np.zeros(shape))
     for i in range(nt + 1):
         _dissipation(film, speed, i, made[i])
     for i in range(nt):
@@ -64,9 +66,7 @@ def cross_operator(
         dissipation[i] = 0.5 * heat[2] * (made[i] + made[i + 1])
         _make_less(cross.temperature[i + 1], heat[4], dissipation[i], factor[i])
         factorise_general(factor[i])
-    for j in range(lines):
-        for m in range(cells):
-            carried[j, m] = heat[0] * max(flows[nt - 1, j, m], 0.0)
+    carried[:] = heat[0] * np.maximum(flows[-1], 0.0)
     return _flow_back(grid, work, speed, flows[0])
 
 
@@ -155,18 +155,6 @@ class _Space(NamedTuple):
     coupling: FloatArray  #: (4, ..): To the cells below and above, the lines before and after [W/K].
     carried: FloatArray  #: Along [W/K].
     theta: FloatArray  #: The later station's share in the exchange.
-
-
-@inner
-def _space(lines: int, cells: int) -> _Space:
-    shape = (lines, cells)
-    return _Space(
-        np.zeros((lines, cells + 1)),
-        np.zeros((lines + 1, cells)),
-        np.zeros((4, lines, cells)),
-        np.zeros(shape),
-        np.zeros(shape),
-    )
 
 
 @inner

@@ -57,10 +57,16 @@ class Problem(NamedTuple):
 @inner
 def rigid_approach(pad: np.record, position: FloatArray) -> float:
     """Approach of a film if its pivot were rigid [m]."""
-    return pad.preload + pad.frame[0, 0] * position[0] + pad.frame[0, 1] * position[1]
+    return pad.preload + towards(pad, position)
 
 
 @inner
-def along(pad: np.record, position: FloatArray) -> float:
-    """Journal's place across the pivot line [m]."""
-    return pad.frame[1, 0] * position[0] + pad.frame[1, 1] * position[1]
+def towards(pad: np.record, move: FloatArray) -> float:
+    """A move of the journal along the pivot line [m]."""
+    return pad.frame[0, 0] * move[0] + pad.frame[0, 1] * move[1]
+
+
+@inner
+def along(pad: np.record, move: FloatArray) -> float:
+    """A move of the journal across the pivot line [m]."""
+    return pad.frame[1, 0] * move[0] + pad.frame[1, 1] * move[1]

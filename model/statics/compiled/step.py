@@ -9,7 +9,7 @@ from model.film.dense import BOUNDLESS, product
 from model.film.models import solve_by
 from model.film.oil_state import least_share, set_viscosity
 from model.statics.compiled.bending import axial_shape, bend_pads, change_shape
-from model.statics.compiled.case import ACROSS, HEAT_PER_FORCE, HEATING_STEP, Problem, along, rigid_approach
+from model.statics.compiled.case import ACROSS, HEAT_PER_FORCE, HEATING_STEP, Problem, along, rigid_approach, towards
 from model.statics.compiled.heat import rest_films
 from model.statics.compiled.place import let_idle, rescue
 from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, grid_of, work_of
@@ -93,12 +93,12 @@ def move(problem: Problem, shift: FloatArray, damping: float) -> bool:
     moves = np.zeros((len(pads.each), 3))
     length = max(math.hypot(shift[0], shift[1]), 1e-30)
     for m in range(len(pads.each)):
-        pad, frame = pads.each[m], pads.each[m].frame
+        pad = pads.each[m]
         scale = min(scale, _LONGEST_STEP * pad.clearance / length)
         moves[m, 0], moves[m, 1] = pad.moves[0], pad.moves[1]
         if pad.solved:
-            da = frame[0, 0] * shift[0] + frame[0, 1] * shift[1] - moves[m, 1] + closing
-            db = frame[1, 0] * shift[0] + frame[1, 1] * shift[1] + pad.pivot_radius * moves[m, 0]
+            da = towards(pad, shift) - moves[m, 1] + closing
+            db = along(pad, shift) + pad.pivot_radius * moves[m, 0]
             if state.bent.size > 0:
                 moves[m, 2] = change_shape(problem.bodies, problem, m, da, db)
                 extra = state.mismatch[m] + moves[m, 2] * axial_shape(grid_of(grids, m))
