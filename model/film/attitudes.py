@@ -55,35 +55,22 @@ class Attitudes(NamedTuple):
     rise: FloatArray  #: (n, rows, columns): Temperature above the inlet [K].
 
 
-class Heat(NamedTuple):
-    """What heats a film of clearance 1, speed 1 and inlet viscosity 1."""
-
-    exponent: float  #: kappa [1/K]
-    expansion: float  #: alpha_v at the inlet [1/K]
-    capacity: float  #: rho c Cp^2 / (mu U) [1/K, per metre]
-    conduction: float  #: k Cp^2 / (mu U^2) [1/K]
-
-
-ISOTHERMAL = Heat(0.0, 0.0, math.inf, 0.0)
-
-
 def attitudes(grid: FilmGrid, clearance: float, running: Running, inlet: float, load: float) -> Attitudes:
     """The curve of a film, as deep as a load [N] asks for; an infinite heat capacity: isothermal."""
     oil, (specific, conductivity) = running.oil, running.heat
     viscosity = oil[0] * math.exp(oil[1] * (40.0 - inlet))
     density = oil[2] * (1.0 + oil[3] * (40.0 - inlet))
-    heat = ISOTHERMAL
+    alone = Running(1.0, (1.0, 0.0, 1.0, 0.0), (math.inf, 0.0))
     size = viscosity * running.speed / clearance**2
     if math.isfinite(specific):
-        capacity = _rounded(density * specific / size)
-        conduction = _rounded(conductivity / (size * running.speed))
-        heat = Heat(oil[1], oil[3] * oil[2] / density, capacity, conduction)
+        heat = _rounded(density * specific / size), _rounded(conductivity / (size * running.speed))
+        alone = Running(1.0, (1.0, oil[1], 1.0, oil[3] * oil[2] / density), heat)
     radius = float(grid.dx * (len(grid.angle) - 1) / (grid.angle[-1] - grid.angle[0]))
     length = 2.0 * float(grid.z[-1])
     deepest = load / (size * radius**2 * length)
     depth = 4.0 ** math.ceil(math.log(max(deepest, 1e-3), 4.0))
     ends = round(float(grid.angle[0]), 12), round(float(grid.angle[-1]), 12)
-    return _attitudes(ends, round(radius, 12), round(length, 12), heat, depth)
+    return _attitudes(ends, round(radius, 12), round(length, 12), alone, depth)
 
 
 def _rounded(value: float) -> float:
@@ -91,16 +78,13 @@ def _rounded(value: float) -> float:
 
 
 @lru_cache(maxsize=256)
-def _attitudes(ends: tuple[float, float], radius: float, length: float, heat: Heat, depth: float) -> Attitudes:
+def _attitudes(ends: tuple[float, float], radius: float, length: float, running: Running, depth: float) -> Attitudes:
     """Solve the attitudes of a film between two angles from the pivot; none if it never carries."""
     grid = film_grid(*ends, radius, length, _MESH, True)
     work = film_work(grid, 40.0)
-    isothermal = math.isinf(heat.capacity)
-    oil = (1.0, heat.exponent, 1.0, heat.expansion)
-    running = Running(1.0, oil, (1.0 if isothermal else heat.capacity, heat.conduction))
     numbers = np.zeros((2 * _ROWS, 3))
     rises = np.zeros((2 * _ROWS, *work.temperature.shape))
-    low, high = walk(grid, work, running, (isothermal, depth * radius**2 * length), (numbers, rises))
+    low, high = walk(grid, work, running, depth * radius**2 * length, (numbers, rises))
     if high - low < 3:
         nothing = np.zeros(1)
         return Attitudes(nothing, nothing, nothing, np.zeros((1, *work.temperature.shape)))
@@ -153,21 +137,20 @@ def walk(
     grid: FilmGrid,
     work: FilmWork,
     running: Running,
-    limits: tuple[bool, float],
+    depth: float,
     out: tuple[FloatArray, FloatArray],
 ) -> tuple[int, int]:
     """Fill rows (A, B, W) and temperature rises, from the middle on flatter and deeper; first row and end.
 
-    `limits`: whether the film is isothermal, the largest load.
+    `depth`: the largest load.
     """
     numbers, rises = out
-    isothermal, depth = limits
     middle, ahead = numbers.shape[0] // 2, grid.angle[0]
     if not grid.angle[-1] > 0.0 or not ahead < 0.0:
         return middle, middle
     first = _FIRST / np.sin(grid.angle[-1])
     curvature = max(2.0 * (_OPENS + first * ahead) / ahead**2, -0.75)
-    found, curvature, load = _balance(grid, work, running, isothermal, curvature, first)
+    found, curvature, load = _balance(grid, work, running, curvature, first)
     if not found or not load > 0.0:
         return middle, middle
     _keep(work, out, middle, (curvature, first, load))
@@ -181,7 +164,7 @@ def walk(
         known = low if high - low > 3 else low - 1
         curvature = _ahead(work, out, wedge, (known, min(low + 3, high), low))
         work.ruptured[:] = False
-        found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
+        found, curvature, load = _balance(grid, work, running, curvature, wedge)
         if found and load > 0.0:
             low -= 1
             _keep(work, out, low, (curvature, wedge, load))
@@ -195,7 +178,7 @@ def walk(
             break
         wedge = numbers[before, 1] * _DEEPER
         curvature = _ahead(work, out, wedge, (max(high - 3, low), high, before))
-        found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
+        found, curvature, load = _balance(grid, work, running, curvature, wedge)
         if not found or not load > 0.0:
             break
         _keep(work, out, high, (curvature, wedge, load))
@@ -226,7 +209,7 @@ def _keep(work: FilmWork, out: tuple[FloatArray, FloatArray], row: int, attitude
 
 @inner
 def _balance(
-    grid: FilmGrid, work: FilmWork, running: Running, isothermal: bool, curvature: float, wedge: float
+    grid: FilmGrid, work: FilmWork, running: Running, curvature: float, wedge: float
 ) -> tuple[bool, float, float]:
     """A at which the heated film has no moment, and its load: more A takes the pressure upstream."""
     shift = np.empty(work.unknown.shape[0])
@@ -239,7 +222,7 @@ def _balance(
             curvature, last = 1.5 * curvature + 0.2, 0.0
             continue
         moment, load, warmer, hottest = forces.force[1], forces.force[0], 0.0, 0.0
-        if not isothermal:
+        if math.isfinite(running.heat[0]):
             warmer, _, radial, tangential = heat_step(grid, work, running, (40.0, 1.0, 30.0), shift)
             moment = moment + tangential
             load = load + radial

@@ -26,9 +26,9 @@ from model.film.energy import limited_share
 from model.film.models import TURBULENT
 from model.interpolation import largest
 from model.pad.bending import PadDeformation
-from model.statics.compiled.case import HEATING_STEP, Problem
+from model.statics.compiled.case import HEATING_STEP, Problem, film_of
 from model.statics.compiled.heat import balance_heat, note_flows, note_heat
-from model.statics.compiled.stack import BACKFLOW, JOURNAL, grid_of, work_of
+from model.statics.compiled.stack import BACKFLOW, JOURNAL
 from rigdata.arrays import FloatArray
 
 #: What a pad conducts is solved to this share in every step; what is left contracts with the rest.
@@ -96,7 +96,7 @@ def set_cross_viscosities(problem: Problem, across: Across) -> None:
         turbulent = (running.speed, running.heat[0] / max(running.heat[1], 1e-9))
     for m in range(len(problem.pads.each)):
         if not problem.pads.each[m].idle:
-            set_cross_viscosity(_film(across.films, m), work_of(problem.works, m), running.oil, turbulent)
+            set_cross_viscosity(_film(across.films, m), film_of(problem, m)[1], running.oil, turbulent)
 
 
 @compiled
@@ -120,7 +120,7 @@ def settle_cross_temperatures(problem: Problem, across: Across, relaxation: floa
         pad.inlet += limited_share(hotter, limits) * hotter
         change = note_heat(pad, abs(hotter), (0.0, 0.0), change)
         if pad.solved:
-            grid, work, cross = grid_of(problem.grids, m), work_of(problem.works, m), _film(across.films, m)
+            (grid, work), cross = film_of(problem, m), _film(across.films, m)
             running, weights = case.running, (inlets[m], journal)
             asked = _warm(cross, across.fields[m], across.faces[m], weights, limits)
             across.outlet[m] = outlets[m, 0] + outlets[m, 1] * inlets[m] + outlets[m, 2] * journal
@@ -157,7 +157,7 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
     Of cells and faces; of the oil at the trailing edge (3,) [degC], and what the journal takes (3,) [W]. Which share of
     the oil runs back where it enters is noted in the figures.
     """
-    grid, work, cross = grid_of(problem.grids, m), work_of(problem.works, m), _film(across.films, m)
+    (grid, work), cross = film_of(problem, m), _film(across.films, m)
     pad, state, case = problem.pads.each[m], problem.state, problem.case
     bodies, operator = problem.bodies, across.operator
     assert bodies is not None

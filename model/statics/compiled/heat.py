@@ -25,8 +25,8 @@ from model.film.mesh import FilmGrid
 from model.film.oil_state import edge_flows
 from model.film.resting import resting_film
 from model.interpolation import largest
-from model.statics.compiled.case import HEAT_PER_FORCE, HEATING_STEP, Problem, rigid_approach
-from model.statics.compiled.stack import BACKFLOW, JOURNAL, BodyStack, grid_of, work_of
+from model.statics.compiled.case import HEAT_PER_FORCE, HEATING_STEP, Problem, film_of
+from model.statics.compiled.stack import BACKFLOW, JOURNAL, BodyStack, grid_of, rigid_approach
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 
 #: q h / k (T_mean - T_wall) of a parabolic profile, flat at the other wall.
@@ -40,13 +40,13 @@ _LEAST_FRESH = 1e-3
 @inner
 def heat_films(problem: Problem, relaxation: float) -> float:
     """Temperatures of the films that carry, each for itself; returns the largest change asked for [K]."""
-    grids, _, pads, works, state, case = problem
-    change = 0.0
-    for m in range(len(pads.each)):
-        pad = pads.each[m]
+    state, change = problem.state, 0.0
+    for m in range(len(problem.pads.each)):
+        pad = problem.pads.each[m]
         if pad.solved:
+            grid, work = film_of(problem, m)
             thermal = (pad.inlet, relaxation, HEATING_STEP)
-            found = heat_step(grid_of(grids, m), work_of(works, m), case.running, thermal, state.shift[m])
+            found = heat_step(grid, work, problem.case.running, thermal, state.shift[m])
             state.figures[BACKFLOW] = max(state.figures[BACKFLOW], found[1])
             change = note_heat(pad, found[0], found[2:], change)
     return change
@@ -76,7 +76,7 @@ def rest_films(problem: Problem) -> None:
 @inner
 def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> float:
     """Temperatures of all films, the inlets and the journal for their present flows; returns the largest change [K]."""
-    grids, _, pads, works, state, case = problem
+    pads, works, state, case = problem.pads, problem.works, problem.state, problem.case
     n, fields = len(pads.each), 3 if case.journal else 2
     answers = np.zeros((n, fields, works.temperature.shape[1], works.temperature.shape[2]))
     flows = np.empty((n, 2))
@@ -101,8 +101,8 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
         asked = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
         if case.journal:
             asked += journal * answers[m, 2]
-        limits = (relaxation, HEATING_STEP)
-        found = warm(grid_of(grids, m), work_of(works, m), case.running, asked, limits, state.shift[m])
+        (grid, work), limits = film_of(problem, m), (relaxation, HEATING_STEP)
+        found = warm(grid, work, case.running, asked, limits, state.shift[m])
         change = note_heat(pad, found[0], found[1:], change)
     if case.journal:
         state.figures[JOURNAL] = journal
@@ -114,7 +114,8 @@ def note_flows(problem: Problem, m: int, supplied: float, flows: FloatArray, out
     """Set a pad's flows over its leading and trailing edge [kg/s]; an idle one passes its inlet on, somewhat warmer."""
     pad = problem.pads.each[m]
     if pad.solved:
-        entering, sides = edge_flows(grid_of(problem.grids, m), work_of(problem.works, m), supplied)
+        grid, work = film_of(problem, m)
+        entering, sides = edge_flows(grid, work, supplied)
         flows[0], flows[1] = entering, entering - sides
     else:
         flows[:] = pad.resting[1]
@@ -131,8 +132,7 @@ def _answer(
 
     A hotter film makes less heat: that counts as a loss, beside what the journal takes.
     """
-    grid = grid_of(problem.grids, m)
-    work = work_of(problem.works, m)
+    grid, work = film_of(problem, m)
     case = problem.case
     figures = problem.state.figures
     sources, loss = np.zeros(fields.shape), np.empty(work.temperature.shape)
@@ -194,7 +194,7 @@ def _into_pad(grid: FilmGrid, bodies: BodyStack, m: int, rise: FloatArray) -> Fl
 def _cooled(held: tuple[BodyStack, Problem, int, FloatArray], change: FloatArray) -> tuple[FloatArray, FloatArray]:
     """A change of a film's temperature (nodes,), and A^-1 F added to it: what it would be if the pad took nothing."""
     bodies, problem, m, loss = held
-    grid, work = grid_of(problem.grids, m), work_of(problem.works, m)
+    grid, work = film_of(problem, m)
     taken, fields = np.empty((1, *loss.shape)), np.zeros((1, *loss.shape))
     taken[0] = -_into_pad(grid, bodies, m, change)
     march(grid, work, problem.case.running, loss, fields, between(taken))

@@ -8,8 +8,8 @@ from model.compilation import compiled, inner
 from model.film.mesh import FilmWork
 from model.interpolation import row_below
 from model.pad.pivot import compliance
-from model.statics.compiled.case import ALONE, COUPLED, Case, along, rigid_approach
-from model.statics.compiled.stack import work_of
+from model.statics.compiled.case import ALONE, COUPLED, Case
+from model.statics.compiled.stack import along, rigid_approach, work_of
 from model.tilt_hold import held_moment
 from rigdata.arrays import BoolArray, FloatArray
 

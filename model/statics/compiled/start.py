@@ -16,7 +16,7 @@ from model.compilation import compiled, inner
 from model.film.dense import product, solve
 from model.interpolation import row_below
 from model.pad.pivot import deflection
-from model.statics.compiled.case import rigid_approach
+from model.statics.compiled.stack import rigid_approach
 from rigdata.arrays import BoolArray, FloatArray
 
 #: Share of the clearance over which a curve falls to 1/e beyond its fold.
