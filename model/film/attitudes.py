@@ -21,7 +21,7 @@ from model.film.energy import heat_step
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.oil_state import Running, set_viscosity
 from model.film.reynolds import FilmForces, solve_film
-from model.interpolation import largest
+from model.interpolation import lagrange, largest
 from rigdata.arrays import FloatArray
 
 _MESH = (20, 4)
@@ -111,25 +111,14 @@ def points_between(rows: FloatArray, rises: FloatArray) -> tuple[FloatArray, Flo
         first = min(max(row - 1, 0), last + 1 - count)
         place = logarithms[row, 0] + share * (logarithms[min(row + 1, last), 0] - logarithms[row, 0])
         points[1, p], power = np.exp(place), 0.0
-        by_wedge = _weights(rows[first : first + count, 1], points[1, p])
-        by_power = _weights(logarithms[first : first + count, 0], place)
+        by_wedge = lagrange(rows[first : first + count, 1], points[1, p])
+        by_power = lagrange(logarithms[first : first + count, 0], place)
         for k in range(count):
             points[0, p] += by_wedge[k] * rows[first + k, 0]
             power += by_power[k] * logarithms[first + k, 1]
             warm[p] += by_wedge[k] * rises[first + k]
         points[0, p], points[2, p] = max(points[0, p], _FARTHEST), np.exp(power)
     return points, warm
-
-
-@inner
-def _weights(places: FloatArray, place: float) -> FloatArray:
-    """Of values at places, (n,), in the polynomial through them, elsewhere (Lagrange)."""
-    weights = np.ones(len(places))
-    for k in range(len(places)):
-        for j in range(len(places)):
-            if j != k:
-                weights[k] *= (place - places[j]) / (places[k] - places[j])
-    return weights
 
 
 @compiled
@@ -150,10 +139,8 @@ def walk(
         return middle, middle
     first = _FIRST / np.sin(grid.angle[-1])
     curvature = max(2.0 * (_OPENS + first * ahead) / ahead**2, -0.75)
-    found, curvature, load = _balance(grid, work, running, curvature, first)
-    if not found or not load > 0.0:
+    if not _fill(grid, work, running, out, middle, (curvature, first)):
         return middle, middle
-    _keep(work, out, middle, (curvature, first, load))
     low, high = middle, middle + 1
     flatter = _FLATTER
     while low > 0 and flatter < _LEAST_STEP and numbers[low, 0] != _FARTHEST:
@@ -164,24 +151,17 @@ def walk(
         known = low if high - low > 3 else low - 1
         curvature = _ahead(work, out, wedge, (known, min(low + 3, high), low))
         work.ruptured[:] = False
-        found, curvature, load = _balance(grid, work, running, curvature, wedge)
-        if found and load > 0.0:
+        if _fill(grid, work, running, out, low - 1, (curvature, wedge)):
             low -= 1
-            _keep(work, out, low, (curvature, wedge, load))
         else:
             flatter = np.sqrt(flatter)
     work.ruptured[:] = False
-    while high < numbers.shape[0]:
-        before = high - 1
-        hottest = largest(rises[before].reshape(-1))
-        if numbers[before, 2] > depth or numbers[before, 0] > _DEEPEST or hottest > _HOTTEST:
+    while high < len(numbers) and numbers[high - 1, 2] <= depth and numbers[high - 1, 0] <= _DEEPEST:
+        wedge = numbers[high - 1, 1] * _DEEPER
+        curvature = _ahead(work, out, wedge, (max(high - 3, low), high, high - 1))
+        hottest = largest(rises[high - 1].reshape(-1))
+        if hottest > _HOTTEST or not _fill(grid, work, running, out, high, (curvature, wedge)):
             break
-        wedge = numbers[before, 1] * _DEEPER
-        curvature = _ahead(work, out, wedge, (max(high - 3, low), high, before))
-        found, curvature, load = _balance(grid, work, running, curvature, wedge)
-        if not found or not load > 0.0:
-            break
-        _keep(work, out, high, (curvature, wedge, load))
         high += 1
     return low, high
 
@@ -191,7 +171,7 @@ def _ahead(work: FilmWork, out: tuple[FloatArray, FloatArray], wedge: float, row
     """Curvature at a wedge, and temperatures into `work`, as rows head: from the first on, to an end; the nearest."""
     numbers, rises = out
     first, end, nearest = rows
-    weights, curvature, rise = _weights(numbers[first:end, 1], wedge), 0.0, np.zeros(work.temperature.shape)
+    weights, curvature, rise = lagrange(numbers[first:end, 1], wedge), 0.0, np.zeros(work.temperature.shape)
     for k in range(len(weights)):
         curvature += weights[k] * numbers[first + k, 0]
         rise += weights[k] * rises[first + k]
@@ -202,9 +182,22 @@ def _ahead(work: FilmWork, out: tuple[FloatArray, FloatArray], wedge: float, row
 
 
 @inner
-def _keep(work: FilmWork, out: tuple[FloatArray, FloatArray], row: int, attitude: tuple[float, float, float]) -> None:
-    out[0][row, 0], out[0][row, 1], out[0][row, 2] = attitude
-    out[1][row] = work.temperature - 40.0
+def _fill(
+    grid: FilmGrid,
+    work: FilmWork,
+    running: Running,
+    out: tuple[FloatArray, FloatArray],
+    row: int,
+    start: tuple[float, float],
+) -> bool:
+    """Fill a row from a start (A, B); False where nothing balances at that wedge, or carries nothing."""
+    (numbers, rises), (curvature, wedge) = out, start
+    found, curvature, load = _balance(grid, work, running, curvature, wedge)
+    if not found or not load > 0.0:
+        return False
+    numbers[row, 0], numbers[row, 1], numbers[row, 2] = curvature, wedge, load
+    rises[row] = work.temperature - 40.0
+    return True
 
 
 @inner

@@ -69,7 +69,7 @@ def heat_impedance(
             march(grid, work, running, loss, fields, _gain(film, thicker, warmer, pressure))
             asked, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
             warmer = fields[0]
-            _pressure(film, 0.0 * thicker, warmer, nothing, omega, answer)
+            _pressure(film, warmer, omega, answer)
             if asked < settled * size:
                 ended = True
                 break
@@ -80,12 +80,10 @@ def heat_impedance(
 
 
 @inner
-def _pressure(
-    film: _Film, thicker: FloatArray, warmer: ComplexArray, pressure: ComplexArray, omega: float, answer: ComplexArray
-) -> None:
+def _pressure(film: _Film, warmer: ComplexArray, omega: float, answer: ComplexArray) -> None:
     """Change of pressure by a change of temperature, into `answer` (unknowns,)."""
     grid, work, oil = film.grid, film.work, film.running.oil
-    net_inflow(grid, _flows(film, thicker, warmer, pressure), answer)
+    net_inflow(grid, _flows(film, None, warmer, 0.0 * warmer), answer)
     by_heat = 1j * omega * oil[2] * oil[3]
     for k in range(len(answer)):
         i, j = divmod(grid.node[k], grid.steps[0])
@@ -95,7 +93,7 @@ def _pressure(
 
 
 @inner
-def _flows(film: _Film, thicker: FloatArray, warmer: ComplexArray, pressure: ComplexArray) -> ComplexArray:
+def _flows(film: _Film, thicker: FloatArray | None, warmer: ComplexArray, pressure: ComplexArray) -> ComplexArray:
     """Change of the mass flows through the faces, (2, nodes) [kg/s/m]."""
     grid, work, oil, p = film.grid, film.work, film.running.oil, pressure.reshape(-1)
     denser = -oil[2] * oil[3] * warmer

@@ -155,8 +155,7 @@ def _answer(
     weight[-1] *= 0.5
     for k in range(len(fields)):
         outlet[k] = product(fields[k, -1], flow) / product(np.ones(len(flow)), flow)
-        if case.journal:
-            taken[k] = product(weight.reshape(-1), fields[k].reshape(-1))
+        taken[k] = product(weight.reshape(-1), fields[k].reshape(-1))
     taken[2] -= product(np.ones(weight.size), weight.reshape(-1))
 
 
