@@ -10,6 +10,7 @@ from model.film.dense import gmres, times
 from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
+_Three = tuple[float, float, float]
 #: A film, the edges of its cells and the oil's conductivity.
 _Solved = tuple[FilmGrid, FilmWork, FloatArray, float]
 
@@ -29,30 +30,35 @@ def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray
         band, before, journal = operator.factor[i], operator.before[i], operator.journal[i]
         old, new = fields[i], fields[i + 1]
         for k in range(n):
-            weight = before[k, 0]
-            a, b, c = weight * old[k, 0] + sources[i, k], weight * old[k, 1], weight * old[k, 2]
+            beside = 0.0  # a journal that is a kelvin warm for the third field
+            if (k + 1) % cells == 0:
+                beside = journal[k // cells, 0] + journal[k // cells, 1]
+            values = _plus((sources[i, k], 0.0, beside), before[k, 0], old, k)
             for side in range(4):
                 step = (1 if side < 2 else cells) * (2 * (side % 2) - 1)
-                weight, r = before[k, 1 + side], min(max(k + step, 0), n - 1)
-                a, b, c = a + weight * old[r, 0], b + weight * old[r, 1], c + weight * old[r, 2]
-            if (k + 1) % cells == 0:  # beside a journal that is a kelvin warm for the third field
-                c += journal[k // cells, 0] + journal[k // cells, 1]
+                values = _plus(values, before[k, 1 + side], old, min(max(k + step, 0), n - 1))
             for s in range(min(cells, k), 0, -1):
-                weight, r = band[k, cells - s], k - s
-                a, b, c = a - weight * new[r, 0], b - weight * new[r, 1], c - weight * new[r, 2]
-            new[k, 0], new[k, 1], new[k, 2] = a, b, c
+                values = _plus(values, -band[k, cells - s], new, k - s)
+            new[k, 0], new[k, 1], new[k, 2] = values
         for k in range(n - 1, -1, -1):
-            a, b, c = new[k, 0], new[k, 1], new[k, 2]
+            values = (new[k, 0], new[k, 1], new[k, 2])
             for s in range(min(cells, n - 1 - k), 0, -1):
-                weight, r = band[k, cells + s], k + s
-                a, b, c = a - weight * new[r, 0], b - weight * new[r, 1], c - weight * new[r, 2]
-            new[k, 0], new[k, 1], new[k, 2] = a * band[k, cells], b * band[k, cells], c * band[k, cells]
+                values = _plus(values, -band[k, cells + s], new, k + s)
+            for q in range(3):
+                new[k, q] = values[q] * band[k, cells]
         for j in range(lines):
             k = j * cells + cells - 1
             for q in range(3):
                 heat_flow[q] += journal[j, 0] * old[k, q] + journal[j, 1] * new[k, q]
             heat_flow[2] -= journal[j, 0] + journal[j, 1]
     return heat_flow
+
+
+@inner
+def _plus(values: _Three, weight: float, fields: FloatArray, row: int) -> _Three:
+    """Three values and a row of the fields, weighted."""
+    a, b, c = values
+    return a + weight * fields[row, 0], b + weight * fields[row, 1], c + weight * fields[row, 2]
 
 
 @compiled
