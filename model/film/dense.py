@@ -16,30 +16,27 @@ BOUNDLESS = 1e30
 
 @inner
 def solve(matrix: FloatArray, right: FloatArray) -> None:
-    """Gauss' elimination with the largest pivot of each column; the solutions replace the right-hand sides (n, q)."""
-    n = len(matrix)
+    """Gauss' elimination with the largest pivot of each column; the solutions replace the right-hand sides (.., q)."""
+    n, count = len(matrix), right.shape[1]
+    system = np.empty((n, n + count))
+    system[:, :n], system[:, n:] = matrix, right[:n]
     for k in range(n):
         best = k
         for i in range(k + 1, n):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
+            if abs(system[i, k]) > abs(system[best, k]):
                 best = i
-        if best != k:
-            for j in range(n):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-            for j in range(right.shape[1]):
-                right[k, j], right[best, j] = right[best, j], right[k, j]
+        for j in range(k, n + count):
+            system[k, j], system[best, j] = system[best, j], system[k, j]
         for i in range(k + 1, n):
-            factor = matrix[i, k] / matrix[k, k]
-            for j in range(k, n):
-                matrix[i, j] -= factor * matrix[k, j]
-            for j in range(right.shape[1]):
-                right[i, j] -= factor * right[k, j]
+            factor = system[i, k] / system[k, k]
+            for j in range(k, n + count):
+                system[i, j] -= factor * system[k, j]
     for k in range(n - 1, -1, -1):
-        for j in range(right.shape[1]):
-            total = right[k, j]
+        for j in range(count):
+            total = system[k, n + j]
             for i in range(k + 1, n):
-                total -= matrix[k, i] * right[i, j]
-            right[k, j] = total / matrix[k, k]
+                total -= system[k, i] * right[i, j]
+            right[k, j] = total / system[k, k]
 
 
 @inner

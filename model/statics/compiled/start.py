@@ -135,22 +135,19 @@ def stand_on_curves(load: FloatArray, pads: np.ndarray, loaded: BoolArray, posit
         pad = pads[m]
         least = min(least, pad.clearance)
         if loaded[m]:
-            last = pad.rows - 1
+            last, largest = pad.rows - 1, max(largest, _pushes(pad, position)[0])
             room = min(room, pad.attitudes[1, last] - pad.preload)
             stiff = max(stiff, pad.attitudes[3, last] / pad.clearance)
     if math.isinf(room):
         return False
     room = max(room, 0.05 * least)
     size = math.hypot(load[0], load[1])
-    if position[0] == 0.0 and position[1] == 0.0 and size > 0.0:
-        position[:] = 0.4 * room / size * load
+    if size == 0.0:
+        size = largest
+    if position[0] == 0.0 and position[1] == 0.0:
+        position[:] = 0.4 * room / max(size, 1e-30) * load
     slopes, step = np.empty((2, 2)), np.empty((2, 1))
     missing = _missing(load, pads, loaded, position, slopes)
-    if size == 0.0:
-        for m in range(len(loaded)):
-            if loaded[m]:
-                largest = max(largest, _pushes(pads[m], position)[0])
-        size = largest
     for _ in range(60):
         if math.hypot(missing[0], missing[1]) < _GOOD_ENOUGH * size:
             return True
