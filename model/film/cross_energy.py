@@ -185,14 +185,11 @@ def _box(
         for m in range(cells):
             wide = edges[m + 1] - edges[m]
             carried[j, m] = specific * max(flows[i, j, m], least * wide)
-            if m > 0:
-                pass_on = station / (resists[m] + resists[m - 1])
-                low[j, m] = max(pass_on + 0.5 * specific * up[j, m], max(0.0, specific * up[j, m]))
+            high[j, m] = heat[3] * station / resists[m]
             if m < cells - 1:
-                pass_on = station / (resists[m + 1] + resists[m])
-                high[j, m] = max(pass_on - 0.5 * specific * up[j, m + 1], max(0.0, -specific * up[j, m + 1]))
-            else:
-                high[j, m] = heat[3] * station / resists[m]
+                pass_on, rises = station / (resists[m + 1] + resists[m]), specific * up[j, m + 1]
+                low[j, m + 1] = max(pass_on + 0.5 * rises, rises, 0.0)
+                high[j, m] = max(pass_on - 0.5 * rises, -rises, 0.0)
             if j == lines - 1:  # the edge is upwind: what leaves takes its temperature along
                 first[j, m] = 0.5 * specific * max(sideways[j, m], 0.0)
             elif j > 0:

@@ -65,12 +65,12 @@ def march(grid: FilmGrid, work: FilmWork, running: Running, loss: Any, fields: A
     """
     specific, h, density = running.heat[0], work.thickness, work.density
     (count, rows, lines), limited = fields.shape, 0.0
-    lower, upper, main = np.zeros(lines), np.zeros(lines), np.zeros(lines, dtype=loss.dtype)
+    sides, main = np.zeros((2, lines)), np.zeros(lines, dtype=loss.dtype)
     rhs = np.zeros((lines, count), dtype=fields.dtype)
     for i in range(rows - 1):
-        _side_exchange(grid, work, running, i, lower, upper)
+        side_exchange(grid, running, i, (work.flow, h), work.flow, sides)
         for j in range(lines):
-            low, high, flow = lower[j], upper[j], work.flow[0, i * lines + j]
+            low, high, flow = sides[0, j], sides[1, j], work.flow[0, i * lines + j]
             dragged = h[i, j] * density[i, j] + h[i + 1, j] * density[i + 1, j]
             couette = 0.25 * running.speed * dragged * grid.height[j]
             if flow < _LEAST_FLOW * couette:
@@ -86,7 +86,7 @@ def march(grid: FilmGrid, work: FilmWork, running: Running, loss: Any, fields: A
                 if j < lines - 1:
                     value -= high * t[j + 1]
                 rhs[j, m] = value
-        tridiagonal(lower, main, upper, rhs)
+        tridiagonal(sides[0], main, sides[1], rhs)
         for m in range(count):
             for j in range(lines):
                 fields[m, i + 1, j] = rhs[j, m]
@@ -94,22 +94,27 @@ def march(grid: FilmGrid, work: FilmWork, running: Running, loss: Any, fields: A
 
 
 @inner
-def _side_exchange(
-    grid: FilmGrid, work: FilmWork, running: Running, i: int, lower: FloatArray, upper: FloatArray
+def side_exchange(
+    grid: FilmGrid, running: Running, i: int, carried: tuple[Any, FloatArray], steady: FloatArray, sides: Any
 ) -> None:
-    """Factors of (T[j-1] - T[j]) and (T[j+1] - T[j]) after station i; half of them act there, half at the next."""
-    h, lines = work.thickness, len(lower)
+    """Factors of (T[j-1] - T[j]) and (T[j+1] - T[j]) after station i, (2, lines); half of them act there, half beyond.
+
+    Linear in what is carried, mass flow (2, nodes) and thickness (nt + 1, nz + 1), real or complex; the sense of a
+    `steady` flow says whether oil enters at an edge.
+    """
+    (flow, h), (lower, upper), lines = carried, sides, sides.shape[1]
     for j in range(lines - 1):
         n = i * lines + j
-        aside = 0.25 * running.heat[0] * (work.flow[1, n] + work.flow[1, n + lines])
+        aside = 0.25 * running.heat[0] * (flow[1, n] + flow[1, n + lines])
         film = h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1]
         conducted = 0.25 * running.heat[1] * grid.dx / grid.dz[j] * film
         upper[j], lower[j + 1] = 0.5 * (aside - conducted), -0.5 * (aside + conducted)
         # the edges are upwind: what leaves takes its temperature along
+        leaves = steady[1, n] + steady[1, n + lines] > 0.0
         if j == lines - 2:
-            lower[j + 1] = -0.5 * max(aside, 0.0)
+            lower[j + 1] = -0.5 * aside if leaves else 0.0 * aside
         if j == 0 and grid.first == 1:
-            upper[j] = -0.5 * max(-aside, 0.0)
+            upper[j] = 0.0 * aside if leaves else 0.5 * aside
 
 
 @compiled

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.energy import dissipated, march, slope_products
+from model.film.energy import dissipated, march, side_exchange, slope_products
 from model.film.faces import conductances, net_inflow
 from model.film.matrix import substitute
 from model.film.mesh import FilmGrid, FilmWork, Wedge
@@ -112,33 +112,21 @@ def _gain(film: _Film, thicker: FloatArray, warmer: ComplexArray, pressure: Comp
     grid, work, t, heat = film.grid, film.work, film.work.temperature, film.running.heat
     nt, lines = t.shape[0] - 1, t.shape[1]
     gained = np.empty((1, nt, lines), dtype=np.complex128)
+    sides = np.zeros((2, lines), dtype=np.complex128)
     made = _made(film, thicker, pressure)
     flows = _flows(film, thicker, warmer, pressure)
     for i in range(nt):
+        side_exchange(grid, film.running, i, (flows, thicker), work.flow, sides)
+        both = t[i] + t[i + 1]
         for j in range(lines):
             value = 0.5 * (made[i, j] + made[i + 1, j])
             value -= heat[0] * flows[0, i * lines + j] * (t[i + 1, j] - t[i, j])
-            for side in range(-1, 2, 2):
-                line = j + side
-                if not 0 <= line < lines:
-                    continue
-                face = min(j, line)
-                n = i * lines + face
-                changed = side * 0.125 * heat[0] * (flows[1, n] + flows[1, n + lines])
-                if not _is_edge(grid, j, side):
-                    thick = thicker[i, j] + thicker[i + 1, j]
-                    changed -= 0.25 * heat[1] * grid.dx / grid.dz[face] * thick
-                elif not side * (work.flow[1, n] + work.flow[1, n + lines]) < 0.0:
-                    changed *= 0.0
-                value -= changed * (t[i + 1, line] - t[i + 1, j] + t[i, line] - t[i, j])
+            if j > 0:
+                value -= sides[0, j] * (both[j - 1] - both[j])
+            if j < lines - 1:
+                value -= sides[1, j] * (both[j + 1] - both[j])
             gained[0, i, j] = value
     return gained
-
-
-@inner
-def _is_edge(grid: FilmGrid, j: int, side: int) -> bool:
-    """Whether a line is an edge of the film, seen from its neighbour."""
-    return j == len(grid.dz) if side < 0 else (j == 0 and grid.first == 1)
 
 
 @inner
