@@ -51,7 +51,7 @@ class Attitudes(NamedTuple):
 
     curvature: FloatArray  #: (n,): A
     wedge: FloatArray  #: (n,): B
-    load: FloatArray  #: (n,): Radial force over mu U R^2 L / Cp^2.
+    load: FloatArray  #: (n,): Radial force [N].
     rise: FloatArray  #: (n, rows, columns): Temperature above the inlet [K].
 
 
@@ -67,10 +67,11 @@ def attitudes(grid: FilmGrid, clearance: float, running: Running, inlet: float, 
         alone = Running(1.0, (1.0, oil[1], 1.0, oil[3] * oil[2] / density), heat)
     radius = float(grid.dx * (len(grid.angle) - 1) / (grid.angle[-1] - grid.angle[0]))
     length = 2.0 * float(grid.z[-1])
-    deepest = load / (size * radius**2 * length)
-    depth = 4.0 ** math.ceil(math.log(max(deepest, 1e-3), 4.0))
+    unit = size * radius**2 * length
+    depth = 4.0 ** math.ceil(math.log(max(load / unit, 1e-3), 4.0))
     ends = round(float(grid.angle[0]), 12), round(float(grid.angle[-1]), 12)
-    return _attitudes(ends, round(radius, 12), round(length, 12), alone, depth)
+    curve = _attitudes(ends, round(radius, 12), round(length, 12), alone, depth)
+    return curve._replace(load=unit * curve.load)
 
 
 def _rounded(value: float) -> float:
@@ -79,7 +80,10 @@ def _rounded(value: float) -> float:
 
 @lru_cache(maxsize=256)
 def _attitudes(ends: tuple[float, float], radius: float, length: float, running: Running, depth: float) -> Attitudes:
-    """Solve the attitudes of a film between two angles from the pivot; none if it never carries."""
+    """Solve the attitudes of a film between two angles from the pivot; none if it never carries.
+
+    `depth` and the loads are over mu U R^2 L / Cp^2.
+    """
     grid = film_grid(*ends, radius, length, _MESH, True)
     work = film_work(grid, 40.0)
     numbers = np.zeros((2 * _ROWS, 3))

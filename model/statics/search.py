@@ -123,9 +123,6 @@ class Search:
     def _find_curves(self) -> None:
         """Find the curve of every pad's loaded attitudes; pads that are alike share it."""
         load = max(float(np.hypot(*self.load)), 1.0)
-        bearing, running, supply = self.setup.bearing, self.running, self.case.supply
-        size = bearing.journal_radius**2 * bearing.length
-        viscosity = float(bearing.oil.viscosity(supply))
         pads, alike = self.pads, dict[tuple[int, float, int], int]()
         for m, film in enumerate(self.films):
             clearance, law = float(pads["clearance"][m]), self.setup.pivots[m]
@@ -134,13 +131,12 @@ class Search:
                 pads["rows"][m], pads["attitudes"][m] = pads["rows"][first], pads["attitudes"][first]
                 self.rises.append(self.rises[first])
                 continue
-            curve = attitudes(film.grid, clearance, running, supply, load)
-            unit = viscosity * running.speed * size / clearance**2
+            curve = attitudes(film.grid, clearance, self.running, self.case.supply, load)
             gives = np.empty(0)
             if pads["law"][m, 0] == OTHER:
-                gives = np.array([law.deflection(w) for w in (curve.load * unit).tolist()])
+                gives = np.array([law.deflection(w) for w in curve.load.tolist()])
             pivot = pads["law"][m], self.stack.curves[m]
-            pads["rows"][m] = pivot_curve(curve[:3], (clearance, unit), pivot, gives, pads["attitudes"][m])
+            pads["rows"][m] = pivot_curve(curve[:3], clearance, pivot, gives, pads["attitudes"][m])
             self.rises.append((len(curve.load) - int(pads["rows"][m]), curve.rise))
 
     def stand(self) -> Search:

@@ -32,24 +32,22 @@ _MOST_DOUBTFUL = 6
 @compiled
 def pivot_curve(
     attitude: tuple[FloatArray, FloatArray, FloatArray],
-    scale: tuple[float, float],
+    clearance: float,
     pivot: tuple[FloatArray, FloatArray],
     gives: FloatArray,
     out: FloatArray,
 ) -> int:
     """A pad's loaded attitudes on its pivot, rising from the fold: r = a + delta(W), a, b [m], W [N]; how many.
 
-    `attitude` is (A, B, W), `scale` Cp and the unit of the load; `pivot` its law and curve; `gives` (n,) what it
-    gives, empty where the law says it.
+    `attitude` is (A, B, W); `pivot` its law and curve; `gives` (n,) what it gives, empty where the law says it.
     """
     curvature, wedge, load = attitude
-    clearance, unit = scale
     count = len(load)
     if count < 3:
         return 0
     reach = np.empty(count)
     for k in range(count):
-        give = gives[k] if len(gives) > 0 else deflection(pivot[0], pivot[1], load[k] * unit)
+        give = gives[k] if len(gives) > 0 else deflection(pivot[0], pivot[1], load[k])
         reach[k] = clearance * curvature[k] / (1.0 + curvature[k]) + give
     low = count - 1
     while low > 0 and reach[low - 1] < reach[low]:
@@ -58,7 +56,7 @@ def pivot_curve(
         share = 1.0 / (1.0 + curvature[k])
         out[0, k - low], out[1, k - low] = reach[k], clearance * curvature[k] * share
         out[2, k - low] = clearance * wedge[k] * share
-        out[3, k - low] = load[k] * unit
+        out[3, k - low] = load[k]
     return count - low
 
 
