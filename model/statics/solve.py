@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from model.conditions import named, pads_of
+from model.conditions import named, pads_of, said
 from model.setup import Setup
 from model.statics import conditions
 from model.statics.equilibrium import Equilibrium
@@ -131,14 +131,14 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
     edge = [f.number for f in films if abs(above[f.number - 1]) < _EDGE and f.number not in even]
     another = search.other.any() and not restless
     names = (
-        (bool(restless), named("pads {pads} can neither carry nor idle", restless)),
-        (bool(restless), named("not converged")),
-        (bool(off) and not restless, named("pads {pads} cannot keep their load", off)),
-        (bool(even) and not restless, named("pads {pads} stand concentric", even)),
-        (bool(edge), named("pads {pads} on the edge of carrying", edge)),
-        (another, named("another equilibrium exists", (np.flatnonzero(~search.other) + 1).tolist())),
+        (restless, "pads {pads} can neither carry nor idle", restless),
+        (restless, "not converged"),
+        (off and not restless, "pads {pads} cannot keep their load", off),
+        (even and not restless, "pads {pads} stand concentric", even),
+        (edge, "pads {pads} on the edge of carrying", edge),
+        (another, "another equilibrium exists", (np.flatnonzero(~search.other) + 1).tolist()),
     )
-    return replace(result, status=(*(name for holds, name in names if holds), *result.status))
+    return replace(result, status=(*said(names), *result.status))
 
 
 def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
