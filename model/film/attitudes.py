@@ -87,25 +87,24 @@ def _attitudes(ends: tuple[float, float], radius: float, length: float, running:
     grid = film_grid(*ends, radius, length, _MESH, True)
     work = film_work(grid, 40.0)
     numbers = np.zeros((2 * _ROWS, 3))
-    rises = np.zeros((2 * _ROWS, *work.temperature.shape))
+    rises = np.zeros((2 * _ROWS, work.temperature.size))
     low, high = walk(grid, work, running, depth * radius**2 * length, (numbers, rises))
     if high - low < 3:
-        nothing = np.zeros(1)
-        return Attitudes(nothing, nothing, nothing, np.zeros((1, *work.temperature.shape)))
+        return Attitudes(*np.zeros((3, 1)), np.zeros((1, *work.temperature.shape)))
     (curvature, wedge, load), rise = points_between(numbers[low:high], rises[low:high])
-    return Attitudes(curvature, wedge, load / (radius**2 * length), rise)
+    return Attitudes(curvature, wedge, load / (radius**2 * length), rise.reshape(-1, *work.temperature.shape))
 
 
 @compiled
 def points_between(rows: FloatArray, rises: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Points (A, B, W) of a curve, (3, n), and their temperatures: cubics through four rows (A, B, W).
+    """Points (A, B, W) of a curve, (3, n), and their temperatures, (n, nodes): cubics through four rows (A, B, W).
 
     A is nearly a parabola of the wedge, W nearly a power of it; from the parallel film on to the first row all is
     straight.
     """
     last, count = len(rows) - 1, min(4, len(rows))
     points = np.zeros((3, _BETWEEN * (last + 1) + 1))
-    warm = np.zeros((points.shape[1], rises.shape[1], rises.shape[2]))
+    warm = np.zeros((points.shape[1], rises.shape[1]))
     logarithms = np.log(rows[:, 1:])
     for p in range(points.shape[1]):
         row, share = p // _BETWEEN - 1, p % _BETWEEN / _BETWEEN
@@ -120,7 +119,8 @@ def points_between(rows: FloatArray, rises: FloatArray) -> tuple[FloatArray, Flo
         for k in range(count):
             points[0, p] += by_wedge[k] * rows[first + k, 0]
             power += by_power[k] * logarithms[first + k, 1]
-            warm[p] += by_wedge[k] * rises[first + k]
+            for q in range(warm.shape[1]):
+                warm[p, q] += by_wedge[k] * rises[first + k, q]
         points[0, p], points[2, p] = max(points[0, p], _FARTHEST), np.exp(power)
     return points, warm
 
@@ -163,8 +163,7 @@ def walk(
     while high < len(numbers) and numbers[high - 1, 2] <= depth and numbers[high - 1, 0] <= _DEEPEST:
         wedge = numbers[high - 1, 1] * _DEEPER
         curvature = _ahead(work, out, wedge, (max(high - 3, low), high, high - 1))
-        hottest = largest(rises[high - 1].reshape(-1))
-        if hottest > _HOTTEST or not _fill(grid, work, running, out, high, (curvature, wedge)):
+        if largest(rises[high - 1]) > _HOTTEST or not _fill(grid, work, running, out, high, (curvature, wedge)):
             break
         high += 1
     return low, high
@@ -175,12 +174,12 @@ def _ahead(work: FilmWork, out: tuple[FloatArray, FloatArray], wedge: float, row
     """Curvature at a wedge, and temperatures into `work`, as rows head: from the first on, to an end; the nearest."""
     numbers, rises = out
     first, end, nearest = rows
-    weights, curvature, rise = lagrange(numbers[first:end, 1], wedge), 0.0, np.zeros(work.temperature.shape)
+    weights, curvature, rise = lagrange(numbers[first:end, 1], wedge), 0.0, np.zeros(work.temperature.size)
     for k in range(len(weights)):
         curvature += weights[k] * numbers[first + k, 0]
         rise += weights[k] * rises[first + k]
     last = rises[nearest]
-    work.temperature[:] = 40.0 + np.minimum(np.maximum(rise, 0.5 * last), 1.5 * last)
+    work.temperature.reshape(-1)[:] = 40.0 + np.minimum(np.maximum(rise, 0.5 * last), 1.5 * last)
     most = 0.5 * (1.0 + numbers[nearest, 0])
     return max(numbers[nearest, 0] + min(max(curvature - numbers[nearest, 0], -most), most), -0.75)
 
@@ -200,7 +199,7 @@ def _fill(
     if not found or not load > 0.0:
         return False
     numbers[row, 0], numbers[row, 1], numbers[row, 2] = curvature, wedge, load
-    rises[row] = work.temperature - 40.0
+    rises[row] = work.temperature.reshape(-1) - 40.0
     return True
 
 
