@@ -253,11 +253,8 @@ def operators_at(
 ) -> PadOperators:
     """Operators at several convections of the free faces, the first axis of `expansion` and `flux`."""
     mesh = sector_mesh(geometry, density)
-    corners = mesh.theta.breaks.size * mesh.z.breaks.size
-    by_convection = (len(convections), mesh.n_surface, corners)
-    shapes = {"compliance": (mesh.n_surface,) * 2, "expansion": by_convection, "flux": by_convection}
     key = storage_key((geometry, density, even, convections))
-    arrays = load_arrays(key, shapes)
+    arrays = load_arrays(key, ("compliance", "expansion", "flux"))
     if arrays is None:
         arrays = _solve(geometry, mesh, even, convections)
         save_arrays(key, arrays)
