@@ -84,8 +84,8 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFil
             PadFilm(
                 number=k + 1,
                 pad=pad,
-                normal=np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)]),
-                tangent=np.array([-math.sin(pad.pivot_angle), math.cos(pad.pivot_angle)]),
+                normal=np.array(pad.normal),
+                tangent=np.array([-pad.normal[1], pad.normal[0]]),
                 preload_distance=pad.pad_clearance - pad.assembled_clearance - setup.clearance_change,
                 pivot_radius=bearing.pivot_radius(pad),
                 grid=grid,

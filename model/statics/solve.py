@@ -176,8 +176,7 @@ def _raise(quantity: str, setup: Setup, load: FloatArray, speed: float, failed: 
         share = min(1.0, reached + step)
         shares = {"load": 1.0, "heat": 1.0, "speed": 1.0, quantity: share}
         if quantity == "want":
-            fed = replace(oil, supply_flow=oil.supply_flow / share)
-            setup = setup.change(bearing=replace(setup.bearing, oil=fed))
+            setup = setup.change_oil(supply_flow=oil.supply_flow / share)
         search = Search(setup, shares["load"] * load, shares["speed"] * speed, shares["heat"])
         if last is None or not search.start_from(last):
             search.stand()
