@@ -56,28 +56,19 @@ def cross_operator(
     space = _Space(*over, np.zeros((4, *shape)), np.zeros(shape), np.zeros(shape))
     for i in range(nt + 1):
         _dissipation(film, speed, i, made[i])
+    # a hotter film shears with less heat: taken as it will be, or the two would swing
+    dissipation[:] = 0.5 * heat[2] * (made[:-1] + made[1:])
+    less = heat[4] * dissipation
+    dissipation += less * cross.temperature[1:].reshape((nt, n))
     for i in range(nt):
         _box(film, speed, heat, i, flows, space)
         _set_rows(space, factor[i], before[i])
-        for j in range(lines):
-            exchange = space.coupling[1, j, cells - 1]
-            journal[i, j, 0] = (1.0 - space.theta[j, cells - 1]) * exchange
-            journal[i, j, 1] = space.theta[j, cells - 1] * exchange
-        dissipation[i] = 0.5 * heat[2] * (made[i] + made[i + 1])
-        _make_less(cross.temperature[i + 1], heat[4], dissipation[i], factor[i])
+        exchange, share = space.coupling[1, :, -1], space.theta[:, -1]
+        journal[i, :, 0], journal[i, :, 1] = (1.0 - share) * exchange, share * exchange
+        factor[i, :, cells] += less[i]
         factorise_general(factor[i])
     carried[:] = heat[0] * np.maximum(flows[-1], 0.0)
     return _flow_back(grid, work, speed, flows[0])
-
-
-@inner
-def _make_less(temperature: FloatArray, thinning: float, dissipation: FloatArray, factor: FloatArray) -> None:
-    """A hotter film shears with less heat: taken as it will be, or the two would swing."""
-    cells = temperature.shape[1]
-    for k in range(len(dissipation)):
-        less = thinning * dissipation[k]
-        factor[k, cells] += less
-        dissipation[k] += less * temperature[k // cells, k % cells]
 
 
 @inner

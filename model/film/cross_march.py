@@ -70,16 +70,11 @@ def face_temperature(
     `edges` (cells + 1,), `taken` (nt + 1, nz + 1) [W/m^2], `face` (nt + 1, nz + 1) [degC].
     """
     cells = len(edges) - 1
-    first_centre = 0.5 * (edges[0] + edges[1])
-    second_centre = 0.5 * (edges[1] + edges[2])
-    for i in range(face.shape[0]):
-        for j in range(face.shape[1]):
-            slope = heat_flow[i, j] * work.thickness[i, j] / conductivity
-            first, second = field[i, j * cells], field[i, j * cells + 1]
-            bend = (second - first - slope * (second_centre - first_centre)) / (
-                second_centre * second_centre - first_centre * first_centre
-            )
-            face[i, j] = first - slope * first_centre - bend * first_centre * first_centre
+    below, above = 0.5 * (edges[0] + edges[1]), 0.5 * (edges[1] + edges[2])
+    slope = heat_flow * work.thickness / conductivity
+    first, second = field[:, ::cells], field[:, 1::cells]
+    bend = (second - first - slope * (above - below)) / (above * above - below * below)
+    face[:] = first - slope * below - bend * below * below
 
 
 @inner

@@ -43,12 +43,10 @@ def heat_sources(
 ) -> None:
     """What stations make [W] and lose per kelvin [W/K] if a share is kept: a hotter film makes less heat."""
     heat = dissipated(grid, work, running.speed)
-    for i in range(made.shape[0]):
-        for j in range(made.shape[1]):
-            sheared, pressed = heat[0, i, j], heat[1, i, j] + heat[2, i, j]
-            fewer = kept * running.oil[1] * max(sheared - pressed, 0.0)
-            made[i, j] = kept * (sheared + pressed + work.gained[i, j]) + fewer * work.temperature[i, j]
-            loss[i, j] = work.exchange[i, j] + fewer
+    sheared, pressed = heat[0], heat[1] + heat[2]
+    fewer = kept * running.oil[1] * np.maximum(sheared - pressed, 0.0)
+    made[:] = kept * (sheared + pressed + work.gained) + fewer * work.temperature
+    loss[:] = work.exchange + fewer
 
 
 @inner

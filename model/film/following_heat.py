@@ -43,28 +43,21 @@ def heat_impedance(
     grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Running, omega: float, settled: float
 ) -> ComplexArray:
     """What the temperature that follows adds to a film's impedance; it ends when it changes by a share `settled`."""
-    shape, unknowns = work.pressure.shape, len(work.unknown)
-    film = _Film(grid, work, running, conductances(grid, work, wedge), np.empty(shape))
-    out, loss = np.zeros((2, 2), dtype=np.complex128), np.empty(shape, dtype=np.complex128)
-    nothing = np.zeros(shape, dtype=np.complex128)
-    heat = dissipated(grid, work, running.speed)
-    for i in range(shape[0]):
-        for j in range(shape[1]):
-            sheared, pressed, h = heat[0, i, j], heat[1, i, j] + heat[2, i, j], work.thickness[i, j]
-            film.closer[i, j] = (3.0 * pressed - sheared) / h
-            # what a kelvin at a node stores and makes less [W/K]
-            stored = 1j * omega * running.heat[0] * grid.dx * grid.height[j] * work.density[i, j] * h
-            loss[i, j] = stored + running.oil[1] * (sheared - pressed) + work.exchange[i, j]
+    shape, heat = work.pressure.shape, dissipated(grid, work, running.speed)
+    sheared, pressed = heat[0], heat[1] + heat[2]
+    closer = (3.0 * pressed - sheared) / work.thickness
+    film = _Film(grid, work, running, conductances(grid, work, wedge), closer)
+    out, nothing = np.zeros((2, 2), dtype=np.complex128), np.zeros(shape, dtype=np.complex128)
+    # what a kelvin at a node stores and makes less [W/K]
+    stored = 1j * omega * running.heat[0] * grid.dx * grid.height * work.density * work.thickness
+    loss = stored + running.oil[1] * (sheared - pressed) + work.exchange
     for axis in range(2):
-        thicker = np.empty(shape)
-        for i in range(shape[0]):
-            thicker[i] = -grid.cos[i] if axis == 0 else -grid.sin[i]
-        warmer, pressure, answer = nothing, nothing.copy(), np.zeros(unknowns, dtype=np.complex128)
+        thicker = np.zeros(shape) - (grid.cos if axis == 0 else grid.sin).reshape((-1, 1))
+        frozen = work.slopes[:, axis] + 1j * omega * work.slopes[:, 2 + axis]
+        warmer, pressure, answer = nothing, nothing.copy(), np.zeros(len(frozen), dtype=np.complex128)
         ended = False
         for _ in range(_MOST_TURNS):
-            for k in range(unknowns):
-                frozen = work.slopes[k, axis] + 1j * omega * work.slopes[k, 2 + axis]
-                pressure.reshape(-1)[grid.node[k]] = frozen + answer[k]
+            pressure.reshape(-1)[grid.node] = frozen + answer
             fields = np.zeros((1, shape[0], shape[1]), dtype=np.complex128)
             march(grid, work, running, loss, fields, _gain(film, thicker, warmer, pressure))
             asked, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
@@ -84,10 +77,8 @@ def _pressure(film: _Film, warmer: ComplexArray, omega: float, answer: ComplexAr
     """Change of pressure by a change of temperature, into `answer` (unknowns,)."""
     grid, work, oil = film.grid, film.work, film.running.oil
     net_inflow(grid, _flows(film, None, warmer, 0.0 * warmer), answer)
-    by_heat = 1j * omega * oil[2] * oil[3]
-    for k in range(len(answer)):
-        i, j = divmod(grid.node[k], grid.steps[0])
-        answer[k] += by_heat * warmer[i, j] * work.thickness[i, j] * grid.dx * grid.height[j]
+    stored = 1j * omega * oil[2] * oil[3] * grid.dx * grid.height * warmer * work.thickness
+    answer += stored.reshape(-1)[grid.node]
     keep_ruptured(grid, work, answer)
     substitute(work.band, answer)
 
