@@ -283,9 +283,8 @@ class Search:
                 continue
             stiffness = pad.stiffness
             deep = 0.0 < _BEYOND_FOLD * pad.attitudes[3, 0] < pad.force[0]
-            if deep and is_stable(self.case, pad, curve, stiffness):
-                continue
-            if self.case.thermal in (ALONE, COUPLED):  # the temperature follows, and that is known
+            told = deep and is_stable(self.case, pad, curve, stiffness)
+            if self.case.thermal in (ALONE, COUPLED) and not told:  # the temperature follows, and that is known
                 wedge = (float(pad.clearance), *pad.wedge.tolist())
                 stiffness = stiffness + heat_impedance(film.grid, film.work, wedge, self.running, 0.0, _TOLD).real
             if not is_stable(self.case, pad, curve, stiffness):
