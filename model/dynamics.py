@@ -32,19 +32,13 @@ _MOST_TURNS, _SETTLED = 40, 1e-7
 _RIGID = 1e30
 #: Halvings of the amplitude with which a pivot with friction vibrates.
 _HALVINGS = 60
+#: A pad on a sphere that follows a shaft that leans has one more tilt, about the axis across it through its pivot: what
+#: a unit of it adds to h, (nt + 1, nz + 1) [m/rad]; its moment by the pressure at the film's unknown nodes, less what
+#: grows with the pad's load, (unknowns,) [m^3]; its stiffness [N m/rad] and inertia [kg m^2].
+AxialTilt = tuple[FloatArray, FloatArray, float, float]
 #: Conditions of pads whose pivots rub.
 _HELD = "pivot friction holds pads {pads}"
 _LOOSE = "vibration of {number:g} um breaks the pivots of pads {pads} loose"
-
-
-class AxialTilt(NamedTuple):
-    """A pad on a sphere that follows a shaft that leans: one more tilt, about the axis across it through its pivot."""
-
-    shape: FloatArray  #: (nt + 1, nz + 1): What a unit of axial tilt adds to h [m/rad].
-    #: (unknowns,): Moment by the pressure at the film's unknown nodes, less what grows with the pad's load [m^3].
-    weights: FloatArray
-    stiffness: float  #: [N m/rad]
-    inertia: float  #: [kg m^2]
 
 
 def flexing_impedance(film: PadFilm, omega: FloatArray, factor: float, axial: AxialTilt | None = None) -> ComplexArray:
@@ -73,7 +67,8 @@ def flexing_impedance(film: PadFilm, omega: FloatArray, factor: float, axial: Ax
 
     still, moving = film.work.slopes[:, :2], film.work.slopes[:, 2:4]
     if axial is not None:
-        more = slopes(axial.shape[:, :, None])
+        shape, levers, stiffness, inertia = axial
+        more = slopes(shape[:, :, None])
         still, moving = np.hstack([still, more[0]]), np.hstack([moving, more[1]])
     softest = slopes(film.deformation.shapes) if factor and film.deformation is not None else None
     out = np.empty((len(omega), 2, 2), dtype=np.complex128)
@@ -83,8 +78,8 @@ def flexing_impedance(film: PadFilm, omega: FloatArray, factor: float, axial: Ax
             pressure = _bent_pressure(film, factor, slopes, softest, rigid, w)
         out[k] = weights @ (pressure - rigid)[:, :2]
         if axial is not None:
-            moment = axial.weights @ pressure
-            pad_impedance = axial.stiffness - axial.inertia * w * w - moment[2]
+            moment = levers @ pressure
+            pad_impedance = stiffness - inertia * w * w - moment[2]
             out[k] += np.outer(weights @ pressure[:, 2], moment[:2]) / pad_impedance
     return out
 
@@ -183,8 +178,9 @@ def pad_matrices(setup: Setup, films: Sequence[PadFilm]) -> PadMatrices:
         stiffness[k, 1, 1] = setup.pivots[film.number - 1].vibration_stiffness(load)
     moments = frame.copy()
     moments[:, 0, 2] = arms
-    full = moments.swapaxes(1, 2) @ of_film @ frame
-    return PadMatrices([f.number for f in carrying], frame, moments, *full, mass, damping, stiffness, friction)
+    of_pad = moments.swapaxes(1, 2) @ of_film @ frame
+    numbers = [film.number for film in carrying]
+    return PadMatrices(numbers, frame, moments, of_pad[0], of_pad[1], mass, damping, stiffness, friction)
 
 
 def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
@@ -239,10 +235,10 @@ def _broken_loose(friction: FloatArray, z: ComplexArray, film: ComplexArray, vib
 
 def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> ComplexArray:
     """h(omega) in the rig's frame of the bearing inside the measured displacement, with effects of the structure."""
-    pads, added = pad_matrices(setup, equilibrium.films), np.zeros(())
+    pads = pad_matrices(setup, equilibrium.films)
+    added = np.zeros((len(pads.number), len(omega), 4, 4), dtype=np.complex128)
     heat = setup.options.perturbed_heat and setup.thermal != "isothermal"
     if heat or setup.pads_follow or (setup.options.perturbed_bending and setup.flexible_pads):
-        added = np.zeros((len(pads.number), len(omega), 4, 4), dtype=np.complex128)
         for k, number in enumerate(pads.number):
             film = equilibrium.films[number - 1]
             if heat:
@@ -262,14 +258,14 @@ def _axial_tilt(setup: Setup, film: PadFilm) -> AxialTilt:
     assert film.forces is not None
     pad, grid = film.pad, film.grid
     hold = held_moment(hold_numbers(setup), film.axial, float(film.forces.force[0]))
-    weights = axial_levers(grid, hold.arm)[grid.node]
+    levers = axial_levers(grid, hold.arm)[grid.node]
     inner, outer, middle = _radii(setup, film)
     ends = pad.leading_edge, pad.leading_edge + pad.arc
     mean, square = (math.sin(ends[1]) - math.sin(ends[0])) / pad.arc, 0.5
     square += 0.25 * (math.sin(2.0 * ends[1]) - math.sin(2.0 * ends[0])) / pad.arc
     reach = 0.5 * (outer**2 + inner**2) * square + film.pivot_radius**2
     reach -= 2.0 * film.pivot_radius * middle * mean
-    return AxialTilt(axial_shape(grid), weights, hold.stiffness, pad.mass * (reach + setup.bearing.length**2 / 12.0))
+    return axial_shape(grid), levers, hold.stiffness, pad.mass * (reach + setup.bearing.length**2 / 12.0)
 
 
 def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:

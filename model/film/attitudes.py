@@ -65,7 +65,7 @@ def attitudes(grid: FilmGrid, clearance: float, running: Running, inlet: float, 
     if math.isfinite(specific):
         heat = _rounded(density * specific / size), _rounded(conductivity / (size * running.speed))
         alone = Running(1.0, (1.0, oil[1], 1.0, oil[3] * oil[2] / density), heat)
-    radius = float(grid.dx * (len(grid.angle) - 1) / (grid.angle[-1] - grid.angle[0]))
+    radius = float(grid.dx / (grid.angle[1] - grid.angle[0]))
     length = 2.0 * float(grid.z[-1])
     unit = size * radius**2 * length
     depth = 4.0 ** math.ceil(math.log(max(load / unit, 1e-3), 4.0))
@@ -90,7 +90,8 @@ def _attitudes(ends: tuple[float, float], radius: float, length: float, running:
     rises = np.zeros((2 * _ROWS, work.temperature.size))
     low, high = walk(grid, work, running, depth * radius**2 * length, (numbers, rises))
     if high - low < 3:
-        return Attitudes(*np.zeros((3, 1)), np.zeros((1, *work.temperature.shape)))
+        nothing = np.zeros(1)
+        return Attitudes(nothing, nothing, nothing, np.zeros((1, *work.temperature.shape)))
     (curvature, wedge, load), rise = points_between(numbers[low:high], rises[low:high])
     return Attitudes(curvature, wedge, load / (radius**2 * length), rise.reshape(-1, *work.temperature.shape))
 

@@ -101,11 +101,10 @@ def conduct(
 
     `missing` (nt + 1, nz + 1) [K]; gives what the journal takes besides [W].
     """
-    flux, to_coarse, _ = pad
     fields, face = np.zeros((*answer[0].shape, 3)), np.empty(missing.shape)
     held = (film, operator, pad, fields, face)
-    change = gmres(_warmed, held, times(to_coarse, missing.reshape(-1)), tolerance)
-    more = _conducted(film, operator, times(flux, change), fields, face)
+    change = gmres(_warmed, held, times(pad[1], missing.reshape(-1)), tolerance)
+    more = _conducted(film, operator, times(pad[0], change), fields, face)
     if not math.isfinite(more):
         return 0.0
     answer[0][:] += fields[:, :, 0]

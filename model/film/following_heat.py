@@ -47,7 +47,7 @@ def heat_impedance(
     sheared, pressed = heat[0], heat[1] + heat[2]
     closer = (3.0 * pressed - sheared) / work.thickness
     film = _Film(grid, work, running, conductances(grid, work, wedge), closer)
-    out, nothing = np.zeros((2, 2), dtype=np.complex128), np.zeros(shape, dtype=np.complex128)
+    out, nothing = np.full((2, 2), np.nan + 0j), np.zeros(shape, dtype=np.complex128)
     # what a kelvin at a node stores and makes less [W/K]
     stored = 1j * omega * running.heat[0] * grid.dx * grid.height * work.density * work.thickness
     loss = stored + running.oil[1] * (sheared - pressed) + work.exchange
@@ -55,20 +55,16 @@ def heat_impedance(
         thicker = np.zeros(shape) - (grid.cos if axis == 0 else grid.sin).reshape((-1, 1))
         frozen = work.slopes[:, axis] + 1j * omega * work.slopes[:, 2 + axis]
         warmer, pressure, answer = nothing, nothing.copy(), np.zeros(len(frozen), dtype=np.complex128)
-        ended = False
         for _ in range(_MOST_TURNS):
             pressure.reshape(-1)[grid.node] = frozen + answer
-            fields = np.zeros((1, shape[0], shape[1]), dtype=np.complex128)
+            fields = np.zeros((1, *shape), dtype=np.complex128)
             march(grid, work, running, loss, fields, _gain(film, thicker, warmer, pressure))
             asked, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
             warmer = fields[0]
             _pressure(film, warmer, omega, answer)
             if asked < settled * size:
-                ended = True
+                out[:, axis] = force_of(grid, grid.area, answer.reshape((-1, 1)))[:, 0]
                 break
-        out[:, axis] = force_of(grid, grid.area, answer.reshape((-1, 1)))[:, 0]
-        if not ended:
-            out[:, axis] = np.nan
     return out
 
 

@@ -145,7 +145,6 @@ class Search:
         pads, state = self.pads, self.state
         state.position[:], loaded, self.other = first_position(self.case.load, pads)
         pads["idle"] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
-        self.idle_by_curves = int(pads["idle"].sum())
         self.load_pads(loaded)
         begun = (state.position, pads["tilt"], pads["deflection"], self.works.temperature)
         self.begun = Begun(*(values.copy() for values in begun))
@@ -299,8 +298,8 @@ class Search:
         for name in ("tilt", "deflection", "axial", "idle", "inlet", "supplied"):
             for film, value in zip(self.films, pads[name].tolist(), strict=True):
                 setattr(film, name, value)
-        solved, resting, clearances = pads["solved"].tolist(), pads["resting"].tolist(), pads["clearance"].tolist()
-        wedges, least, steps = pads["wedge"].tolist(), pads["least"].tolist(), pads["steps"].tolist()
+        names = ("solved", "resting", "clearance", "wedge", "least", "steps")
+        solved, resting, clearances, wedges, least, steps = (pads[name].tolist() for name in names)
         for m, film in enumerate(self.films):
             film.wedge = (clearances[m], *wedges[m])
             if self.across is not None:

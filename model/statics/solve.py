@@ -43,7 +43,7 @@ def solve_equilibrium(
             warm = _settled(search, search.run())
             # where pads are left idle that could carry, another start may leave others
             loose = pads_of("pads {pads} cannot keep their load", warm.status)
-            if warm.converged and not loose and sum(f.idle for f in warm.films) <= search.idle_by_curves:
+            if warm.converged and not loose and sum(f.idle for f in warm.films) <= np.isnan(search.begun.tilt).sum():
                 return warm
     search = Search(setup, load, speed).stand()
     near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.pads["idle"][m]]

@@ -174,8 +174,8 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
     operator.dissipation[:, :: len(cross.edges) - 1] -= station_heat(grid, into_pad)
     taken[:] = march_cross(operator, fields, operator.dissipation)
     for q in range(3):
-        given = into_pad if q == 0 else np.zeros(into_pad.shape)
-        face_temperature(work, cross.edges, conductivity, fields[:, :, q], given, faces[q])
+        heat_flow = (1.0 if q == 0 else 0.0) * into_pad
+        face_temperature(work, cross.edges, conductivity, fields[:, :, q], heat_flow, faces[q])
     missing = faces[0] + pad.inlet * faces[1] + journal * faces[2] - cross.face
     if 0.0 < largest(missing.reshape(-1)) < BOUNDLESS:
         solved = (grid, work, cross.edges, conductivity)

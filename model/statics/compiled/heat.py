@@ -78,7 +78,7 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
     """Temperatures of all films, the inlets and the journal for their present flows; returns the largest change [K]."""
     pads, works, state, case = problem.pads, problem.works, problem.state, problem.case
     n, fields = len(pads.each), 3 if case.journal else 2
-    answers = np.zeros((n, fields, works.temperature.shape[1], works.temperature.shape[2]))
+    answers = np.zeros((n, fields, *works.temperature.shape[1:]))
     flows = np.empty((n, 2))
     outlets = np.zeros((n, 3))
     taken = np.zeros((n, 3))
@@ -135,11 +135,11 @@ def _answer(
     grid, work = film_of(problem, m)
     case = problem.case
     figures = problem.state.figures
-    sources, loss = np.zeros(fields.shape), np.empty(work.temperature.shape)
+    sources = np.zeros(fields.shape)
     if case.journal:
         work.exchange[:] = _NUSSELT * case.running.heat[1] / work.thickness * (grid.dx * grid.height)
         sources[2] = work.exchange
-    heat_sources(grid, work, case.running, case.kept, sources[0], loss)
+    sources[0], loss = heat_sources(grid, work, case.running, case.kept)
     fields[1, 0] = 1.0
     conducts = len(bodies.flux) > 0
     if conducts:

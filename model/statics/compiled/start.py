@@ -45,19 +45,17 @@ def pivot_curve(
     count = len(load)
     if count < 3:
         return 0
-    reach = np.empty(count)
+    share = clearance / (1.0 + curvature)
+    reach = share * curvature
     for k in range(count):
-        give = gives[k] if len(gives) > 0 else deflection(pivot[0], pivot[1], load[k])
-        reach[k] = clearance * curvature[k] / (1.0 + curvature[k]) + give
+        reach[k] += gives[k] if len(gives) > 0 else deflection(pivot[0], pivot[1], load[k])
     low = count - 1
     while low > 0 and reach[low - 1] < reach[low]:
         low -= 1
-    for k in range(low, count):
-        share = 1.0 / (1.0 + curvature[k])
-        out[0, k - low], out[1, k - low] = reach[k], clearance * curvature[k] * share
-        out[2, k - low] = clearance * wedge[k] * share
-        out[3, k - low] = load[k]
-    return count - low
+    rows = count - low
+    out[0, :rows], out[1, :rows] = reach[low:], (share * curvature)[low:]
+    out[2, :rows], out[3, :rows] = (share * wedge)[low:], load[low:]
+    return rows
 
 
 def first_position(load: FloatArray, pads: np.ndarray) -> tuple[FloatArray, BoolArray, BoolArray]:
