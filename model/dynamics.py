@@ -30,6 +30,7 @@ from rigdata.problem import Condition
 _MOST_TURNS, _SETTLED = 40, 1e-7
 #: A pivot this stiff lets eta take no part [N/m].
 _RIGID = 1e30
+_UNIT = np.eye(2)
 #: Halvings of the amplitude with which a pivot with friction vibrates.
 _HALVINGS = 60
 #: A pad on a sphere that follows a shaft that leans has one more tilt, about the axis across it through its pivot: what
@@ -271,10 +272,10 @@ def _axial_tilt(setup: Setup, film: PadFilm) -> AxialTilt:
 def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:
     """What the structure around a bearing makes of its impedance: `omega` (n,) [rad/s]."""
     s = 1j * omega[:, None, None]
-    h = h + s**2 * setup.added_mass * np.eye(2)
+    h = h + s**2 * setup.added_mass * _UNIT
     if any(setup.series_compliance):
         # of C and h both may be singular: (1 + h C)^-1 h needs neither inverse
-        h = np.linalg.solve(np.eye(2) + h @ setup.structure, h).astype(np.complex128, copy=False)
+        h = np.linalg.solve(_UNIT + h @ setup.structure, h).astype(np.complex128, copy=False)
     k, c = (np.reshape(v, (2, 2)) for v in (setup.parallel_stiffness, setup.parallel_damping))
     return h + k + s * c
 

@@ -78,9 +78,9 @@ def status_of(
     warmth = np.array([f.work.temperature for f in films if f.forces is not None] or _OIL_DATA)
     coldest, hottest = float(warmth.min()), float(warmth.max())
     beyond = coldest if coldest < _OIL_DATA[0] else hottest
-    x, y = np.array([f.normal for f in films if f.forces is not None]).reshape(-1, 2).T
+    normals = [f.normal.tolist() for f in films if f.forces is not None]
     is_free = not failures and setup.rotational_stiffness == 0.0
-    on_one_line = bool(np.all(np.abs(x * y[:1] - y * x[:1]) < 1e-6))
+    on_one_line = all(abs(x * normals[0][1] - y * normals[0][0]) < 1e-6 for x, y in normals)
     conditions: tuple[tuple[Any, ...], ...] = (
         (is_free and on_one_line, "nothing holds the journal across its load"),
         (heavy, "overloaded pads {pads}", heavy, limits),
