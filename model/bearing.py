@@ -157,6 +157,11 @@ class Pad:
         return f"<{type(self).__name__}: {self}>"
 
     @property
+    def normal(self) -> tuple[float, float]:
+        """Unit vector from the bearing centre to the pivot."""
+        return math.cos(self.pivot_angle), math.sin(self.pivot_angle)
+
+    @property
     def leading_edge(self) -> float:
         """Angle of the leading edge from the pivot [rad], negative: the film enters there."""
         return -self.pivot_offset * self.arc

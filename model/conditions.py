@@ -20,6 +20,11 @@ def named(kind: str, pads: Sequence[int] = (), number: float | str = 0.0) -> Con
     return Condition(kind.format(**places), severity, detail.format(**places), tuple(pads))
 
 
+def said(table: Iterable[tuple[Any, ...]]) -> tuple[Condition, ...]:
+    """Name what holds of a table: of every line whether it does, and what `named` takes."""
+    return tuple(named(*words) for holds, *words in table if holds)
+
+
 def pads_of(kind: str, conditions: Iterable[Condition]) -> tuple[int, ...]:
     """Pads (from 1) that conditions of a kind name."""
     start, _, end = kind.partition("{pads}")

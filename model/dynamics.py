@@ -8,7 +8,6 @@ those of `docs/theory.md`: the force on the housing, dF = +h d.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,21 +30,16 @@ from rigdata.problem import Condition
 _MOST_TURNS, _SETTLED = 40, 1e-7
 #: A pivot this stiff lets eta take no part [N/m].
 _RIGID = 1e30
+_UNIT = np.eye(2)
 #: Halvings of the amplitude with which a pivot with friction vibrates.
 _HALVINGS = 60
+#: A pad on a sphere that follows a shaft that leans has one more tilt, about the axis across it through its pivot: what
+#: a unit of it adds to h, (nt + 1, nz + 1) [m/rad]; its moment by the pressure at the film's unknown nodes, less what
+#: grows with the pad's load, (unknowns,) [m^3]; its stiffness [N m/rad] and inertia [kg m^2].
+AxialTilt = tuple[FloatArray, FloatArray, float, float]
 #: Conditions of pads whose pivots rub.
 _HELD = "pivot friction holds pads {pads}"
 _LOOSE = "vibration of {number:g} um breaks the pivots of pads {pads} loose"
-
-
-class AxialTilt(NamedTuple):
-    """A pad on a sphere that follows a shaft that leans: one more tilt, about the axis across it through its pivot."""
-
-    shape: FloatArray  #: (nt + 1, nz + 1): What a unit of axial tilt adds to h [m/rad].
-    #: (unknowns,): Moment by the pressure at the film's unknown nodes, less what grows with the pad's load [m^3].
-    weights: FloatArray
-    stiffness: float  #: [N m/rad]
-    inertia: float  #: [kg m^2]
 
 
 def flexing_impedance(film: PadFilm, omega: FloatArray, factor: float, axial: AxialTilt | None = None) -> ComplexArray:
@@ -74,7 +68,8 @@ def flexing_impedance(film: PadFilm, omega: FloatArray, factor: float, axial: Ax
 
     still, moving = film.work.slopes[:, :2], film.work.slopes[:, 2:4]
     if axial is not None:
-        more = slopes(axial.shape[:, :, None])
+        shape, levers, stiffness, inertia = axial
+        more = slopes(shape[:, :, None])
         still, moving = np.hstack([still, more[0]]), np.hstack([moving, more[1]])
     softest = slopes(film.deformation.shapes) if factor and film.deformation is not None else None
     out = np.empty((len(omega), 2, 2), dtype=np.complex128)
@@ -84,8 +79,8 @@ def flexing_impedance(film: PadFilm, omega: FloatArray, factor: float, axial: Ax
             pressure = _bent_pressure(film, factor, slopes, softest, rigid, w)
         out[k] = weights @ (pressure - rigid)[:, :2]
         if axial is not None:
-            moment = axial.weights @ pressure
-            pad_impedance = axial.stiffness - axial.inertia * w * w - moment[2]
+            moment = levers @ pressure
+            pad_impedance = stiffness - inertia * w * w - moment[2]
             out[k] += np.outer(weights @ pressure[:, 2], moment[:2]) / pad_impedance
     return out
 
@@ -148,11 +143,10 @@ def friction_impedance(pad_impedance: ComplexArray, drive: FloatArray, stick: An
     return np.where(held, stick + 0.0j, describing(high, stick, slip))
 
 
-@dataclass(frozen=True)
-class PadMatrices:
-    """Full matrices of one pad in (x, y, theta, eta), Eq. (11) and (12)."""
+class PadMatrices(NamedTuple):
+    """Full matrices in (x, y, theta, eta), Eq. (11) and (12), of one pad; of several they have an axis in front."""
 
-    number: int
+    number: Any
     frame: FloatArray  #: (2, 4): J, and what the film's forces do in these directions.
     moments: FloatArray
     stiffness: FloatArray  #: (4, 4): film [N/m, N/rad, N m/rad]; damping the same times s.
@@ -160,38 +154,34 @@ class PadMatrices:
     pad_mass: FloatArray  #: (2, 2) each: Eq. (12), in (theta, eta); a rigid pivot has infinite k_eta.
     pad_damping: FloatArray
     pad_stiffness: FloatArray
-    friction: tuple[float, float]  #: See `friction_limits`; (0, infinite): there is none.
+    friction: FloatArray  #: (2,): See `friction_limits`; zero where there is none.
 
 
-def pad_matrices(setup: Setup, films: Sequence[PadFilm]) -> list[PadMatrices]:
+def pad_matrices(setup: Setup, films: Sequence[PadFilm]) -> PadMatrices:
     """Assemble the full matrices of the pads that carry."""
     smooth = hold_numbers(setup)._replace(slip=0.0)  # friction vibrates otherwise than it holds
-    matrices = []
-    for film in films:
-        if film.forces is None:
-            continue
+    carrying = [film for film in films if film.forces is not None]
+    n = len(carrying)
+    frame, friction, (mass, damping, stiffness) = np.zeros((n, 2, 4)), np.zeros((n, 2)), np.zeros((3, n, 2, 2))
+    frame[:, 0, 3], damping[:, 1, 1] = -1.0, setup.pivot_damping
+    arms, of_film = np.zeros(n), np.zeros((2, n, 2, 2))
+    for k, film in enumerate(carrying):
+        assert film.forces is not None
         pad, load = film.pad, float(film.forces.force[0])
         hold = held_moment(smooth, film.tilt, load)
-        frame = np.array([[*film.normal, 0.0, -1.0], [*film.tangent, film.pivot_radius, 0.0]])
-        moments = frame.copy()
-        moments[0, 2] = hold.arm
-        friction = friction_limits(setup, load) if setup.friction else (0.0, math.inf)
+        if setup.friction:
+            friction[k] = friction_limits(setup, load)
+        frame[k, :, :2], frame[k, 1, 2], arms[k] = (film.normal, film.tangent), film.pivot_radius, hold.arm
+        of_film[:, k] = film.forces.stiffness, film.forces.damping
         coupling = -pad.mass * mass_centre_offset(setup, film)  # the centre moves outward by eta - b tilt
-        pivot = setup.pivots[film.number - 1].vibration_stiffness(load)
-        matrices.append(
-            PadMatrices(
-                number=film.number,
-                frame=frame,
-                moments=moments,
-                stiffness=moments.T @ film.forces.stiffness @ frame,
-                damping=moments.T @ film.forces.damping @ frame,
-                pad_mass=np.array([[pad.moment_of_inertia, coupling], [coupling, pad.mass]]),
-                pad_damping=np.diag([0.0, setup.pivot_damping]),
-                pad_stiffness=np.diag([hold.stiffness + friction[0], pivot]),
-                friction=friction,
-            )
-        )
-    return matrices
+        mass[k] = (pad.moment_of_inertia, coupling), (coupling, pad.mass)
+        stiffness[k, 0, 0] = hold.stiffness + friction[k, 0]
+        stiffness[k, 1, 1] = setup.pivots[film.number - 1].vibration_stiffness(load)
+    moments = frame.copy()
+    moments[:, 0, 2] = arms
+    of_pad = moments.swapaxes(1, 2) @ of_film @ frame
+    numbers = [film.number for film in carrying]
+    return PadMatrices(numbers, frame, moments, of_pad[0], of_pad[1], mass, damping, stiffness, friction)
 
 
 def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
@@ -208,41 +198,35 @@ def _radii(setup: Setup, film: PadFilm) -> tuple[float, float, float]:
 
 
 def reduce_pads(
-    pads: list[PadMatrices], omega: FloatArray, vibration: float = 0.0, added: list[ComplexArray] | None = None
+    pads: PadMatrices, omega: FloatArray, vibration: float = 0.0, added: ComplexArray | float = 0.0
 ) -> ComplexArray:
     """Eq. (10): the bearing's 2 x 2 impedance at every excitation frequency; `omega` (n,) [rad/s]."""
-    if not pads:
-        return np.zeros((len(omega), 2, 2), dtype=np.complex128)
     z, film = _impedances(pads, omega, added)
     driven = z[..., 2:, :2]
     follow = np.linalg.solve(film, driven)
-    rubbing = [k for k, pad in enumerate(pads) if pad.friction[0]]
-    if rubbing:
-        loose = _broken_loose([pads[k] for k in rubbing], z[rubbing], film[rubbing], vibration)
-        stick = np.array([pads[k].friction[0] for k in rubbing])[:, None]
+    rubbing = np.flatnonzero(pads.friction[:, 0])
+    if rubbing.size:
+        loose = _broken_loose(pads.friction[rubbing], z[rubbing], film[rubbing], vibration)
         for axis in range(2):  # X and Y excited one at a time
             held, column = film[rubbing], driven[rubbing][..., axis : axis + 1]
-            held[..., 0, 0] += loose[..., axis] - stick
+            held[..., 0, 0] += loose[..., axis] - pads.friction[rubbing, :1]
             follow[rubbing, :, :, axis] = np.linalg.solve(held, column)[..., 0]
     return np.asarray((z[..., :2, :2] - z[..., :2, 2:] @ follow).sum(axis=0), dtype=np.complex128)
 
 
 def _impedances(
-    pads: list[PadMatrices], omega: FloatArray, added: list[ComplexArray] | None = None
+    pads: PadMatrices, omega: FloatArray, added: ComplexArray | float = 0.0
 ) -> tuple[ComplexArray, ComplexArray]:
     """Film impedance (pads, n, 4, 4), with more beside it, and that of tilt and deflection with pad and pivot."""
     s = 1j * omega[:, None, None]
-    parts = zip(*[(p.stiffness, p.damping, p.pad_stiffness, p.pad_damping, p.pad_mass) for p in pads], strict=True)
-    film_stiffness, film_damping, stiffness, damping, mass = (np.array(part)[:, None] for part in parts)
-    z = film_stiffness + s * film_damping
-    if added is not None:
-        z = z + np.array(added)
-    return z, z[..., 2:, 2:] + np.minimum(stiffness, _RIGID) + s * (damping + s * mass)
+    z = pads.stiffness[:, None] + s * pads.damping[:, None] + added
+    held = np.minimum(pads.pad_stiffness, _RIGID)[:, None]
+    return z, z[..., 2:, 2:] + held + s * (pads.pad_damping[:, None] + s * pads.pad_mass[:, None])
 
 
-def _broken_loose(pads: list[PadMatrices], z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
+def _broken_loose(friction: FloatArray, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
     """Rotational impedance (pads, n, 2) of the pivots' friction [N m/rad], the journal vibrating along X, along Y."""
-    stick, slip = np.array([pad.friction for pad in pads]).T[:, :, None, None]
+    stick, slip = friction.T[:, :, None, None]
     compliance = film[..., 0, 1] / film[..., 1, 1]  # the pivot gives way as well
     pad_impedance = (film[..., 0, 0] - compliance * film[..., 1, 0])[..., None] - stick
     drive = z[..., 2, :2] - compliance[..., None] * z[..., 3, :2]
@@ -253,12 +237,11 @@ def _broken_loose(pads: list[PadMatrices], z: ComplexArray, film: ComplexArray, 
 def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> ComplexArray:
     """h(omega) in the rig's frame of the bearing inside the measured displacement, with effects of the structure."""
     pads = pad_matrices(setup, equilibrium.films)
+    added = np.zeros((len(pads.number), len(omega), 4, 4), dtype=np.complex128)
     heat = setup.options.perturbed_heat and setup.thermal != "isothermal"
-    added = None
     if heat or setup.pads_follow or (setup.options.perturbed_bending and setup.flexible_pads):
-        added = []
-        for pad in pads:
-            film = equilibrium.films[pad.number - 1]
+        for k, number in enumerate(pads.number):
+            film = equilibrium.films[number - 1]
             if heat:
                 held = film.grid, film.work, film.wedge, equilibrium.running
                 more = np.array([heat_impedance(*held, w, _SETTLED) for w in omega.tolist()])
@@ -266,7 +249,7 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
                 factor = setup.bending_factor if setup.options.perturbed_bending else 0.0
                 axial = _axial_tilt(setup, film) if setup.pads_follow else None
                 more = flexing_impedance(film, omega, factor, axial)
-            added.append(pad.moments.T @ more @ pad.frame)
+            added[k] = pads.moments[k].T @ more @ pads.frame[k]
     h = with_structure(setup, reduce_pads(pads, omega, setup.vibration, added), omega)
     return np.asarray(MIRROR @ h @ MIRROR) if setup.mirrored else h
 
@@ -276,35 +259,34 @@ def _axial_tilt(setup: Setup, film: PadFilm) -> AxialTilt:
     assert film.forces is not None
     pad, grid = film.pad, film.grid
     hold = held_moment(hold_numbers(setup), film.axial, float(film.forces.force[0]))
-    weights = axial_levers(grid, hold.arm)[grid.node]
+    levers = axial_levers(grid, hold.arm)[grid.node]
     inner, outer, middle = _radii(setup, film)
     ends = pad.leading_edge, pad.leading_edge + pad.arc
     mean, square = (math.sin(ends[1]) - math.sin(ends[0])) / pad.arc, 0.5
     square += 0.25 * (math.sin(2.0 * ends[1]) - math.sin(2.0 * ends[0])) / pad.arc
     reach = 0.5 * (outer**2 + inner**2) * square + film.pivot_radius**2
     reach -= 2.0 * film.pivot_radius * middle * mean
-    return AxialTilt(axial_shape(grid), weights, hold.stiffness, pad.mass * (reach + setup.bearing.length**2 / 12.0))
+    return axial_shape(grid), levers, hold.stiffness, pad.mass * (reach + setup.bearing.length**2 / 12.0)
 
 
 def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:
     """What the structure around a bearing makes of its impedance: `omega` (n,) [rad/s]."""
     s = 1j * omega[:, None, None]
-    h = h + s**2 * setup.added_mass * np.eye(2)
+    h = h + s**2 * setup.added_mass * _UNIT
     if any(setup.series_compliance):
         # of C and h both may be singular: (1 + h C)^-1 h needs neither inverse
-        h = np.linalg.solve(np.eye(2) + h @ setup.structure, h).astype(np.complex128, copy=False)
+        h = np.linalg.solve(_UNIT + h @ setup.structure, h).astype(np.complex128, copy=False)
     k, c = (np.reshape(v, (2, 2)) for v in (setup.parallel_stiffness, setup.parallel_damping))
     return h + k + s * c
 
 
 def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> tuple[Condition, ...]:
     """Named regimes of pivots with friction: which ones it holds, and which ones the vibration breaks loose."""
-    pads = [pad for pad in pad_matrices(setup, equilibrium.films) if pad.friction[0]]
-    if not pads:
-        return ()
-    z, tilting = _impedances(pads, omega)
-    least = np.abs(_broken_loose(pads, z, tilting, setup.vibration)).min(axis=(1, 2))
-    regimes: dict[str, list[int]] = {}
-    for pad, impedance in zip(pads, least, strict=True):
-        regimes.setdefault(_LOOSE if impedance < pad.friction[0] else _HELD, []).append(pad.number)
-    return tuple(named(kind, regimes[kind], 1e6 * setup.vibration) for kind in (_HELD, _LOOSE) if kind in regimes)
+    pads = pad_matrices(setup, equilibrium.films)
+    impedances = _impedances(pads, omega)
+    loose = np.abs(_broken_loose(pads.friction, *impedances, setup.vibration)).min(axis=(1, 2)) < pads.friction[:, 0]
+    regimes = []
+    for kind, holds in ((_HELD, ~loose), (_LOOSE, loose)):
+        if holds.any():
+            regimes.append(named(kind, np.array(pads.number)[holds].tolist(), 1e6 * setup.vibration))
+    return tuple(regimes)

@@ -1,4 +1,4 @@
-"""Tables: the row a value belongs to, the largest; rising cubics.
+"""Tables: the row a value belongs to, the largest; polynomials and rising cubics.
 
 numpy's and scipy's would load scipy: 0.3 s and 20 MB of a process that predicts.
 """
@@ -32,6 +32,17 @@ def largest(values: Any) -> float:
         if not abs(value) <= found and found == found:
             found = abs(value)
     return found
+
+
+@inner
+def lagrange(places: FloatArray, place: float) -> FloatArray:
+    """Of values at places, (n,), in the polynomial through them, elsewhere."""
+    weights = np.ones(len(places))
+    for k in range(len(places)):
+        for j in range(len(places)):
+            if j != k:
+                weights[k] *= (place - places[j]) / (places[k] - places[j])
+    return weights
 
 
 def rising_cubics(x: FloatArray, y: FloatArray) -> FloatArray:

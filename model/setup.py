@@ -134,6 +134,10 @@ class Setup:
         """Return a copy with other values."""
         return replace(self, **changes)
 
+    def change_oil(self, **changes: Any) -> Setup:
+        """Return a copy whose oil has other values."""
+        return replace(self, bearing=replace(self.bearing, oil=replace(self.bearing.oil, **changes)))
+
     def change_pads(self, change: Callable[[int, Pad], Pad]) -> Setup:
         """Return a copy with every pad replaced by ``change(number, pad)``; numbers from 1.
 

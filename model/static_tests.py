@@ -13,8 +13,7 @@ from rigdata.arrays import FloatArray
 def dry_curve(setup: Setup, pad: int, load: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Force [N] and displacement [m] along a pad's direction as cells and probes read a dry test: `load` (n,) [N]."""
     law = setup.pivots[pad - 1]
-    angle = setup.bearing.pads[pad - 1].pivot_angle
-    normal = np.array([np.cos(angle), np.sin(angle)])
+    normal = np.array(setup.bearing.pads[pad - 1].normal)
     give = np.array([law.deflection(w) for w in load.tolist()]) + (normal @ setup.structure @ normal) * load
     displacement = normal @ setup.instruments.displacement_map(0.0).real @ normal
     force = normal @ setup.instruments.force_map(0.0).real @ normal
@@ -26,8 +25,7 @@ def polygon_sides(setup: Setup, push_load: float) -> tuple[FloatArray, FloatArra
 
     Of a cold clearance sweep with a push load [N], under which pivots and structure give way.
     """
-    angle = np.array([pad.pivot_angle for pad in setup.bearing.pads])
-    towards = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    towards = np.array([pad.normal for pad in setup.bearing.pads])
     normals = towards @ np.linalg.inv(setup.instruments.displacement_map(0.0).real)
     distance = np.array([pad.assembled_clearance for pad in setup.bearing.pads])
     distance += [law.deflection(push_load) for law in setup.pivots]

@@ -1,6 +1,5 @@
 """Pads, shaft and housing that stand otherwise than drawn."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -55,7 +54,7 @@ def uneven_pads(setup: Setup, **offsets: float) -> Setup:
     """
     pads = setup.bearing.pads
     clearances = np.array([offsets[f"offset_{k}"] for k in range(1, len(pads) + 1)])
-    normals = np.array([[math.cos(p.pivot_angle), math.sin(p.pivot_angle)] for p in pads])
+    normals = np.array([pad.normal for pad in pads])
     without_shift = clearances - normals @ np.linalg.lstsq(normals, clearances, rcond=None)[0]
     for number, change in enumerate(without_shift.tolist(), start=1):
         setup = _moved(setup, "assembled_clearance", change, number)

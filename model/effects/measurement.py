@@ -7,7 +7,7 @@ import numpy as np
 
 from model.effects.kind import PAD, Parameter, effect_on
 from model.setup import Setup
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import FloatArray
 
 _PROBE_GAIN = Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.03)
 _CELL_GAIN = Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.02)
@@ -31,11 +31,8 @@ def _misread(setup: Setup, matrix: FloatArray) -> Setup:
 )
 def channel_delay(setup: Setup, delay: float) -> Setup:
     """Displacement channels are recorded this much later than force and acceleration channels."""
-
-    def late(omega: float) -> ComplexArray:
-        return np.exp(-1j * omega * delay) * np.eye(2)
-
-    return setup.change(instruments=setup.instruments.read_displacement(late))
+    late = setup.instruments.read_displacement(lambda omega: np.exp(-1j * omega * delay) * np.eye(2))
+    return setup.change(instruments=late)
 
 
 @effect_on(

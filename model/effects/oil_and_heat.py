@@ -18,8 +18,7 @@ from model.setup import Setup
 )
 def oil_viscosity(setup: Setup, factor: float) -> Setup:
     """mu_40 times factor."""
-    oil = replace(setup.bearing.oil, viscosity_40=setup.bearing.oil.viscosity_40 * factor)
-    return setup.change(bearing=replace(setup.bearing, oil=oil))
+    return setup.change_oil(viscosity_40=setup.bearing.oil.viscosity_40 * factor)
 
 
 @effect_on(
@@ -39,8 +38,7 @@ def viscosity_law(setup: Setup, factor: float) -> Setup:
     oil = setup.bearing.oil
     exponent = oil.viscosity_exponent * factor
     viscosity = oil.viscosity_40 * math.exp((oil.viscosity_exponent - exponent) * (40.0 - oil.supply_temperature))
-    changed = replace(oil, viscosity_40=viscosity, viscosity_exponent=exponent)
-    return setup.change(bearing=replace(setup.bearing, oil=changed))
+    return setup.change_oil(viscosity_40=viscosity, viscosity_exponent=exponent)
 
 
 @effect_on(

@@ -22,7 +22,7 @@ def _add_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
     """
     pivots = []
     for law, pad in zip(setup.pivots, setup.bearing.pads, strict=True):
-        x, y = math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)
+        x, y = pad.normal
         pivots.append(_alone(law, xx * x * x + 2.0 * xy * x * y + yy * y * y))
     return _added(setup.change(pivots=tuple(pivots)), "series_compliance", xx, xy, yy)
 

@@ -21,7 +21,7 @@ from model.film.energy import heat_step
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.oil_state import Running, set_viscosity
 from model.film.reynolds import FilmForces, solve_film
-from model.interpolation import largest
+from model.interpolation import lagrange, largest
 from rigdata.arrays import FloatArray
 
 _MESH = (20, 4)
@@ -51,20 +51,8 @@ class Attitudes(NamedTuple):
 
     curvature: FloatArray  #: (n,): A
     wedge: FloatArray  #: (n,): B
-    load: FloatArray  #: (n,): Radial force over mu U R^2 L / Cp^2.
+    load: FloatArray  #: (n,): Radial force [N].
     rise: FloatArray  #: (n, rows, columns): Temperature above the inlet [K].
-
-
-class Heat(NamedTuple):
-    """What heats a film of clearance 1, speed 1 and inlet viscosity 1."""
-
-    exponent: float  #: kappa [1/K]
-    expansion: float  #: alpha_v at the inlet [1/K]
-    capacity: float  #: rho c Cp^2 / (mu U) [1/K, per metre]
-    conduction: float  #: k Cp^2 / (mu U^2) [1/K]
-
-
-ISOTHERMAL = Heat(0.0, 0.0, math.inf, 0.0)
 
 
 def attitudes(grid: FilmGrid, clearance: float, running: Running, inlet: float, load: float) -> Attitudes:
@@ -72,18 +60,18 @@ def attitudes(grid: FilmGrid, clearance: float, running: Running, inlet: float, 
     oil, (specific, conductivity) = running.oil, running.heat
     viscosity = oil[0] * math.exp(oil[1] * (40.0 - inlet))
     density = oil[2] * (1.0 + oil[3] * (40.0 - inlet))
-    heat = ISOTHERMAL
+    alone = Running(1.0, (1.0, 0.0, 1.0, 0.0), (math.inf, 0.0))
     size = viscosity * running.speed / clearance**2
     if math.isfinite(specific):
-        capacity = _rounded(density * specific / size)
-        conduction = _rounded(conductivity / (size * running.speed))
-        heat = Heat(oil[1], oil[3] * oil[2] / density, capacity, conduction)
-    radius = float(grid.dx * (len(grid.angle) - 1) / (grid.angle[-1] - grid.angle[0]))
+        heat = _rounded(density * specific / size), _rounded(conductivity / (size * running.speed))
+        alone = Running(1.0, (1.0, oil[1], 1.0, oil[3] * oil[2] / density), heat)
+    radius = float(grid.dx / (grid.angle[1] - grid.angle[0]))
     length = 2.0 * float(grid.z[-1])
-    deepest = load / (size * radius**2 * length)
-    depth = 4.0 ** math.ceil(math.log(max(deepest, 1e-3), 4.0))
+    unit = size * radius**2 * length
+    depth = 4.0 ** math.ceil(math.log(max(load / unit, 1e-3), 4.0))
     ends = round(float(grid.angle[0]), 12), round(float(grid.angle[-1]), 12)
-    return _attitudes(ends, round(radius, 12), round(length, 12), heat, depth)
+    curve = _attitudes(ends, round(radius, 12), round(length, 12), alone, depth)
+    return curve._replace(load=unit * curve.load)
 
 
 def _rounded(value: float) -> float:
@@ -91,33 +79,33 @@ def _rounded(value: float) -> float:
 
 
 @lru_cache(maxsize=256)
-def _attitudes(ends: tuple[float, float], radius: float, length: float, heat: Heat, depth: float) -> Attitudes:
-    """Solve the attitudes of a film between two angles from the pivot; none if it never carries."""
+def _attitudes(ends: tuple[float, float], radius: float, length: float, running: Running, depth: float) -> Attitudes:
+    """Solve the attitudes of a film between two angles from the pivot; none if it never carries.
+
+    `depth` and the loads are over mu U R^2 L / Cp^2.
+    """
     grid = film_grid(*ends, radius, length, _MESH, True)
     work = film_work(grid, 40.0)
-    isothermal = math.isinf(heat.capacity)
-    oil = (1.0, heat.exponent, 1.0, heat.expansion)
-    running = Running(1.0, oil, (1.0 if isothermal else heat.capacity, heat.conduction))
     numbers = np.zeros((2 * _ROWS, 3))
-    rises = np.zeros((2 * _ROWS, *work.temperature.shape))
-    low, high = walk(grid, work, running, (isothermal, depth * radius**2 * length), (numbers, rises))
+    rises = np.zeros((2 * _ROWS, work.temperature.size))
+    low, high = walk(grid, work, running, depth * radius**2 * length, (numbers, rises))
     if high - low < 3:
         nothing = np.zeros(1)
         return Attitudes(nothing, nothing, nothing, np.zeros((1, *work.temperature.shape)))
     (curvature, wedge, load), rise = points_between(numbers[low:high], rises[low:high])
-    return Attitudes(curvature, wedge, load / (radius**2 * length), rise)
+    return Attitudes(curvature, wedge, load / (radius**2 * length), rise.reshape(-1, *work.temperature.shape))
 
 
 @compiled
 def points_between(rows: FloatArray, rises: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Points (A, B, W) of a curve, (3, n), and their temperatures: cubics through four rows (A, B, W).
+    """Points (A, B, W) of a curve, (3, n), and their temperatures, (n, nodes): cubics through four rows (A, B, W).
 
     A is nearly a parabola of the wedge, W nearly a power of it; from the parallel film on to the first row all is
     straight.
     """
     last, count = len(rows) - 1, min(4, len(rows))
     points = np.zeros((3, _BETWEEN * (last + 1) + 1))
-    warm = np.empty((points.shape[1], rises.shape[1], rises.shape[2]))
+    warm = np.zeros((points.shape[1], rises.shape[1]))
     logarithms = np.log(rows[:, 1:])
     for p in range(points.shape[1]):
         row, share = p // _BETWEEN - 1, p % _BETWEEN / _BETWEEN
@@ -127,30 +115,15 @@ def points_between(rows: FloatArray, rises: FloatArray) -> tuple[FloatArray, Flo
         first = min(max(row - 1, 0), last + 1 - count)
         place = logarithms[row, 0] + share * (logarithms[min(row + 1, last), 0] - logarithms[row, 0])
         points[1, p], power = np.exp(place), 0.0
-        by_wedge = _weights(rows[first : first + count, 1], points[1, p])
-        by_power = _weights(logarithms[first : first + count, 0], place)
+        by_wedge = lagrange(rows[first : first + count, 1], points[1, p])
+        by_power = lagrange(logarithms[first : first + count, 0], place)
         for k in range(count):
             points[0, p] += by_wedge[k] * rows[first + k, 0]
             power += by_power[k] * logarithms[first + k, 1]
+            for q in range(warm.shape[1]):
+                warm[p, q] += by_wedge[k] * rises[first + k, q]
         points[0, p], points[2, p] = max(points[0, p], _FARTHEST), np.exp(power)
-        for i in range(warm.shape[1]):
-            for j in range(warm.shape[2]):
-                rise = 0.0
-                for k in range(count):
-                    rise += by_wedge[k] * rises[first + k, i, j]
-                warm[p, i, j] = rise
     return points, warm
-
-
-@inner
-def _weights(places: FloatArray, place: float) -> FloatArray:
-    """Of values at places, (n,), in the polynomial through them, elsewhere (Lagrange)."""
-    weights = np.ones(len(places))
-    for k in range(len(places)):
-        for j in range(len(places)):
-            if j != k:
-                weights[k] *= (place - places[j]) / (places[k] - places[j])
-    return weights
 
 
 @compiled
@@ -158,24 +131,21 @@ def walk(
     grid: FilmGrid,
     work: FilmWork,
     running: Running,
-    limits: tuple[bool, float],
+    depth: float,
     out: tuple[FloatArray, FloatArray],
 ) -> tuple[int, int]:
     """Fill rows (A, B, W) and temperature rises, from the middle on flatter and deeper; first row and end.
 
-    `limits`: whether the film is isothermal, the largest load.
+    `depth`: the largest load.
     """
     numbers, rises = out
-    isothermal, depth = limits
     middle, ahead = numbers.shape[0] // 2, grid.angle[0]
     if not grid.angle[-1] > 0.0 or not ahead < 0.0:
         return middle, middle
     first = _FIRST / np.sin(grid.angle[-1])
     curvature = max(2.0 * (_OPENS + first * ahead) / ahead**2, -0.75)
-    found, curvature, load = _balance(grid, work, running, isothermal, curvature, first)
-    if not found or not load > 0.0:
+    if not _fill(grid, work, running, out, middle, (curvature, first)):
         return middle, middle
-    _keep(work, out, middle, (curvature, first, load))
     low, high = middle, middle + 1
     flatter = _FLATTER
     while low > 0 and flatter < _LEAST_STEP and numbers[low, 0] != _FARTHEST:
@@ -186,24 +156,16 @@ def walk(
         known = low if high - low > 3 else low - 1
         curvature = _ahead(work, out, wedge, (known, min(low + 3, high), low))
         work.ruptured[:] = False
-        found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
-        if found and load > 0.0:
+        if _fill(grid, work, running, out, low - 1, (curvature, wedge)):
             low -= 1
-            _keep(work, out, low, (curvature, wedge, load))
         else:
             flatter = np.sqrt(flatter)
     work.ruptured[:] = False
-    while high < numbers.shape[0]:
-        before = high - 1
-        hottest = largest(rises[before].reshape(-1))
-        if numbers[before, 2] > depth or numbers[before, 0] > _DEEPEST or hottest > _HOTTEST:
+    while high < len(numbers) and numbers[high - 1, 2] <= depth and numbers[high - 1, 0] <= _DEEPEST:
+        wedge = numbers[high - 1, 1] * _DEEPER
+        curvature = _ahead(work, out, wedge, (max(high - 3, low), high, high - 1))
+        if largest(rises[high - 1]) > _HOTTEST or not _fill(grid, work, running, out, high, (curvature, wedge)):
             break
-        wedge = numbers[before, 1] * _DEEPER
-        curvature = _ahead(work, out, wedge, (max(high - 3, low), high, before))
-        found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
-        if not found or not load > 0.0:
-            break
-        _keep(work, out, high, (curvature, wedge, load))
         high += 1
     return low, high
 
@@ -213,31 +175,38 @@ def _ahead(work: FilmWork, out: tuple[FloatArray, FloatArray], wedge: float, row
     """Curvature at a wedge, and temperatures into `work`, as rows head: from the first on, to an end; the nearest."""
     numbers, rises = out
     first, end, nearest = rows
-    weights, curvature = _weights(numbers[first:end, 1], wedge), 0.0
+    weights, curvature, rise = lagrange(numbers[first:end, 1], wedge), 0.0, np.zeros(work.temperature.size)
     for k in range(len(weights)):
         curvature += weights[k] * numbers[first + k, 0]
-    for i in range(work.temperature.shape[0]):
-        for j in range(work.temperature.shape[1]):
-            rise, last = 0.0, rises[nearest, i, j]
-            for k in range(len(weights)):
-                rise += weights[k] * rises[first + k, i, j]
-            work.temperature[i, j] = 40.0 + min(max(rise, 0.5 * last), 1.5 * last)
+        rise += weights[k] * rises[first + k]
+    last = rises[nearest]
+    work.temperature.reshape(-1)[:] = 40.0 + np.minimum(np.maximum(rise, 0.5 * last), 1.5 * last)
     most = 0.5 * (1.0 + numbers[nearest, 0])
     return max(numbers[nearest, 0] + min(max(curvature - numbers[nearest, 0], -most), most), -0.75)
 
 
 @inner
-def _keep(work: FilmWork, out: tuple[FloatArray, FloatArray], row: int, attitude: tuple[float, float, float]) -> None:
-    numbers, rises = out
-    numbers[row, 0], numbers[row, 1], numbers[row, 2] = attitude
-    for i in range(work.temperature.shape[0]):
-        for j in range(work.temperature.shape[1]):
-            rises[row, i, j] = work.temperature[i, j] - 40.0
+def _fill(
+    grid: FilmGrid,
+    work: FilmWork,
+    running: Running,
+    out: tuple[FloatArray, FloatArray],
+    row: int,
+    start: tuple[float, float],
+) -> bool:
+    """Fill a row from a start (A, B); False where nothing balances at that wedge, or carries nothing."""
+    (numbers, rises), (curvature, wedge) = out, start
+    found, curvature, load = _balance(grid, work, running, curvature, wedge)
+    if not found or not load > 0.0:
+        return False
+    numbers[row, 0], numbers[row, 1], numbers[row, 2] = curvature, wedge, load
+    rises[row] = work.temperature.reshape(-1) - 40.0
+    return True
 
 
 @inner
 def _balance(
-    grid: FilmGrid, work: FilmWork, running: Running, isothermal: bool, curvature: float, wedge: float
+    grid: FilmGrid, work: FilmWork, running: Running, curvature: float, wedge: float
 ) -> tuple[bool, float, float]:
     """A at which the heated film has no moment, and its load: more A takes the pressure upstream."""
     shift = np.empty(work.unknown.shape[0])
@@ -250,7 +219,7 @@ def _balance(
             curvature, last = 1.5 * curvature + 0.2, 0.0
             continue
         moment, load, warmer, hottest = forces.force[1], forces.force[0], 0.0, 0.0
-        if not isothermal:
+        if math.isfinite(running.heat[0]):
             warmer, _, radial, tangential = heat_step(grid, work, running, (40.0, 1.0, 30.0), shift)
             moment = moment + tangential
             load = load + radial

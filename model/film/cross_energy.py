@@ -23,6 +23,7 @@ from model.film.matrix import factorise_general
 from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
+_Film = tuple[FilmGrid, FilmWork, CrossFilm]
 #: Least share of its Couette flow that a cell is taken to carry downstream.
 _LEAST_FLOW = 1e-3
 #: Net flow over the leading edge, as a share of the Couette flow, below which the heat balance there is said to be off.
@@ -50,37 +51,24 @@ def cross_operator(
     for i in range(nt):
         for j in range(lines):
             _shared_flow(film, speed, i, j, flows[i, j])
-    space = _space(lines, cells)
-    last = np.zeros(n)
-    _dissipation(grid, work, cross, speed, 0, last)
+    shape, made = (lines, cells), np.zeros((nt + 1, n))
+    over = np.zeros((lines, cells + 1)), np.zeros((lines + 1, cells))
+    space = _Space(*over, np.zeros((4, *shape)), np.zeros(shape), np.zeros(shape))
+    for i in range(nt + 1):
+        _dissipation(film, speed, i, made[i])
+    # a hotter film shears with less heat: taken as it will be, or the two would swing
+    dissipation[:] = 0.5 * heat[2] * (made[:-1] + made[1:])
+    less = heat[4] * dissipation
+    dissipation += less * cross.temperature[1:].reshape((nt, n))
     for i in range(nt):
         _box(film, speed, heat, i, flows, space)
         _set_rows(space, factor[i], before[i])
-        for j in range(lines):
-            exchange = space.coupling[1, j, cells - 1]
-            journal[i, j, 0] = (1.0 - space.theta[j, cells - 1]) * exchange
-            journal[i, j, 1] = space.theta[j, cells - 1] * exchange
-        for k in range(n):
-            dissipation[i, k] = 0.5 * heat[2] * last[k]
-        _dissipation(grid, work, cross, speed, i + 1, last)
-        for k in range(n):
-            dissipation[i, k] += 0.5 * heat[2] * last[k]
-        _make_less(cross.temperature[i + 1], heat[4], dissipation[i], factor[i])
+        exchange, share = space.coupling[1, :, -1], space.theta[:, -1]
+        journal[i, :, 0], journal[i, :, 1] = (1.0 - share) * exchange, share * exchange
+        factor[i, :, cells] += less[i]
         factorise_general(factor[i])
-    for j in range(lines):
-        for m in range(cells):
-            carried[j, m] = heat[0] * max(flows[nt - 1, j, m], 0.0)
+    carried[:] = heat[0] * np.maximum(flows[-1], 0.0)
     return _flow_back(grid, work, speed, flows[0])
-
-
-@inner
-def _make_less(temperature: FloatArray, thinning: float, dissipation: FloatArray, factor: FloatArray) -> None:
-    """A hotter film shears with less heat: taken as it will be, or the two would swing."""
-    cells = temperature.shape[1]
-    for k in range(len(dissipation)):
-        less = thinning * dissipation[k]
-        factor[k, cells] += less
-        dissipation[k] += less * temperature[k // cells, k % cells]
 
 
 @inner
@@ -98,7 +86,7 @@ def _flow_back(grid: FilmGrid, work: FilmWork, speed: float, flows: FloatArray) 
 
 
 @inner
-def _shared_flow(film: tuple[FilmGrid, FilmWork, CrossFilm], speed: float, i: int, j: int, flow: FloatArray) -> None:
+def _shared_flow(film: _Film, speed: float, i: int, j: int, flow: FloatArray) -> None:
     """Mass flow of every cell through the face between stations i and i + 1 [kg/s]; their sum is the face's."""
     grid, work, cross = film
     edges, cells = cross.edges, len(cross.edges) - 1
@@ -126,18 +114,17 @@ def _shared_flow(film: tuple[FilmGrid, FilmWork, CrossFilm], speed: float, i: in
 
 
 @inner
-def _side_shares(cross: CrossFilm, i: int, j: int, shares: FloatArray) -> None:
-    """Share of every cell in a flow that pressure drives, between lines j and j + 1 and stations i and i + 1."""
+def _side_flow(cross: CrossFilm, i: int, j: int, aside: float, flow: FloatArray) -> None:
+    """Every cell's part of a flow that pressure drives, between lines j and j + 1 and stations i and i + 1."""
     edges, cells = cross.edges, len(cross.edges) - 1
     centre = 0.25 * (cross.centre[i, j] + cross.centre[i + 1, j] + cross.centre[i, j + 1] + cross.centre[i + 1, j + 1])
     below, total = 0.0, 0.0
     for m in range(cells):
         light = cross.fluidity[i, j, m] + cross.fluidity[i + 1, j, m]
         light += cross.fluidity[i, j + 1, m] + cross.fluidity[i + 1, j + 1, m]
-        shares[m], below = _across_cell(edges, m, centre, (below, 0.0, light))
-        total += shares[m]
-    for m in range(cells):
-        shares[m] /= total
+        flow[m], below = _across_cell(edges, m, centre, (below, 0.0, light))
+        total += flow[m]
+    flow *= aside / total
 
 
 @inner
@@ -159,25 +146,11 @@ class _Space(NamedTuple):
     coupling: FloatArray  #: (4, ..): To the cells below and above, the lines before and after [W/K].
     carried: FloatArray  #: Along [W/K].
     theta: FloatArray  #: The later station's share in the exchange.
-    shares: FloatArray  #: (cells,)
-
-
-@inner
-def _space(lines: int, cells: int) -> _Space:
-    shape = (lines, cells)
-    return _Space(
-        np.zeros((lines, cells + 1)),
-        np.zeros((lines + 1, cells)),
-        np.zeros((4, lines, cells)),
-        np.zeros(shape),
-        np.zeros(shape),
-        np.zeros(cells),
-    )
 
 
 @inner
 def _box(
-    film: tuple[FilmGrid, FilmWork, CrossFilm],
+    film: _Film,
     speed: float,
     heat: tuple[float, float, float, float, float],
     i: int,
@@ -188,14 +161,11 @@ def _box(
     grid, work, cross = film
     lines, cells = space.theta.shape
     edges, conductivity, specific = cross.edges, heat[1], heat[0]
-    up, sideways, coupling, carried, theta, shares = space
-    low, high, first, last = coupling[0], coupling[1], coupling[2], coupling[3]
+    up, sideways, (low, high, first, last), carried, theta = space
     resists = np.empty(cells)  # of half a cell
     for j in range(lines - 1):
-        _side_shares(cross, i, j, shares)
         aside = 0.5 * (work.flow[1, i * lines + j] + work.flow[1, (i + 1) * lines + j])
-        for m in range(cells):
-            sideways[j + 1, m] = aside * shares[m]
+        _side_flow(cross, i, j, aside, sideways[j + 1])
     for j in range(lines):
         h = 0.5 * (work.thickness[i, j] + work.thickness[i + 1, j])
         station = conductivity * grid.dx * grid.height[j] / h
@@ -206,14 +176,11 @@ def _box(
         for m in range(cells):
             wide = edges[m + 1] - edges[m]
             carried[j, m] = specific * max(flows[i, j, m], least * wide)
-            if m > 0:
-                pass_on = station / (resists[m] + resists[m - 1])
-                low[j, m] = max(pass_on + 0.5 * specific * up[j, m], max(0.0, specific * up[j, m]))
+            high[j, m] = heat[3] * station / resists[m]
             if m < cells - 1:
-                pass_on = station / (resists[m + 1] + resists[m])
-                high[j, m] = max(pass_on - 0.5 * specific * up[j, m + 1], max(0.0, -specific * up[j, m + 1]))
-            else:
-                high[j, m] = heat[3] * station / resists[m]
+                pass_on, rises = station / (resists[m + 1] + resists[m]), specific * up[j, m + 1]
+                low[j, m + 1] = max(pass_on + 0.5 * rises, rises, 0.0)
+                high[j, m] = max(pass_on - 0.5 * rises, -rises, 0.0)
             if j == lines - 1:  # the edge is upwind: what leaves takes its temperature along
                 first[j, m] = 0.5 * specific * max(sideways[j, m], 0.0)
             elif j > 0:
@@ -235,21 +202,19 @@ def _upward(flows: FloatArray, sideways: FloatArray, first: int, i: int, j: int,
     """
     nt, cells = flows.shape[0], flows.shape[2]
     edge = j == sideways.shape[0] - 2 or (j == 0 and first == 1)
-    total, magnitude = 0.0, 0.0
-    for turn in range(2):
-        running = 0.0
-        for m in range(cells):
-            behind = flows[max(i - 1, 0), j, m]
-            ahead = flows[min(i + 1, nt - 1), j, m]
-            gain = 0.5 * (behind - ahead) if 0 < i < nt - 1 else behind - ahead
-            if not edge:
-                gain += sideways[j, m] - sideways[j + 1, m]
-            if turn == 0:
-                total += gain
-                magnitude += abs(flows[i, j, m])
-            else:
-                running += gain - total * abs(flows[i, j, m]) / magnitude
-                up[m + 1] = running
+    total, magnitude, part = 0.0, 0.0, 0.0
+    for m in range(cells):
+        gain = flows[max(i - 1, 0), j, m] - flows[min(i + 1, nt - 1), j, m]
+        if 0 < i < nt - 1:
+            gain *= 0.5
+        if not edge:
+            gain += sideways[j, m] - sideways[j + 1, m]
+        total += gain
+        magnitude += abs(flows[i, j, m])
+        up[m + 1] = total
+    for m in range(cells - 1):
+        part += abs(flows[i, j, m])
+        up[m + 1] -= total * part / magnitude
     up[cells] = 0.0
 
 
@@ -275,10 +240,9 @@ def _set_rows(space: _Space, factor: FloatArray, before: FloatArray) -> None:
 
 
 @inner
-def _dissipation(
-    grid: FilmGrid, work: FilmWork, cross: CrossFilm, speed: float, i: int, dissipation: FloatArray
-) -> None:
+def _dissipation(film: _Film, speed: float, i: int, dissipation: FloatArray) -> None:
     """Heat made in the cells of a station, per length dx and control-volume height [W], full film."""
+    grid, work, cross = film
     p, edges, cells = work.pressure, cross.edges, len(cross.edges) - 1
     behind, ahead = max(i - 1, 0), min(i + 1, len(p) - 1)
     for j in range(p.shape[1]):

@@ -1,79 +1,64 @@
 """Temperatures across a film from its factorised heat balances: marched as answers, or for what a pad conducts."""
 
-from typing import Any
+import math
 
 import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.cross_film import CrossOperator
-from model.film.dense import product, residual, times
+from model.film.dense import gmres, times
 from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
-#: GMRES steps at most; what they leave contracts with the rest.
-_STEPS = 12
-#: An answer beyond this is none [K^2].
-_BOUNDLESS = 1e30
-
-
-def _marching(count: int) -> Any:
-    """`march_cross` for three fields, or one: numbers that do not wait for one another cost little more than one."""
-    one, other = 1 % count, 2 % count
-
-    @inner
-    def march_fields(operator: CrossOperator, fields: FloatArray, sources: FloatArray) -> FloatArray:
-        n, (lines, cells) = fields.shape[1], operator.carried.shape
-        heat_flow = np.zeros(count)
-        for i in range(operator.factor.shape[0]):
-            band, before, journal = operator.factor[i], operator.before[i], operator.journal[i]
-            old, new = fields[i], fields[i + 1]
-            for k in range(n):
-                weight = before[k, 0]
-                a, b, c = weight * old[k, 0] + sources[i, k], weight * old[k, one], weight * old[k, other]
-                for side in range(4):
-                    step = (1 if side < 2 else cells) * (2 * (side % 2) - 1)
-                    weight, r = before[k, 1 + side], min(max(k + step, 0), n - 1)
-                    a, b, c = a + weight * old[r, 0], b + weight * old[r, one], c + weight * old[r, other]
-                if (k + 1) % cells == 0:  # beside a journal that is a kelvin warm for the third field
-                    c += journal[k // cells, 0] + journal[k // cells, 1]
-                for s in range(min(cells, k), 0, -1):
-                    weight, r = band[k, cells - s], k - s
-                    a, b, c = a - weight * new[r, 0], b - weight * new[r, one], c - weight * new[r, other]
-                new[k, 0] = a
-                if count == 3:
-                    new[k, 1], new[k, 2] = b, c
-            for k in range(n - 1, -1, -1):
-                a, b, c = new[k, 0], new[k, one], new[k, other]
-                for s in range(min(cells, n - 1 - k), 0, -1):
-                    weight, r = band[k, cells + s], k + s
-                    a, b, c = a - weight * new[r, 0], b - weight * new[r, one], c - weight * new[r, other]
-                new[k, 0] = a * band[k, cells]
-                if count == 3:
-                    new[k, 1], new[k, 2] = b * band[k, cells], c * band[k, cells]
-            for j in range(lines):
-                k = j * cells + cells - 1
-                for q in range(count):
-                    heat_flow[q] += journal[j, 0] * old[k, q] + journal[j, 1] * new[k, q]
-                if count == 3:
-                    heat_flow[2] -= journal[j, 0] + journal[j, 1]
-        return heat_flow
-
-    return march_fields
-
-
-_march_one, _march_three = _marching(1), _marching(3)
+_Three = tuple[float, float, float]
+#: A film, the edges of its cells and the oil's conductivity.
+_Solved = tuple[FilmGrid, FilmWork, FloatArray, float]
 
 
 @compiled
 def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray) -> FloatArray:
-    """March temperature fields: of oil that enters as `fields` say; the first with sources, the third beside a journal.
+    """March three fields of oil that enters as they say; the first with sources, the third beside a journal.
 
-    The equation is linear: the three are the answers to sources, to a kelvin of the inlet, and of the journal. One
-    alone is that of the sources.
+    The equation is linear: the three are the answers to sources, to a kelvin of the inlet, and of the journal. Numbers
+    that do not wait for one another cost little more than one.
 
-    `fields` (nt + 1, n, 1 or 3) [degC], `sources` (nt, n) [W]; gives what the journal takes of each [W].
+    `fields` (nt + 1, n, 3) [degC], `sources` (nt, n) [W]; gives what the journal takes of each [W].
     """
-    return _march_three(operator, fields, sources) if fields.shape[2] == 3 else _march_one(operator, fields, sources)
+    n, (lines, cells) = fields.shape[1], operator.carried.shape
+    heat_flow = np.zeros(3)
+    for i in range(operator.factor.shape[0]):
+        band, before, journal = operator.factor[i], operator.before[i], operator.journal[i]
+        old, new = fields[i], fields[i + 1]
+        for k in range(n):
+            beside = 0.0  # a journal that is a kelvin warm for the third field
+            if (k + 1) % cells == 0:
+                beside = journal[k // cells, 0] + journal[k // cells, 1]
+            values = _plus((sources[i, k], 0.0, beside), before[k, 0], old, k)
+            for side in range(4):
+                step = (1 if side < 2 else cells) * (2 * (side % 2) - 1)
+                values = _plus(values, before[k, 1 + side], old, min(max(k + step, 0), n - 1))
+            for s in range(min(cells, k), 0, -1):
+                values = _plus(values, -band[k, cells - s], new, k - s)
+            new[k, 0], new[k, 1], new[k, 2] = values
+        for k in range(n - 1, -1, -1):
+            values = (new[k, 0], new[k, 1], new[k, 2])
+            for s in range(min(cells, n - 1 - k), 0, -1):
+                values = _plus(values, -band[k, cells + s], new, k + s)
+            for q in range(3):
+                new[k, q] = values[q] * band[k, cells]
+        for j in range(lines):
+            k = j * cells + cells - 1
+            for q in range(3):
+                heat_flow[q] += journal[j, 0] * old[k, q] + journal[j, 1] * new[k, q]
+            heat_flow[2] -= journal[j, 0] + journal[j, 1]
+    return heat_flow
+
+
+@inner
+def _plus(values: _Three, weight: float, fields: FloatArray, row: int) -> _Three:
+    """Three values and a row of the fields, weighted."""
+    a, b, c = values
+    return a + weight * fields[row, 0], b + weight * fields[row, 1], c + weight * fields[row, 2]
 
 
 @compiled
@@ -85,16 +70,11 @@ def face_temperature(
     `edges` (cells + 1,), `taken` (nt + 1, nz + 1) [W/m^2], `face` (nt + 1, nz + 1) [degC].
     """
     cells = len(edges) - 1
-    first_centre = 0.5 * (edges[0] + edges[1])
-    second_centre = 0.5 * (edges[1] + edges[2])
-    for i in range(face.shape[0]):
-        for j in range(face.shape[1]):
-            slope = heat_flow[i, j] * work.thickness[i, j] / conductivity
-            first, second = field[i, j * cells], field[i, j * cells + 1]
-            bend = (second - first - slope * (second_centre - first_centre)) / (
-                second_centre * second_centre - first_centre * first_centre
-            )
-            face[i, j] = first - slope * first_centre - bend * first_centre * first_centre
+    below, above = 0.5 * (edges[0] + edges[1]), 0.5 * (edges[1] + edges[2])
+    slope = heat_flow * work.thickness / conductivity
+    first, second = field[:, ::cells], field[:, 1::cells]
+    bend = (second - first - slope * (above - below)) / (above * above - below * below)
+    face[:] = first - slope * below - bend * below * below
 
 
 @inner
@@ -108,7 +88,7 @@ def station_heat(grid: FilmGrid, flux: FloatArray) -> FloatArray:
 
 @compiled
 def conduct(
-    film: tuple[FilmGrid, FilmWork, FloatArray, float],
+    film: _Solved,
     operator: CrossOperator,
     pad: tuple[FloatArray, FloatArray, FloatArray],
     missing: FloatArray,
@@ -117,54 +97,40 @@ def conduct(
 ) -> float:
     """Change temperatures so that the pad takes what it conducts at its face's new temperature, not at its old one.
 
-    By how much the pad's coarser nodes change is found by GMRES.
+    By how much the pad's coarser nodes change is found by GMRES; nothing is changed where it finds none.
 
-    `missing` (nt + 1, nz + 1) [K].
+    `missing` (nt + 1, nz + 1) [K]; gives what the journal takes besides [W].
     """
-    flux, to_coarse, guess = pad
-    rhs = times(to_coarse, missing.reshape(-1))
-    limit = tolerance * np.sqrt(product(rhs, rhs))
-    steps = np.empty((_STEPS, rhs.size))
-    images = np.empty((_STEPS, rhs.size))
-    faces = np.empty((_STEPS, missing.shape[0], missing.shape[1]))
-    fields = np.empty((_STEPS, *answer[0].shape))
-    heat_flow = np.empty(_STEPS)
-    weights = np.empty((_STEPS, 1))
-    left = rhs.copy()
-    count = 0
-    while count < _STEPS:
-        step = times(guess, left)
-        steps[count] = step / np.sqrt(product(step, step))
-        heat_flow[count] = _conducted(film, operator, times(flux, steps[count]), fields[count], faces[count])
-        images[count] = steps[count] - times(to_coarse, faces[count].reshape(-1))
-        if not product(images[count], images[count]) < _BOUNDLESS:
-            return np.nan
-        count += 1
-        if residual(images, count, rhs, weights, left) < limit:
-            break
-    more = 0.0
-    for k in range(count):
-        more += weights[k, 0] * heat_flow[k]
-        answer[0][:] += weights[k, 0] * fields[k]
-        answer[1][:] += weights[k, 0] * faces[k]
+    fields, face = np.zeros((*answer[0].shape, 3)), np.empty(missing.shape)
+    held = (film, operator, pad, fields, face)
+    change = gmres(_warmed, held, times(pad[1], missing.reshape(-1)), tolerance)
+    more = _conducted(film, operator, times(pad[0], change), fields, face)
+    if not math.isfinite(more):
+        return 0.0
+    answer[0][:] += fields[:, :, 0]
+    answer[1][:] += face
     return more
 
 
 @inner
-def _conducted(
-    film: tuple[FilmGrid, FilmWork, FloatArray, float],
-    operator: CrossOperator,
-    flux: FloatArray,
-    field: FloatArray,
-    face: FloatArray,
-) -> float:
-    """Temperatures of cells and face that a heat flux into the pad makes; what the journal takes up for it [W]."""
+def _warmed(
+    held: tuple[_Solved, CrossOperator, tuple[FloatArray, FloatArray, FloatArray], FloatArray, FloatArray],
+    asked: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """A change of the pad's coarser nodes, about the one that is asked for, and what the film leaves of it."""
+    film, operator, (flux, to_coarse, guess), fields, face = held
+    change = times(guess, asked)
+    _conducted(film, operator, times(flux, change), fields, face)
+    return change, change - times(to_coarse, face.reshape(-1))
+
+
+@inner
+def _conducted(film: _Solved, operator: CrossOperator, flux: FloatArray, fields: FloatArray, face: FloatArray) -> float:
+    """Temperatures of cells (the first field) and face by a heat flux into the pad; what the journal takes [W]."""
     grid, work, edges, conductivity = film
     heat = flux.reshape(face.shape)
     sources = np.zeros(operator.dissipation.shape)
     sources[:, :: len(edges) - 1] = -station_heat(grid, heat)
-    fields = field.reshape((*field.shape, 1))
-    field[0] = 0.0
-    heat_flow = _march_one(operator, fields, sources)
-    face_temperature(work, edges, conductivity, field, heat, face)
+    heat_flow = march_cross(operator, fields, sources)
+    face_temperature(work, edges, conductivity, fields[:, :, 0], heat, face)
     return heat_flow[0]

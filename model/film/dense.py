@@ -1,42 +1,42 @@
-"""Small dense systems: Gauss' elimination, the combination of vectors nearest to another, Anderson's mixing."""
+"""Small dense systems: Gauss' elimination, the combination of vectors nearest to another, GMRES, Anderson's mixing."""
 
 import math
+from typing import Any
 
 import numpy as np
 
 from model.compilation import inner
 from rigdata.arrays import FloatArray
 
-#: Differences that Anderson's mixing keeps.
-DEPTH = 4
+#: Differences that Anderson's mixing keeps, and steps of GMRES at most.
+DEPTH, _STEPS = 4, 12
+#: Kelvins beyond which a film is no film: squares would overflow.
+BOUNDLESS = 1e30
 
 
 @inner
 def solve(matrix: FloatArray, right: FloatArray) -> None:
-    """Gauss' elimination with the largest pivot of each column; the solutions replace the right-hand sides (n, q)."""
-    n = len(matrix)
+    """Gauss' elimination with the largest pivot of each column; the solutions replace the right-hand sides (.., q)."""
+    n, count = len(matrix), right.shape[1]
+    system = np.empty((n, n + count))
+    system[:, :n], system[:, n:] = matrix, right[:n]
     for k in range(n):
         best = k
         for i in range(k + 1, n):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
+            if abs(system[i, k]) > abs(system[best, k]):
                 best = i
-        if best != k:
-            for j in range(n):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-            for j in range(right.shape[1]):
-                right[k, j], right[best, j] = right[best, j], right[k, j]
+        for j in range(k, n + count):
+            system[k, j], system[best, j] = system[best, j], system[k, j]
         for i in range(k + 1, n):
-            factor = matrix[i, k] / matrix[k, k]
-            for j in range(k, n):
-                matrix[i, j] -= factor * matrix[k, j]
-            for j in range(right.shape[1]):
-                right[i, j] -= factor * right[k, j]
+            factor = system[i, k] / system[k, k]
+            for j in range(k, n + count):
+                system[i, j] -= factor * system[k, j]
     for k in range(n - 1, -1, -1):
-        for j in range(right.shape[1]):
-            total = right[k, j]
+        for j in range(count):
+            total = system[k, n + j]
             for i in range(k + 1, n):
-                total -= matrix[k, i] * right[i, j]
-            right[k, j] = total / matrix[k, k]
+                total -= system[k, i] * right[i, j]
+            right[k, j] = total / system[k, k]
 
 
 @inner
@@ -59,16 +59,29 @@ def nearest(images: FloatArray, count: int, right: FloatArray, apart: float, wei
 
 
 @inner
-def residual(images: FloatArray, count: int, right: FloatArray, weights: FloatArray, left: FloatArray) -> float:
-    """What the first images leave of a vector (n,) with the weights nearest to it, into `left`; its size.
+def gmres(step_of: Any, held: Any, right: FloatArray, tolerance: float) -> FloatArray:
+    """Steps (n,) whose images add up to a vector, to a share of it; NaN where an image is `BOUNDLESS`.
 
-    A step of GMRES: Y. Saad, SIAM J. Sci. Comput. 14 (1993) 461.
+    ``step_of(held, left)`` gives a step towards what is left, and its image; linear. What the last step leaves
+    contracts with the rest. Y. Saad, SIAM J. Sci. Comput. 14 (1993) 461.
     """
-    nearest(images, count, right, 1e-13, weights)
-    left[:] = right
-    for r in range(count):
-        left -= weights[r, 0] * images[r]
-    return math.sqrt(product(left, left))
+    answer, left, count = np.zeros(len(right)), right.copy(), 0
+    steps, images, weights = np.empty((_STEPS, len(right))), np.empty((_STEPS, len(right))), np.zeros((_STEPS, 1))
+    size = math.sqrt(product(right, right))
+    length = size
+    while count < _STEPS and length > tolerance * size:
+        steps[count], images[count] = step_of(held, left / length)
+        if not product(images[count], images[count]) < BOUNDLESS:
+            return np.full(len(right), math.nan)
+        count += 1
+        nearest(images, count, right, 1e-13, weights)
+        left[:] = right
+        for k in range(count):
+            left -= weights[k, 0] * images[k]
+        length = math.sqrt(product(left, left))
+    for k in range(count):
+        answer += weights[k, 0] * steps[k]
+    return answer
 
 
 @inner

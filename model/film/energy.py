@@ -28,40 +28,25 @@ _LEAST_FLOW = 0.2
 @compiled
 def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running, temperature: FloatArray) -> float:
     """March the film temperature from the leading edge: `temperature` (nt + 1, nz + 1) [degC]."""
-    rows, columns = temperature.shape
-    fields = temperature.reshape((1, rows, columns))
-    loss = np.empty((rows, columns))
-    sources = np.empty((1, rows, columns))
-    heat_sources(grid, work, running, 1.0, sources[0], loss)
-    for j in range(columns):
-        temperature[0, j] = inlet
-    return march(grid, work, running, loss, fields, between(sources))
+    made, loss = heat_sources(grid, work, running, 1.0)
+    shape = (1, *temperature.shape)
+    temperature[0] = inlet
+    return march(grid, work, running, loss, temperature.reshape(shape), between(made.reshape(shape)))
 
 
 @inner
-def heat_sources(
-    grid: FilmGrid, work: FilmWork, running: Running, kept: float, made: FloatArray, loss: FloatArray
-) -> None:
+def heat_sources(grid: FilmGrid, work: FilmWork, running: Running, kept: float) -> tuple[FloatArray, FloatArray]:
     """What stations make [W] and lose per kelvin [W/K] if a share is kept: a hotter film makes less heat."""
     heat = dissipated(grid, work, running.speed)
-    for i in range(made.shape[0]):
-        for j in range(made.shape[1]):
-            sheared, pressed = heat[0, i, j], heat[1, i, j] + heat[2, i, j]
-            fewer = kept * running.oil[1] * max(sheared - pressed, 0.0)
-            made[i, j] = kept * (sheared + pressed + work.gained[i, j]) + fewer * work.temperature[i, j]
-            loss[i, j] = work.exchange[i, j] + fewer
+    sheared, pressed = heat[0], heat[1] + heat[2]
+    fewer = kept * running.oil[1] * np.maximum(sheared - pressed, 0.0)
+    return kept * (sheared + pressed + work.gained) + fewer * work.temperature, work.exchange + fewer
 
 
 @inner
 def between(sources: FloatArray) -> FloatArray:
     """What stations make, (m, nt + 1, nz + 1), as what is made between them, (m, nt, nz + 1)."""
-    count, rows, columns = sources.shape
-    made = np.empty((count, rows - 1, columns))
-    for m in range(count):
-        for i in range(rows - 1):
-            for j in range(columns):
-                made[m, i, j] = 0.5 * (sources[m, i, j] + sources[m, i + 1, j])
-    return made
+    return 0.5 * (sources[:, :-1] + sources[:, 1:])
 
 
 @compiled
@@ -72,12 +57,12 @@ def march(grid: FilmGrid, work: FilmWork, running: Running, loss: Any, fields: A
     """
     specific, h, density = running.heat[0], work.thickness, work.density
     (count, rows, lines), limited = fields.shape, 0.0
-    lower, upper, main = np.zeros(lines), np.zeros(lines), np.zeros(lines, dtype=loss.dtype)
+    sides, main = np.zeros((2, lines)), np.zeros(lines, dtype=loss.dtype)
     rhs = np.zeros((lines, count), dtype=fields.dtype)
     for i in range(rows - 1):
-        _side_exchange(grid, work, running, i, lower, upper)
+        side_exchange(grid, running, i, (work.flow, h), work.flow, sides)
         for j in range(lines):
-            low, high, flow = lower[j], upper[j], work.flow[0, i * lines + j]
+            low, high, flow = sides[0, j], sides[1, j], work.flow[0, i * lines + j]
             dragged = h[i, j] * density[i, j] + h[i + 1, j] * density[i + 1, j]
             couette = 0.25 * running.speed * dragged * grid.height[j]
             if flow < _LEAST_FLOW * couette:
@@ -93,7 +78,7 @@ def march(grid: FilmGrid, work: FilmWork, running: Running, loss: Any, fields: A
                 if j < lines - 1:
                     value -= high * t[j + 1]
                 rhs[j, m] = value
-        tridiagonal(lower, main, upper, rhs)
+        tridiagonal(sides[0], main, sides[1], rhs)
         for m in range(count):
             for j in range(lines):
                 fields[m, i + 1, j] = rhs[j, m]
@@ -101,22 +86,27 @@ def march(grid: FilmGrid, work: FilmWork, running: Running, loss: Any, fields: A
 
 
 @inner
-def _side_exchange(
-    grid: FilmGrid, work: FilmWork, running: Running, i: int, lower: FloatArray, upper: FloatArray
+def side_exchange(
+    grid: FilmGrid, running: Running, i: int, carried: tuple[Any, FloatArray], steady: FloatArray, sides: Any
 ) -> None:
-    """Factors of (T[j-1] - T[j]) and (T[j+1] - T[j]) after station i; half of them act there, half at the next."""
-    h, lines = work.thickness, len(lower)
+    """Factors of (T[j-1] - T[j]) and (T[j+1] - T[j]) after station i, (2, lines); half of them act there, half beyond.
+
+    Linear in what is carried, mass flow (2, nodes) and thickness (nt + 1, nz + 1), real or complex; the sense of a
+    `steady` flow says whether oil enters at an edge.
+    """
+    (flow, h), (lower, upper), lines = carried, sides, sides.shape[1]
     for j in range(lines - 1):
         n = i * lines + j
-        aside = 0.25 * running.heat[0] * (work.flow[1, n] + work.flow[1, n + lines])
+        aside = 0.25 * running.heat[0] * (flow[1, n] + flow[1, n + lines])
         film = h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1]
         conducted = 0.25 * running.heat[1] * grid.dx / grid.dz[j] * film
         upper[j], lower[j + 1] = 0.5 * (aside - conducted), -0.5 * (aside + conducted)
         # the edges are upwind: what leaves takes its temperature along
+        leaves = steady[1, n] + steady[1, n + lines] > 0.0
         if j == lines - 2:
-            lower[j + 1] = -0.5 * max(aside, 0.0)
+            lower[j + 1] = -0.5 * aside if leaves else 0.0 * aside
         if j == 0 and grid.first == 1:
-            upper[j] = -0.5 * max(-aside, 0.0)
+            upper[j] = 0.0 * aside if leaves else 0.5 * aside
 
 
 @compiled
@@ -143,12 +133,15 @@ def warm(
     Returns the largest change asked for [K], and the change of the film's force.
     """
     change = largest(asked.reshape(-1))
-    share = limits[0] * min(1.0, limits[1] / max(change, 1e-30))
-    for i in range(asked.shape[0]):
-        for j in range(asked.shape[1]):
-            work.temperature[i, j] += share * asked[i, j]
+    work.temperature[:] += limited_share(change, limits) * asked
     radial, tangential = pressure_change(grid, work, running.speed, running.oil, shift)
     return change, radial, tangential
+
+
+@inner
+def limited_share(change: float, limits: tuple[float, float]) -> float:
+    """Share of a change of temperature [K] that is made, of two limits: a share, and kelvins."""
+    return limits[0] * min(1.0, limits[1] / max(abs(change), 1e-30))
 
 
 @inner

@@ -23,27 +23,23 @@ def film_faces(grid: FilmGrid, work: FilmWork, wedge: Wedge, speed: float) -> Fa
     """Faces of a laminar film that is full everywhere; `wedge` is (Cp, a, b)."""
     shape, extra = grid.conducts.shape, work.extra.reshape(-1)
     light, dragged = oil_flows(work)
-    height, conductance, couette, power = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
+    height, conductance, couette = np.empty(shape), np.empty(shape), np.empty(shape)
     for side in range(2):
         step = grid.steps[side]
         for n in range(len(extra) - step):
             even = wedge[0] - wedge[1] * grid.cos_face[side, n] - wedge[2] * grid.sin_face[side, n]
             h = even + 0.5 * (extra[n] + extra[n + step])
-            height[side, n], power[side, n] = h, 3.0
+            height[side, n] = h
             conductance[side, n] = h * h * h / 24.0 * (light[n] + light[n + step]) * grid.conducts[side, n]
             couette[side, n] = 0.25 * speed * h * (dragged[n] + dragged[n + step]) * grid.drags[side, n]
-    return Faces(height, conductance, couette, power)
+    return Faces(height, conductance, couette, np.full(shape, 3.0))
 
 
 @inner
 def oil_flows(work: FilmWork) -> tuple[FloatArray, FloatArray]:
     """Density over viscosity [s/m^2], and what the journal drags along, density times drag [kg/m^3], (nodes,)."""
-    density, viscosity, drag = work.density.reshape(-1), work.viscosity.reshape(-1), work.drag.reshape(-1)
-    light, dragged = np.empty(len(density)), np.empty(len(density))
-    for n in range(len(density)):
-        light[n] = density[n] / viscosity[n]
-        dragged[n] = density[n] * drag[n]
-    return light, dragged
+    density = work.density.reshape(-1)
+    return density / work.viscosity.reshape(-1), density * work.drag.reshape(-1)
 
 
 @compiled

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.energy import dissipated, march, slope_products
+from model.film.energy import dissipated, march, side_exchange, slope_products
 from model.film.faces import conductances, net_inflow
 from model.film.matrix import substitute
 from model.film.mesh import FilmGrid, FilmWork, Wedge
@@ -43,59 +43,44 @@ def heat_impedance(
     grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Running, omega: float, settled: float
 ) -> ComplexArray:
     """What the temperature that follows adds to a film's impedance; it ends when it changes by a share `settled`."""
-    shape, unknowns = work.pressure.shape, len(work.unknown)
-    film = _Film(grid, work, running, conductances(grid, work, wedge), np.empty(shape))
-    out, loss = np.zeros((2, 2), dtype=np.complex128), np.empty(shape, dtype=np.complex128)
-    nothing = np.zeros(shape, dtype=np.complex128)
-    heat = dissipated(grid, work, running.speed)
-    for i in range(shape[0]):
-        for j in range(shape[1]):
-            sheared, pressed, h = heat[0, i, j], heat[1, i, j] + heat[2, i, j], work.thickness[i, j]
-            film.closer[i, j] = (3.0 * pressed - sheared) / h
-            # what a kelvin at a node stores and makes less [W/K]
-            stored = 1j * omega * running.heat[0] * grid.dx * grid.height[j] * work.density[i, j] * h
-            loss[i, j] = stored + running.oil[1] * (sheared - pressed) + work.exchange[i, j]
+    shape, heat = work.pressure.shape, dissipated(grid, work, running.speed)
+    sheared, pressed = heat[0], heat[1] + heat[2]
+    closer = (3.0 * pressed - sheared) / work.thickness
+    film = _Film(grid, work, running, conductances(grid, work, wedge), closer)
+    out, nothing = np.full((2, 2), np.nan + 0j), np.zeros(shape, dtype=np.complex128)
+    # what a kelvin at a node stores and makes less [W/K]
+    stored = 1j * omega * running.heat[0] * grid.dx * grid.height * work.density * work.thickness
+    loss = stored + running.oil[1] * (sheared - pressed) + work.exchange
     for axis in range(2):
-        thicker = np.empty(shape)
-        for i in range(shape[0]):
-            thicker[i] = -grid.cos[i] if axis == 0 else -grid.sin[i]
-        warmer, pressure, answer = nothing, nothing.copy(), np.zeros(unknowns, dtype=np.complex128)
-        ended = False
+        thicker = np.zeros(shape) - (grid.cos if axis == 0 else grid.sin).reshape((-1, 1))
+        frozen = work.slopes[:, axis] + 1j * omega * work.slopes[:, 2 + axis]
+        warmer, pressure, answer = nothing, nothing.copy(), np.zeros(len(frozen), dtype=np.complex128)
         for _ in range(_MOST_TURNS):
-            for k in range(unknowns):
-                frozen = work.slopes[k, axis] + 1j * omega * work.slopes[k, 2 + axis]
-                pressure.reshape(-1)[grid.node[k]] = frozen + answer[k]
-            fields = np.zeros((1, shape[0], shape[1]), dtype=np.complex128)
+            pressure.reshape(-1)[grid.node] = frozen + answer
+            fields = np.zeros((1, *shape), dtype=np.complex128)
             march(grid, work, running, loss, fields, _gain(film, thicker, warmer, pressure))
             asked, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
             warmer = fields[0]
-            _pressure(film, 0.0 * thicker, warmer, nothing, omega, answer)
+            _pressure(film, warmer, omega, answer)
             if asked < settled * size:
-                ended = True
+                out[:, axis] = force_of(grid, grid.area, answer.reshape((-1, 1)))[:, 0]
                 break
-        out[:, axis] = force_of(grid, grid.area, answer.reshape((-1, 1)))[:, 0]
-        if not ended:
-            out[:, axis] = np.nan
     return out
 
 
 @inner
-def _pressure(
-    film: _Film, thicker: FloatArray, warmer: ComplexArray, pressure: ComplexArray, omega: float, answer: ComplexArray
-) -> None:
+def _pressure(film: _Film, warmer: ComplexArray, omega: float, answer: ComplexArray) -> None:
     """Change of pressure by a change of temperature, into `answer` (unknowns,)."""
     grid, work, oil = film.grid, film.work, film.running.oil
-    net_inflow(grid, _flows(film, thicker, warmer, pressure), answer)
-    by_heat = 1j * omega * oil[2] * oil[3]
-    for k in range(len(answer)):
-        i, j = divmod(grid.node[k], grid.steps[0])
-        answer[k] += by_heat * warmer[i, j] * work.thickness[i, j] * grid.dx * grid.height[j]
+    net_inflow(grid, _flows(film, None, warmer, 0.0 * warmer), answer)
+    stored = 1j * omega * oil[2] * oil[3] * grid.dx * grid.height * warmer * work.thickness
+    answer += stored.reshape(-1)[grid.node]
     keep_ruptured(grid, work, answer)
     substitute(work.band, answer)
 
 
 @inner
-def _flows(film: _Film, thicker: FloatArray, warmer: ComplexArray, pressure: ComplexArray) -> ComplexArray:
+def _flows(film: _Film, thicker: FloatArray | None, warmer: ComplexArray, pressure: ComplexArray) -> ComplexArray:
     """Change of the mass flows through the faces, (2, nodes) [kg/s/m]."""
     grid, work, oil, p = film.grid, film.work, film.running.oil, pressure.reshape(-1)
     denser = -oil[2] * oil[3] * warmer
@@ -114,33 +99,21 @@ def _gain(film: _Film, thicker: FloatArray, warmer: ComplexArray, pressure: Comp
     grid, work, t, heat = film.grid, film.work, film.work.temperature, film.running.heat
     nt, lines = t.shape[0] - 1, t.shape[1]
     gained = np.empty((1, nt, lines), dtype=np.complex128)
+    sides = np.zeros((2, lines), dtype=np.complex128)
     made = _made(film, thicker, pressure)
     flows = _flows(film, thicker, warmer, pressure)
     for i in range(nt):
+        side_exchange(grid, film.running, i, (flows, thicker), work.flow, sides)
+        both = t[i] + t[i + 1]
         for j in range(lines):
             value = 0.5 * (made[i, j] + made[i + 1, j])
             value -= heat[0] * flows[0, i * lines + j] * (t[i + 1, j] - t[i, j])
-            for side in range(-1, 2, 2):
-                line = j + side
-                if not 0 <= line < lines:
-                    continue
-                face = min(j, line)
-                n = i * lines + face
-                changed = side * 0.125 * heat[0] * (flows[1, n] + flows[1, n + lines])
-                if not _is_edge(grid, j, side):
-                    thick = thicker[i, j] + thicker[i + 1, j]
-                    changed -= 0.25 * heat[1] * grid.dx / grid.dz[face] * thick
-                elif not side * (work.flow[1, n] + work.flow[1, n + lines]) < 0.0:
-                    changed *= 0.0
-                value -= changed * (t[i + 1, line] - t[i + 1, j] + t[i, line] - t[i, j])
+            if j > 0:
+                value -= sides[0, j] * (both[j - 1] - both[j])
+            if j < lines - 1:
+                value -= sides[1, j] * (both[j + 1] - both[j])
             gained[0, i, j] = value
     return gained
-
-
-@inner
-def _is_edge(grid: FilmGrid, j: int, side: int) -> bool:
-    """Whether a line is an edge of the film, seen from its neighbour."""
-    return j == len(grid.dz) if side < 0 else (j == 0 and grid.first == 1)
 
 
 @inner

@@ -37,13 +37,8 @@ def _factoriser(known: int | None) -> Any:
         n, width = band.shape[0], band.shape[1] - 1 if known is None else known
         for k in range(n):
             inverse = 1.0 / band[k, 0]
-            if k < n - width:
-                for r in range(1, width + 1):
-                    factor = band[k, r] * inverse
-                    for s in range(r, width + 1):
-                        band[k + r, s - r] -= factor * band[k, s]
-            else:
-                for r in range(1, n - k):
+            for r in range(1, width + 1):
+                if k + r < n:
                     factor = band[k, r] * inverse
                     for s in range(r, width + 1):
                         band[k + r, s - r] -= factor * band[k, s]
@@ -61,22 +56,14 @@ def _substitution(known: int | None) -> Any:
         n, width = band.shape[0], band.shape[1] - 1 if known is None else known
         for k in range(1, n):
             total = x[k]
-            if k >= width:
-                for r in range(width, 0, -1):
-                    total -= band[k - r, r] * x[k - r]
-            else:
-                for r in range(k, 0, -1):
+            for r in range(width, 0, -1):
+                if r <= k:
                     total -= band[k - r, r] * x[k - r]
             x[k] = total
-        for k in range(n):
-            x[k] /= band[k, 0]
-        for k in range(n - 2, -1, -1):
-            total = x[k]
-            if k < n - width:
-                for r in range(width, 0, -1):
-                    total -= band[k, r] * x[k + r]
-            else:
-                for r in range(n - 1 - k, 0, -1):
+        for k in range(n - 1, -1, -1):
+            total = x[k] / band[k, 0]
+            for r in range(width, 0, -1):
+                if k + r < n:
                     total -= band[k, r] * x[k + r]
             x[k] = total
 

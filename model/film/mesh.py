@@ -83,8 +83,7 @@ def film_grid(
     angle = np.linspace(start, end, nt + 1)
     z = 0.5 * length * _graded(nz, symmetric)
     first = 0 if symmetric else 1
-    face = 0.5 * (angle[1:] + angle[:-1])
-    dx, dz = radius * (end - start) / nt, np.diff(z)
+    dx, dz = radius * (end - start) / nt, z[1:] - z[:-1]
     height = np.zeros(nz + 1)
     height[:-1] += 0.5 * dz
     height[1:] += 0.5 * dz
@@ -92,8 +91,9 @@ def film_grid(
     # Trapezoids along: the rupture line leaves the profile only once differentiable.
     along = np.full(nt + 1, dx)
     along[[0, -1]] = 0.5 * dx
-    area = np.outer(along, across) * (2.0 if symmetric else 1.0)
-    faces = np.stack([np.append(face, angle[-1]), angle])
+    area = along[:, None] * across * (2.0 if symmetric else 1.0)
+    faces = np.array([angle, angle])
+    faces[0, :-1] = 0.5 * (angle[1:] + angle[:-1])
     cos_face, sin_face = (values.repeat(nz + 1, axis=1) for values in (np.cos(faces), np.sin(faces)))
     conducts, drags = np.zeros((2, nt + 1, nz + 1)), np.zeros((2, nt + 1, nz + 1))
     conducts[0, :-1], drags[0, :-1] = height / dx, height

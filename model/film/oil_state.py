@@ -20,11 +20,9 @@ class Running(NamedTuple):
 @compiled
 def set_viscosity(work: FilmWork, oil: OilConstants) -> None:
     """Eq. (4) and (5) at every node."""
-    t = work.temperature
-    for i in range(t.shape[0]):
-        for j in range(t.shape[1]):
-            work.viscosity[i, j] = oil[0] * np.exp(oil[1] * (40.0 - t[i, j]))
-            work.density[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t[i, j]))
+    colder = 40.0 - work.temperature
+    work.viscosity[:] = oil[0] * np.exp(oil[1] * colder)
+    work.density[:] = oil[2] * (1.0 + oil[3] * colder)
 
 
 @compiled

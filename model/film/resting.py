@@ -38,20 +38,20 @@ def resting_film(grid: FilmGrid, wedge: tuple[float, float], running: Running, i
     length = (grid.z[-1] - grid.z[0]) * (2.0 if grid.first == 0 else 1.0)
     leading = wedge[0] - wedge[1] * grid.cos[0]
     along, rise, power, reynolds = 0.0, 0.0, 0.0, 0.0
-    heating_before, shear_before = 0.0, 0.0
+    before = 0.0
     for i in range(len(grid.cos)):
         thickness = wedge[0] - wedge[1] * grid.cos[i]
         if not thickness > 0.0:
             return RestingFilm(math.nan, math.nan, math.nan, math.nan)
         heating = 2.0 * speed / (density * running.heat[0] * thickness**2)
         if i > 0:
-            along += 0.5 * (heating + heating_before) * grid.dx
+            along += 0.5 * (heating + before) * grid.dx
         rise = entering * along if oil[1] == 0.0 else np.log1p(oil[1] * entering * along) / oil[1]
         viscosity = entering * np.exp(-oil[1] * rise)
         shear = viscosity * speed**2 / thickness * min(1.0, leading / thickness)
-        if i > 0:
-            power += 0.5 * (shear + shear_before) * grid.dx * length
+        for area in grid.area[i]:
+            power += shear * area
         lighter = oil[2] * (1.0 + oil[3] * (40.0 - inlet - rise))
         reynolds = max(reynolds, lighter * speed * thickness / viscosity)
-        heating_before, shear_before = heating, shear
+        before = heating
     return RestingFilm(power, 0.5 * density * speed * leading * length, inlet + rise, reynolds)

@@ -120,10 +120,8 @@ def squeeze_slopes(grid: FilmGrid, work: FilmWork, shapes: Any) -> Any:
 
     Gives (unknowns, m) [Pa s per unit].
     """
-    slopes = np.empty((len(work.unknown), shapes.shape[2]), dtype=shapes.dtype)
-    for k in range(len(slopes)):
-        i, j = divmod(grid.node[k], grid.steps[0])
-        slopes[k] = -work.density[i, j] * grid.dx * grid.height[j] * shapes[i, j]
+    mass = (grid.dx * grid.height * work.density).reshape((-1, 1))
+    slopes = (-mass * shapes.reshape((len(mass), -1)))[grid.node]
     keep_ruptured(grid, work, slopes)
     substitute_many(work.band, slopes)
     return slopes

@@ -41,13 +41,13 @@ _KARMAN, _SUBLAYER, _POINTS = 0.4, 10.7, 8
 @compiled
 def excess(reynolds: float, law: tuple[float, float]) -> tuple[float, float]:
     """What turbulence adds to a laminar coefficient, factor Re^exponent where it is whole, and d / d ln Re of it."""
-    if not reynolds > _TRANSITION[0]:
+    (factor, exponent), (laminar, turbulent) = law, _TRANSITION
+    if not reynolds > laminar:
         return 0.0, 0.0
-    factor, exponent = law
-    share = min(1.0, (reynolds - _TRANSITION[0]) / (_TRANSITION[1] - _TRANSITION[0]))
+    share = min(1.0, (reynolds - laminar) / (turbulent - laminar))
     developed = factor * reynolds**exponent
     comes = share * share * (3.0 - 2.0 * share)
-    rate = 6.0 * share * (1.0 - share) * reynolds / (_TRANSITION[1] - _TRANSITION[0])
+    rate = 6.0 * share * (1.0 - share) * reynolds / (turbulent - laminar)
     return developed * comes, developed * (exponent * comes + rate)
 
 

@@ -191,4 +191,4 @@ def _share(count: int, first: float, second: float) -> tuple[int, int]:
 
 
 def _join(*pieces: FloatArray) -> FloatArray:
-    return np.concatenate([piece[: -1 if i < len(pieces) - 1 else None] for i, piece in enumerate(pieces)])
+    return np.unique(np.concatenate(pieces))

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from model.interpolation import lagrange
 from model.pad.block_cholesky import SlabMatrix, factor, forward, solve
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, SectorMesh, sector_mesh
@@ -243,11 +244,7 @@ def _between(geometry: PadGeometry) -> tuple[tuple[float, ...], FloatArray]:
     last = LARGEST / (LARGEST + through)
     nodes = 0.5 * last * (1.0 - np.cos(np.pi * np.arange(_NODES) / (_NODES - 1)))
     x = geometry.back_convection / (geometry.back_convection + through)
-    weights = np.empty(_NODES)
-    for k, node in enumerate(nodes):
-        others = np.delete(nodes, k)
-        weights[k] = np.prod((x - others) / (node - others))
-    return tuple((through * nodes / (1.0 - nodes)).tolist()), weights
+    return tuple((through * nodes / (1.0 - nodes)).tolist()), lagrange(nodes, x)
 
 
 @lru_cache(maxsize=6)  # 13 MB each at most
@@ -256,11 +253,8 @@ def operators_at(
 ) -> PadOperators:
     """Operators at several convections of the free faces, the first axis of `expansion` and `flux`."""
     mesh = sector_mesh(geometry, density)
-    corners = mesh.theta.breaks.size * mesh.z.breaks.size
-    by_convection = (len(convections), mesh.n_surface, corners)
-    shapes = {"compliance": (mesh.n_surface,) * 2, "expansion": by_convection, "flux": by_convection}
     key = storage_key((geometry, density, even, convections))
-    arrays = load_arrays(key, shapes)
+    arrays = load_arrays(key, ("compliance", "expansion", "flux"))
     if arrays is None:
         arrays = _solve(geometry, mesh, even, convections)
         save_arrays(key, arrays)

@@ -7,7 +7,7 @@ import sys
 import tempfile
 import time
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
@@ -51,21 +51,21 @@ def _source_digest() -> str:
     return digest.hexdigest()
 
 
-def load_arrays(key: str, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, FloatArray] | None:
-    """Arrays stored under `key`, or None if there are none, or none of these shapes and finite."""
+def load_arrays(key: str, names: Iterable[str]) -> dict[str, FloatArray] | None:
+    """Arrays stored under `key`, or None if there are none, or none of these names and finite."""
     folder = cache_folder()
     if folder is None:
         return None
     path = folder / f"pad-{key}.npz"
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            arrays = {name: np.asarray(stored[name], dtype=float) for name in shapes}
+            arrays = {name: np.asarray(stored[name], dtype=float) for name in names}
     except FileNotFoundError:
         return None
     except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
         _LOG.info("%s is unreadable (%s); solving again.", path, error)
         return None
-    if any(arrays[name].shape != shape or not np.isfinite(arrays[name]).all() for name, shape in shapes.items()):
+    if not all(np.isfinite(array).all() for array in arrays.values()):
         _LOG.info("%s does not hold what its name promises; solving again.", path)
         return None
     return arrays

@@ -6,11 +6,12 @@ the iteration went.
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from model.bearing import pad_rooms
-from model.conditions import named
+from model.conditions import said
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
 from model.statics.pad_flow import starved
@@ -71,29 +72,28 @@ def status_of(
     meeting = []
     for number, other, room in pad_rooms(setup.bearing):
         gap = room - pads[number - 1].arc
-        if gap < 1e-9:
-            meeting.append(named("pads {pads} touch" if gap > -1e-9 else "pads {pads} overlap", (number, other)))
+        meeting.append((gap < 1e-9, "pads {pads} touch" if gap > -1e-9 else "pads {pads} overlap", (number, other)))
     reynolds = largest_reynolds(films, speed)
     swirls = reynolds > _LAMINAR and setup.options.turbulence == "none"
-    warmth = [f.work.temperature for f in films if f.forces is not None] or [np.array(_OIL_DATA)]
-    low, high = float(np.min(warmth)), float(np.max(warmth))
-    cold = low < _OIL_DATA[0]
-    x, y = np.array([f.normal for f in films if f.forces is not None]).reshape(-1, 2).T
+    warmth = np.array([f.work.temperature for f in films if f.forces is not None] or _OIL_DATA)
+    coldest, hottest = float(warmth.min()), float(warmth.max())
+    beyond = coldest if coldest < _OIL_DATA[0] else hottest
+    normals = [f.normal.tolist() for f in films if f.forces is not None]
     is_free = not failures and setup.rotational_stiffness == 0.0
-    on_one_line = bool(np.all(np.abs(x * y[:1] - y * x[:1]) < 1e-6))
-    conditions = (
-        (is_free and on_one_line, named("nothing holds the journal across its load")),
-        (bool(heavy), named("overloaded pads {pads}", heavy, limits)),
-        (bool(idle), named("idle pads {pads}", idle)),
-        (back > 0.0, named("flow back at a leading edge")),
-        (bool(short), named("pads {pads} are short of oil", short, ends)),
-        (bool(narrow), named("interference: no clearance at pads {pads}", narrow)),
-        *((True, condition) for condition in meeting),
-        (swirls, named("film not laminar: Re {number:.0f}", number=reynolds)),
-        (cold or high > _OIL_DATA[1], named("oil beyond its data: {number:.0f} degC", number=low if cold else high)),
+    on_one_line = all(abs(x * normals[0][1] - y * normals[0][0]) < 1e-6 for x, y in normals)
+    conditions: tuple[tuple[Any, ...], ...] = (
+        (is_free and on_one_line, "nothing holds the journal across its load"),
+        (heavy, "overloaded pads {pads}", heavy, limits),
+        (idle, "idle pads {pads}", idle),
+        (back > 0.0, "flow back at a leading edge"),
+        (short, "pads {pads} are short of oil", short, ends),
+        (narrow, "interference: no clearance at pads {pads}", narrow),
+        *meeting,
+        (swirls, "film not laminar: Re {number:.0f}", (), reynolds),
+        (beyond < _OIL_DATA[0] or beyond > _OIL_DATA[1], "oil beyond its data: {number:.0f} degC", (), beyond),
     )
-    against = [named("no pads against the load")] if failures and unsupported(setup, load) else []
-    return (*against, *failures, *(condition for holds, condition in conditions if holds))
+    against = said([(failures and unsupported(setup, load), "no pads against the load")])
+    return (*against, *failures, *said(conditions))
 
 
 def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:

@@ -76,7 +76,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFil
     works, each = film_works(grids, setup.inlet_temperature)
     crosses = cross_film(works, setup.inlet_temperature) if across else None
     for k, (pad, grid, work) in enumerate(zip(bearing.pads, grids, each, strict=True)):
-        work.pressure[0, grid.first : -1] = pad.leading_edge_pressure
+        work.pressure[0, grid.first : -1], (x, y) = pad.leading_edge_pressure, pad.normal
         if not symmetric:
             # the axis leans by `angle` towards `toward`: at z the journal stands z * angle further that way
             work.extra[:, :] = -np.outer(np.cos(grid.angle + pad.pivot_angle - toward), grid.z * angle)
@@ -84,8 +84,8 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFil
             PadFilm(
                 number=k + 1,
                 pad=pad,
-                normal=np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)]),
-                tangent=np.array([-math.sin(pad.pivot_angle), math.cos(pad.pivot_angle)]),
+                normal=np.array([x, y]),
+                tangent=np.array([-y, x]),
                 preload_distance=pad.pad_clearance - pad.assembled_clearance - setup.clearance_change,
                 pivot_radius=bearing.pivot_radius(pad),
                 grid=grid,

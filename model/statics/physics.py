@@ -53,7 +53,7 @@ def case_of(setup: Setup, load: FloatArray, running: Running, heat: float) -> Ca
         thermal=thermal,
         rupture=None if plain else model,
         supply=supply,
-        kept=float(kept),
+        kept=kept,
         mixing=float(setup.mixing),
         journal=bool(setup.options.isothermal_journal),
         closing=0.0 if growth is None else float(growth.closing(setup.bearing)),

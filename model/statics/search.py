@@ -123,9 +123,6 @@ class Search:
     def _find_curves(self) -> None:
         """Find the curve of every pad's loaded attitudes; pads that are alike share it."""
         load = max(float(np.hypot(*self.load)), 1.0)
-        bearing, running, supply = self.setup.bearing, self.running, self.case.supply
-        size = bearing.journal_radius**2 * bearing.length
-        viscosity = float(bearing.oil.viscosity(supply))
         pads, alike = self.pads, dict[tuple[int, float, int], int]()
         for m, film in enumerate(self.films):
             clearance, law = float(pads["clearance"][m]), self.setup.pivots[m]
@@ -134,13 +131,12 @@ class Search:
                 pads["rows"][m], pads["attitudes"][m] = pads["rows"][first], pads["attitudes"][first]
                 self.rises.append(self.rises[first])
                 continue
-            curve = attitudes(film.grid, clearance, running, supply, load)
-            unit = viscosity * running.speed * size / clearance**2
+            curve = attitudes(film.grid, clearance, self.running, self.case.supply, load)
             gives = np.empty(0)
             if pads["law"][m, 0] == OTHER:
-                gives = np.array([law.deflection(w) for w in (curve.load * unit).tolist()])
+                gives = np.array([law.deflection(w) for w in curve.load.tolist()])
             pivot = pads["law"][m], self.stack.curves[m]
-            pads["rows"][m] = pivot_curve(curve[:3], (clearance, unit), pivot, gives, pads["attitudes"][m])
+            pads["rows"][m] = pivot_curve(curve[:3], clearance, pivot, gives, pads["attitudes"][m])
             self.rises.append((len(curve.load) - int(pads["rows"][m]), curve.rise))
 
     def stand(self) -> Search:
@@ -149,7 +145,6 @@ class Search:
         pads, state = self.pads, self.state
         state.position[:], loaded, self.other = first_position(self.case.load, pads)
         pads["idle"] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
-        self.idle_by_curves = int(pads["idle"].sum())
         self.load_pads(loaded)
         begun = (state.position, pads["tilt"], pads["deflection"], self.works.temperature)
         self.begun = Begun(*(values.copy() for values in begun))
@@ -287,9 +282,8 @@ class Search:
                 continue
             stiffness = pad.stiffness
             deep = 0.0 < _BEYOND_FOLD * pad.attitudes[3, 0] < pad.force[0]
-            if deep and is_stable(self.case, pad, curve, stiffness):
-                continue
-            if self.case.thermal in (ALONE, COUPLED):  # the temperature follows, and that is known
+            told = deep and is_stable(self.case, pad, curve, stiffness)
+            if self.case.thermal in (ALONE, COUPLED) and not told:  # the temperature follows, and that is known
                 wedge = (float(pad.clearance), *pad.wedge.tolist())
                 stiffness = stiffness + heat_impedance(film.grid, film.work, wedge, self.running, 0.0, _TOLD).real
             if not is_stable(self.case, pad, curve, stiffness):
@@ -304,8 +298,8 @@ class Search:
         for name in ("tilt", "deflection", "axial", "idle", "inlet", "supplied"):
             for film, value in zip(self.films, pads[name].tolist(), strict=True):
                 setattr(film, name, value)
-        solved, resting, clearances = pads["solved"].tolist(), pads["resting"].tolist(), pads["clearance"].tolist()
-        wedges, least, steps = pads["wedge"].tolist(), pads["least"].tolist(), pads["steps"].tolist()
+        names = ("solved", "resting", "clearance", "wedge", "least", "steps")
+        solved, resting, clearances, wedges, least, steps = (pads[name].tolist() for name in names)
         for m, film in enumerate(self.films):
             film.wedge = (clearances[m], *wedges[m])
             if self.across is not None:

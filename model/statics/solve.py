@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from model.conditions import named, pads_of
+from model.conditions import named, pads_of, said
 from model.setup import Setup
 from model.statics import conditions
 from model.statics.equilibrium import Equilibrium
@@ -43,7 +43,7 @@ def solve_equilibrium(
             warm = _settled(search, search.run())
             # where pads are left idle that could carry, another start may leave others
             loose = pads_of("pads {pads} cannot keep their load", warm.status)
-            if warm.converged and not loose and sum(f.idle for f in warm.films) <= search.idle_by_curves:
+            if warm.converged and not loose and sum(f.idle for f in warm.films) <= np.isnan(search.begun.tilt).sum():
                 return warm
     search = Search(setup, load, speed).stand()
     near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.pads["idle"][m]]
@@ -131,14 +131,14 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
     edge = [f.number for f in films if abs(above[f.number - 1]) < _EDGE and f.number not in even]
     another = search.other.any() and not restless
     names = (
-        (bool(restless), named("pads {pads} can neither carry nor idle", restless)),
-        (bool(restless), named("not converged")),
-        (bool(off) and not restless, named("pads {pads} cannot keep their load", off)),
-        (bool(even) and not restless, named("pads {pads} stand concentric", even)),
-        (bool(edge), named("pads {pads} on the edge of carrying", edge)),
-        (another, named("another equilibrium exists", (np.flatnonzero(~search.other) + 1).tolist())),
+        (restless, "pads {pads} can neither carry nor idle", restless),
+        (restless, "not converged"),
+        (off and not restless, "pads {pads} cannot keep their load", off),
+        (even and not restless, "pads {pads} stand concentric", even),
+        (edge, "pads {pads} on the edge of carrying", edge),
+        (another, "another equilibrium exists", (np.flatnonzero(~search.other) + 1).tolist()),
     )
-    return replace(result, status=(*(name for holds, name in names if holds), *result.status))
+    return replace(result, status=(*said(names), *result.status))
 
 
 def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
@@ -176,8 +176,7 @@ def _raise(quantity: str, setup: Setup, load: FloatArray, speed: float, failed: 
         share = min(1.0, reached + step)
         shares = {"load": 1.0, "heat": 1.0, "speed": 1.0, quantity: share}
         if quantity == "want":
-            fed = replace(oil, supply_flow=oil.supply_flow / share)
-            setup = setup.change(bearing=replace(setup.bearing, oil=fed))
+            setup = setup.change_oil(supply_flow=oil.supply_flow / share)
         search = Search(setup, shares["load"] * load, shares["speed"] * speed, shares["heat"])
         if last is None or not search.start_from(last):
             search.stand()

@@ -97,7 +97,8 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         raise refusal(run, "record", what, cure)
     pickup = _pickup(run, {"force": load, "displacement": place}, good, rate)
     order = np.argsort(time, kind="stable")  # a logger may repeat or shuffle time stamps
-    time, load, place, good = (values[order] for values in (time, load, place, good))
+    time, load, place = (values[order] for values in (time, load, place))
+    good = good[order]
     # an overshoot of the load, which friction remembers, is no glitch for being short
     turns = good_samples(load, max(round(_COURSE[0] * rate), 3)) & np.isfinite(time)
     course = time[turns], load[turns]

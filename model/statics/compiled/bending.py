@@ -11,8 +11,8 @@ from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import force_of, shape_slopes
 from model.interpolation import largest
 from model.pad.bending import PadDeformation
-from model.statics.compiled.case import Problem
-from model.statics.compiled.stack import BodyStack, grid_of, work_of
+from model.statics.compiled.case import Problem, film_of
+from model.statics.compiled.stack import BodyStack
 from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray
 
@@ -115,7 +115,7 @@ def _columns(matrix: FloatArray, field: FloatArray, out: FloatArray) -> None:
 @inner
 def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray) -> float:
     """One pad's part of a Newton step, see `model.pad.bending`; how far a tilt along the shaft moves the ends [m]."""
-    grid, work = grid_of(problem.grids, m), work_of(problem.works, m)
+    grid, work = film_of(problem, m)
     pad, state, case = problem.pads.each[m], problem.state, problem.case
     bends = len(bodies.shapes) > 0
     body, bending = (bodies.which[m], bodies.shapes.shape[3]) if bends else (0, 0)

@@ -1,13 +1,11 @@
-"""What one search is told, and where a pad stands in it."""
+"""What one search is told, and all that it works on."""
 
 from typing import NamedTuple
-
-import numpy as np
 
 from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import Running
-from model.statics.compiled.stack import BodyStack, PadStack, SearchState
+from model.statics.compiled.stack import BodyStack, PadStack, SearchState, grid_of, work_of
 from model.tilt_hold import HoldNumbers
 from rigdata.arrays import FloatArray
 
@@ -20,8 +18,6 @@ HEATING_STEP = 15.0
 #: would change them by this times `Setup.accuracy`, 3e-5 K as a rule. That is 1e-6 of the viscosity, and of that the
 #: step leaves a tenth.
 HEAT_PER_FORCE = 300.0
-#: Kelvins beyond which a film is no film: squares would overflow.
-BOUNDLESS = 1e30
 
 
 class Case(NamedTuple):
@@ -57,12 +53,6 @@ class Problem(NamedTuple):
 
 
 @inner
-def rigid_approach(pad: np.record, position: FloatArray) -> float:
-    """Approach of a film if its pivot were rigid [m]."""
-    return pad.preload + pad.frame[0, 0] * position[0] + pad.frame[0, 1] * position[1]
-
-
-@inner
-def along(pad: np.record, position: FloatArray) -> float:
-    """Journal's place across the pivot line [m]."""
-    return pad.frame[1, 0] * position[0] + pad.frame[1, 1] * position[1]
+def film_of(problem: Problem, m: int) -> tuple[FilmGrid, FilmWork]:
+    """One pad's mesh, and its film's arrays."""
+    return grid_of(problem.grids, m), work_of(problem.works, m)

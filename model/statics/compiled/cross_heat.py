@@ -21,13 +21,14 @@ from model.compilation import compiled, inner
 from model.film.cross_energy import cross_operator
 from model.film.cross_film import CrossFilm, CrossOperator, cross_pressure_change, set_cross_viscosity
 from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
-from model.film.dense import product, times
+from model.film.dense import BOUNDLESS, product, times
+from model.film.energy import limited_share
 from model.film.models import TURBULENT
 from model.interpolation import largest
 from model.pad.bending import PadDeformation
-from model.statics.compiled.case import BOUNDLESS, HEATING_STEP, Problem
+from model.statics.compiled.case import HEATING_STEP, Problem, film_of
 from model.statics.compiled.heat import balance_heat, note_flows, note_heat
-from model.statics.compiled.stack import BACKFLOW, JOURNAL, grid_of, work_of
+from model.statics.compiled.stack import BACKFLOW, JOURNAL
 from rigdata.arrays import FloatArray
 
 #: What a pad conducts is solved to this share in every step; what is left contracts with the rest.
@@ -95,7 +96,7 @@ def set_cross_viscosities(problem: Problem, across: Across) -> None:
         turbulent = (running.speed, running.heat[0] / max(running.heat[1], 1e-9))
     for m in range(len(problem.pads.each)):
         if not problem.pads.each[m].idle:
-            set_cross_viscosity(_film(across.films, m), work_of(problem.works, m), running.oil, turbulent)
+            set_cross_viscosity(_film(across.films, m), film_of(problem, m)[1], running.oil, turbulent)
 
 
 @compiled
@@ -116,10 +117,10 @@ def settle_cross_temperatures(problem: Problem, across: Across, relaxation: floa
     for m in range(n):
         pad = pads.each[m]
         hotter = inlets[m] - pad.inlet
-        pad.inlet += _limited_share(hotter, limits) * hotter
+        pad.inlet += limited_share(hotter, limits) * hotter
         change = note_heat(pad, abs(hotter), (0.0, 0.0), change)
         if pad.solved:
-            grid, work, cross = grid_of(problem.grids, m), work_of(problem.works, m), _film(across.films, m)
+            (grid, work), cross = film_of(problem, m), _film(across.films, m)
             running, weights = case.running, (inlets[m], journal)
             asked = _warm(cross, across.fields[m], across.faces[m], weights, limits)
             across.outlet[m] = outlets[m, 0] + outlets[m, 1] * inlets[m] + outlets[m, 2] * journal
@@ -143,16 +144,10 @@ def _warm(
     asked = fields[:, :, 0] + inlet * fields[:, :, 1] + journal * fields[:, :, 2] - cells
     face = faces[0] + inlet * faces[1] + journal * faces[2] - cross.face
     change = np.maximum(largest(asked.reshape(-1)), largest(face.reshape(-1)))
-    share = _limited_share(change, limits)
+    share = limited_share(change, limits)
     cells += share * asked
     cross.face[:] += share * face
     return change
-
-
-@inner
-def _limited_share(change: float, limits: tuple[float, float]) -> float:
-    """Share of a change of temperature that is made."""
-    return limits[0] * min(1.0, limits[1] / max(abs(change), 1e-30))
 
 
 @inner
@@ -162,7 +157,7 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
     Of cells and faces; of the oil at the trailing edge (3,) [degC], and what the journal takes (3,) [W]. Which share of
     the oil runs back where it enters is noted in the figures.
     """
-    grid, work, cross = grid_of(problem.grids, m), work_of(problem.works, m), _film(across.films, m)
+    (grid, work), cross = film_of(problem, m), _film(across.films, m)
     pad, state, case = problem.pads.each[m], problem.state, problem.case
     bodies, operator = problem.bodies, across.operator
     assert bodies is not None
@@ -179,14 +174,13 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
     operator.dissipation[:, :: len(cross.edges) - 1] -= station_heat(grid, into_pad)
     taken[:] = march_cross(operator, fields, operator.dissipation)
     for q in range(3):
-        given = into_pad if q == 0 else np.zeros(into_pad.shape)
-        face_temperature(work, cross.edges, conductivity, fields[:, :, q], given, faces[q])
+        heat_flow = (1.0 if q == 0 else 0.0) * into_pad
+        face_temperature(work, cross.edges, conductivity, fields[:, :, q], heat_flow, faces[q])
     missing = faces[0] + pad.inlet * faces[1] + journal * faces[2] - cross.face
     if 0.0 < largest(missing.reshape(-1)) < BOUNDLESS:
         solved = (grid, work, cross.edges, conductivity)
         tolerance = _ROUGH_TOLERANCE if pad.heating > _ROUGH else _CONDUCTION_TOLERANCE
-        more = conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
-        taken[0] += more if math.isfinite(more) else 0.0
+        taken[0] += conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
     carried = operator.carried.reshape(-1)
     for q in range(3):
         outlet[q] = product(carried, fields[-1, :, q]) / product(carried, np.ones(len(carried)))

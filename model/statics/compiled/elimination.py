@@ -34,7 +34,7 @@ def newton(case: Case, pads: PadStack, growing: float) -> tuple[float, FloatArra
             worst = max(worst, _eliminate(case, pads, growing, m, follow[m], system))
     shift = system[:, 2:].copy()
     worst = max(worst, math.hypot(shift[0, 0], shift[1, 0])) / max(math.hypot(load[0], load[1]), 1.0)
-    solve(system[:, :2].copy(), shift)
+    solve(system[:, :2], shift)
     for m in range(n):
         pad = pads.each[m]
         for q in range(2):
@@ -73,7 +73,7 @@ def _eliminate(case: Case, pads: PadStack, growing: float, m: int, follow: Float
     follow[0, 2] = -force[1] - held / radius
     follow[1, 2] = deflection(pad.law, pads.curves[m], max(load, 0.0)) - pad.deflection
     unbalanced = max(abs(follow[0, 2]), abs(follow[1, 2] * k[0, 0]))
-    solve(equations[:, 2:].copy(), follow)
+    solve(equations[:, 2:], follow)
     for i in range(2):
         for column in range(3):
             push = slopes[i, 2] * follow[0, column] + slopes[i, 3] * follow[1, column]

@@ -19,21 +19,20 @@ import math
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.dense import product, residual, solve, times
+from model.film.dense import BOUNDLESS, gmres, product, solve, times
 from model.film.energy import between, heat_sources, heat_step, march, warm
 from model.film.mesh import FilmGrid
 from model.film.oil_state import edge_flows
 from model.film.resting import resting_film
 from model.interpolation import largest
-from model.statics.compiled.case import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Problem, rigid_approach
-from model.statics.compiled.stack import BACKFLOW, JOURNAL, BodyStack, grid_of, work_of
+from model.statics.compiled.case import HEAT_PER_FORCE, HEATING_STEP, Problem, film_of
+from model.statics.compiled.stack import BACKFLOW, JOURNAL, BodyStack, grid_of, rigid_approach
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 
 #: q h / k (T_mean - T_wall) of a parabolic profile, flat at the other wall.
 _NUSSELT = 3.0
 #: Conduction is solved to this share in every step of the equilibrium; what is left contracts with the rest.
 _CONDUCTION_TOLERANCE = 0.01
-_KRYLOV_STEPS = 12
 #: Share of the oil in the grooves that is fresh after a turn, at least.
 _LEAST_FRESH = 1e-3
 
@@ -41,13 +40,13 @@ _LEAST_FRESH = 1e-3
 @inner
 def heat_films(problem: Problem, relaxation: float) -> float:
     """Temperatures of the films that carry, each for itself; returns the largest change asked for [K]."""
-    grids, _, pads, works, state, case = problem
-    change = 0.0
-    for m in range(len(pads.each)):
-        pad = pads.each[m]
+    state, change = problem.state, 0.0
+    for m in range(len(problem.pads.each)):
+        pad = problem.pads.each[m]
         if pad.solved:
+            grid, work = film_of(problem, m)
             thermal = (pad.inlet, relaxation, HEATING_STEP)
-            found = heat_step(grid_of(grids, m), work_of(works, m), case.running, thermal, state.shift[m])
+            found = heat_step(grid, work, problem.case.running, thermal, state.shift[m])
             state.figures[BACKFLOW] = max(state.figures[BACKFLOW], found[1])
             change = note_heat(pad, found[0], found[2:], change)
     return change
@@ -77,9 +76,9 @@ def rest_films(problem: Problem) -> None:
 @inner
 def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> float:
     """Temperatures of all films, the inlets and the journal for their present flows; returns the largest change [K]."""
-    grids, _, pads, works, state, case = problem
+    pads, works, state, case = problem.pads, problem.works, problem.state, problem.case
     n, fields = len(pads.each), 3 if case.journal else 2
-    answers = np.zeros((n, fields, works.temperature.shape[1], works.temperature.shape[2]))
+    answers = np.zeros((n, fields, *works.temperature.shape[1:]))
     flows = np.empty((n, 2))
     outlets = np.zeros((n, 3))
     taken = np.zeros((n, 3))
@@ -102,8 +101,8 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
         asked = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
         if case.journal:
             asked += journal * answers[m, 2]
-        limits = (relaxation, HEATING_STEP)
-        found = warm(grid_of(grids, m), work_of(works, m), case.running, asked, limits, state.shift[m])
+        (grid, work), limits = film_of(problem, m), (relaxation, HEATING_STEP)
+        found = warm(grid, work, case.running, asked, limits, state.shift[m])
         change = note_heat(pad, found[0], found[1:], change)
     if case.journal:
         state.figures[JOURNAL] = journal
@@ -115,7 +114,8 @@ def note_flows(problem: Problem, m: int, supplied: float, flows: FloatArray, out
     """Set a pad's flows over its leading and trailing edge [kg/s]; an idle one passes its inlet on, somewhat warmer."""
     pad = problem.pads.each[m]
     if pad.solved:
-        entering, sides = edge_flows(grid_of(problem.grids, m), work_of(problem.works, m), supplied)
+        grid, work = film_of(problem, m)
+        entering, sides = edge_flows(grid, work, supplied)
         flows[0], flows[1] = entering, entering - sides
     else:
         flows[:] = pad.resting[1]
@@ -132,15 +132,14 @@ def _answer(
 
     A hotter film makes less heat: that counts as a loss, beside what the journal takes.
     """
-    grid = grid_of(problem.grids, m)
-    work = work_of(problem.works, m)
+    grid, work = film_of(problem, m)
     case = problem.case
     figures = problem.state.figures
-    sources, loss = np.zeros(fields.shape), np.empty(work.temperature.shape)
+    sources = np.zeros(fields.shape)
     if case.journal:
         work.exchange[:] = _NUSSELT * case.running.heat[1] / work.thickness * (grid.dx * grid.height)
         sources[2] = work.exchange
-    heat_sources(grid, work, case.running, case.kept, sources[0], loss)
+    sources[0], loss = heat_sources(grid, work, case.running, case.kept)
     fields[1, 0] = 1.0
     conducts = len(bodies.flux) > 0
     if conducts:
@@ -156,8 +155,7 @@ def _answer(
     weight[-1] *= 0.5
     for k in range(len(fields)):
         outlet[k] = product(fields[k, -1], flow) / product(np.ones(len(flow)), flow)
-        if case.journal:
-            taken[k] = product(weight.reshape(-1), fields[k].reshape(-1))
+        taken[k] = product(weight.reshape(-1), fields[k].reshape(-1))
     taken[2] -= product(np.ones(weight.size), weight.reshape(-1))
 
 
@@ -175,9 +173,10 @@ def _conduct(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, fiel
     missing = -temperature
     for k in range(len(answers)):
         missing += hot[k] * answers[k]
-    missing = temperature + _krylov(bodies, problem, m, loss, missing)
+    held = (bodies, problem, m, loss)
+    missing = temperature + gmres(_cooled, held, missing, _CONDUCTION_TOLERANCE)
     for k in range(1, len(answers)):
-        answers[k] = _krylov(bodies, problem, m, loss, answers[k])
+        answers[k] = gmres(_cooled, held, answers[k], _CONDUCTION_TOLERANCE)
         missing -= hot[k] * answers[k]
     answers[0] = missing
 
@@ -191,30 +190,14 @@ def _into_pad(grid: FilmGrid, bodies: BodyStack, m: int, rise: FloatArray) -> Fl
 
 
 @inner
-def _krylov(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve (I + A^-1 F) T = T_alone, (nodes,), by GMRES; NaN where it grows beyond `BOUNDLESS`."""
-    grid, work = grid_of(problem.grids, m), work_of(problem.works, m)
-    size = math.sqrt(product(right, right))
-    answer, left, length = np.zeros(len(right)), right.copy(), size
-    steps = np.zeros((_KRYLOV_STEPS, len(right)))
-    images = np.zeros((_KRYLOV_STEPS, len(right)))
-    taken = np.zeros((1, loss.shape[0], loss.shape[1]))
-    fields = np.zeros((1, loss.shape[0], loss.shape[1]))
-    weights = np.zeros((_KRYLOV_STEPS, 1))
-    for k in range(_KRYLOV_STEPS):
-        if not length > (_CONDUCTION_TOLERANCE * size if k > 0 else 0.0):
-            break
-        steps[k] = left / length
-        taken[0] = -_into_pad(grid, bodies, m, steps[k])
-        march(grid, work, problem.case.running, loss, fields, between(taken))
-        images[k] = steps[k] - fields[0].reshape(-1)
-        if not product(images[k], images[k]) < BOUNDLESS:
-            answer[:] = math.nan
-            return answer
-        length = residual(images, k + 1, right, weights, left)
-    for k in range(_KRYLOV_STEPS):
-        answer += weights[k, 0] * steps[k]
-    return answer
+def _cooled(held: tuple[BodyStack, Problem, int, FloatArray], change: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A change of a film's temperature (nodes,), and A^-1 F added to it: what it would be if the pad took nothing."""
+    bodies, problem, m, loss = held
+    grid, work = film_of(problem, m)
+    taken, fields = np.empty((1, *loss.shape)), np.zeros((1, *loss.shape))
+    taken[0] = -_into_pad(grid, bodies, m, change)
+    march(grid, work, problem.case.running, loss, fields, between(taken))
+    return change, change - fields[0].reshape(-1)
 
 
 @compiled

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.dense import DEPTH, mixed
-from model.statics.compiled.case import ACROSS, ALONE, BOUNDLESS, COUPLED, HEAT_PER_FORCE, ISOTHERMAL, Problem
+from model.film.dense import BOUNDLESS, DEPTH, mixed
+from model.statics.compiled.case import ACROSS, ALONE, COUPLED, HEAT_PER_FORCE, ISOTHERMAL, Problem
 from model.statics.compiled.elimination import newton
 from model.statics.compiled.heat import exchange_heat, heat_films
 from model.statics.compiled.place import is_doubtful

@@ -8,8 +8,8 @@ from model.compilation import compiled, inner
 from model.film.mesh import FilmWork
 from model.interpolation import row_below
 from model.pad.pivot import compliance
-from model.statics.compiled.case import ALONE, COUPLED, Case, along, rigid_approach
-from model.statics.compiled.stack import work_of
+from model.statics.compiled.case import ALONE, COUPLED, Case
+from model.statics.compiled.stack import along, rigid_approach, work_of
 from model.tilt_hold import held_moment
 from rigdata.arrays import BoolArray, FloatArray
 
@@ -18,6 +18,8 @@ from rigdata.arrays import BoolArray, FloatArray
 _NOTHING = 1e-4
 #: How often a search puts a pad back on its loaded attitude that has lost it on the way.
 _RESCUES = 12
+#: A film's temperature follows, and what that adds to its stiffness is known.
+_WARM = (ALONE, COUPLED)
 
 
 @inner
@@ -62,17 +64,11 @@ def rescue(pad: np.record, work: FilmWork, position: FloatArray) -> bool:
 
 
 @inner
-def _warms(case: Case) -> bool:
-    """Whether a film's temperature follows, and what that adds to its stiffness is known."""
-    return case.thermal == ALONE or case.thermal == COUPLED
-
-
-@inner
 def is_doubtful(case: Case, pad: np.record, curve: FloatArray) -> bool:
     """Whether the frozen film leaves a pad's stability in doubt, or its wedge is flatter than that of its fold."""
     if case.hold.flexure > 0.0:
         return False
-    flat = _warms(case) and pad.wedge[1] < pad.attitudes[2, 0]
+    flat = case.thermal in _WARM and pad.wedge[1] < pad.attitudes[2, 0]
     return flat or not is_stable(case, pad, curve, pad.stiffness)
 
 
@@ -87,7 +83,7 @@ def is_stable(case: Case, pad: np.record, curve: FloatArray, k: FloatArray) -> b
     """
     opens = pad.wedge[1] <= pad.flattest
     none = (_NOTHING if opens else case.accuracy) * math.hypot(case.load[0], case.load[1])
-    if case.hold.slip == 0.0 and (pad.force[0] <= none or (opens and not _warms(case))):
+    if case.hold.slip == 0.0 and (pad.force[0] <= none or (opens and case.thermal not in _WARM)):
         return False
     load, radius = pad.force[0], pad.pivot_radius
     give = compliance(pad.law, curve, max(load, 1e-6))

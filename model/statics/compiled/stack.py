@@ -123,3 +123,21 @@ def work_of(works: FilmWork, m: int) -> FilmWork:
         works.drag[m], works.exchange[m], works.gained[m], works.thickness[m], works.extra[m], works.flow[m],
         works.band[m], works.unknown[m], works.slopes[m],
     )  # fmt: skip
+
+
+@inner
+def rigid_approach(pad: np.record, position: FloatArray) -> float:
+    """Approach of a film if its pivot were rigid [m]."""
+    return pad.preload + towards(pad, position)
+
+
+@inner
+def towards(pad: np.record, move: FloatArray) -> float:
+    """A move of the journal along the pivot line [m]."""
+    return pad.frame[0, 0] * move[0] + pad.frame[0, 1] * move[1]
+
+
+@inner
+def along(pad: np.record, move: FloatArray) -> float:
+    """A move of the journal across the pivot line [m]."""
+    return pad.frame[1, 0] * move[0] + pad.frame[1, 1] * move[1]

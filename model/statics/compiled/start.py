@@ -13,9 +13,10 @@ import math
 import numpy as np
 
 from model.compilation import compiled, inner
+from model.film.dense import product, solve
 from model.interpolation import row_below
 from model.pad.pivot import deflection
-from model.statics.compiled.case import rigid_approach
+from model.statics.compiled.stack import rigid_approach
 from rigdata.arrays import BoolArray, FloatArray
 
 #: Share of the clearance over which a curve falls to 1/e beyond its fold.
@@ -31,34 +32,30 @@ _MOST_DOUBTFUL = 6
 @compiled
 def pivot_curve(
     attitude: tuple[FloatArray, FloatArray, FloatArray],
-    scale: tuple[float, float],
+    clearance: float,
     pivot: tuple[FloatArray, FloatArray],
     gives: FloatArray,
     out: FloatArray,
 ) -> int:
     """A pad's loaded attitudes on its pivot, rising from the fold: r = a + delta(W), a, b [m], W [N]; how many.
 
-    `attitude` is (A, B, W), `scale` Cp and the unit of the load; `pivot` its law and curve; `gives` (n,) what it
-    gives, empty where the law says it.
+    `attitude` is (A, B, W); `pivot` its law and curve; `gives` (n,) what it gives, empty where the law says it.
     """
     curvature, wedge, load = attitude
-    clearance, unit = scale
     count = len(load)
     if count < 3:
         return 0
-    reach = np.empty(count)
+    share = clearance / (1.0 + curvature)
+    reach = share * curvature
     for k in range(count):
-        give = gives[k] if len(gives) > 0 else deflection(pivot[0], pivot[1], load[k] * unit)
-        reach[k] = clearance * curvature[k] / (1.0 + curvature[k]) + give
+        reach[k] += gives[k] if len(gives) > 0 else deflection(pivot[0], pivot[1], load[k])
     low = count - 1
     while low > 0 and reach[low - 1] < reach[low]:
         low -= 1
-    for k in range(low, count):
-        share = 1.0 / (1.0 + curvature[k])
-        out[0, k - low], out[1, k - low] = reach[k], clearance * curvature[k] * share
-        out[2, k - low] = clearance * wedge[k] * share
-        out[3, k - low] = load[k] * unit
-    return count - low
+    rows = count - low
+    out[0, :rows], out[1, :rows] = reach[low:], (share * curvature)[low:]
+    out[2, :rows], out[3, :rows] = (share * wedge)[low:], load[low:]
+    return rows
 
 
 def first_position(load: FloatArray, pads: np.ndarray) -> tuple[FloatArray, BoolArray, BoolArray]:
@@ -111,20 +108,19 @@ def _pushes(pad: np.record, position: FloatArray) -> tuple[float, float]:
 @inner
 def _missing(
     load: FloatArray, pads: np.ndarray, loaded: BoolArray, position: FloatArray, slopes: FloatArray
-) -> tuple[float, float]:
-    """Part of the load that the loaded pads do not carry at a position; `slopes` (2, 2) are set."""
-    fx, fy = load[0], load[1]
+) -> FloatArray:
+    """Part (2,) of the load that the loaded pads do not carry at a position; `slopes` (2, 2) are set."""
+    missing = load.copy()
     slopes[:] = 0.0
     for m in range(len(loaded)):
         if loaded[m]:
-            pad = pads[m]
-            push, slope = _pushes(pad, position)
-            fx = fx - pad.frame[0, 0] * push
-            fy = fy - pad.frame[0, 1] * push
+            normal = pads[m].frame[0]
+            push, slope = _pushes(pads[m], position)
             for i in range(2):
+                missing[i] -= normal[i] * push
                 for j in range(2):
-                    slopes[i, j] += slope * pad.frame[0, i] * pad.frame[0, j]
-    return fx, fy
+                    slopes[i, j] += slope * normal[i] * normal[j]
+    return missing
 
 
 @compiled
@@ -135,41 +131,33 @@ def stand_on_curves(load: FloatArray, pads: np.ndarray, loaded: BoolArray, posit
         pad = pads[m]
         least = min(least, pad.clearance)
         if loaded[m]:
-            last = pad.rows - 1
+            last, largest = pad.rows - 1, max(largest, _pushes(pad, position)[0])
             room = min(room, pad.attitudes[1, last] - pad.preload)
             stiff = max(stiff, pad.attitudes[3, last] / pad.clearance)
     if math.isinf(room):
         return False
     room = max(room, 0.05 * least)
     size = math.hypot(load[0], load[1])
-    if position[0] == 0.0 and position[1] == 0.0 and size > 0.0:
-        position[0] = 0.4 * room * load[0] / size
-        position[1] = 0.4 * room * load[1] / size
-    slopes, trial = np.empty((2, 2)), np.empty(2)
-    fx, fy = _missing(load, pads, loaded, position, slopes)
     if size == 0.0:
-        for m in range(len(loaded)):
-            if loaded[m]:
-                largest = max(largest, _pushes(pads[m], position)[0])
         size = largest
+    if position[0] == 0.0 and position[1] == 0.0:
+        position[:] = 0.4 * room / max(size, 1e-30) * load
+    slopes, step = np.empty((2, 2)), np.empty((2, 1))
+    missing = _missing(load, pads, loaded, position, slopes)
     for _ in range(60):
-        if math.hypot(fx, fy) < _GOOD_ENOUGH * size:
+        if math.hypot(missing[0], missing[1]) < _GOOD_ENOUGH * size:
             return True
-        soft = 1e-9 * stiff  # nothing carries in some direction: go where the load pushes
-        jxx = slopes[0, 0] + soft
-        jyy = slopes[1, 1] + soft
-        jxy = slopes[0, 1]
-        det = jxx * jyy - jxy * jxy
-        mx = (fx * jyy - jxy * fy) / det
-        my = (jxx * fy - jxy * fx) / det
-        share = min(1.0, 0.2 * room / max(math.hypot(mx, my), 1e-30))
-        mx, my = share * mx, share * my
+        for axis in range(2):  # nothing carries in some direction: go where the load pushes
+            slopes[axis, axis] += 1e-9 * stiff
+        step[:, 0] = missing
+        solve(slopes, step)
+        move = step[:, 0] * min(1.0, 0.2 * room / max(math.hypot(step[0, 0], step[1, 0]), 1e-30))
+        enough = -0.5 * product(missing, move)
         for halving in range(12):
             # along a step down a convex energy its slope rises: far enough is where it is past its zero, not far past
-            trial[0] = position[0] + mx * 0.5**halving
-            trial[1] = position[1] + my * 0.5**halving
-            gx, gy = _missing(load, pads, loaded, trial, slopes)
-            if gx * mx + gy * my > -0.5 * (fx * mx + fy * my) or halving == 11:
+            trial = position + move * 0.5**halving
+            missing = _missing(load, pads, loaded, trial, slopes)
+            if product(missing, move) > enough or halving == 11:
                 break
-        position[0], position[1], fx, fy = trial[0], trial[1], gx, gy
-    return math.hypot(fx, fy) < 10.0 * _GOOD_ENOUGH * size
+        position[:] = trial
+    return math.hypot(missing[0], missing[1]) < 10.0 * _GOOD_ENOUGH * size

@@ -5,14 +5,14 @@ import math
 import numpy as np
 
 from model.compilation import inner
-from model.film.dense import product
+from model.film.dense import BOUNDLESS, product
 from model.film.models import solve_by
 from model.film.oil_state import least_share, set_viscosity
 from model.statics.compiled.bending import axial_shape, bend_pads, change_shape
-from model.statics.compiled.case import ACROSS, BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Problem, along, rigid_approach
+from model.statics.compiled.case import ACROSS, HEAT_PER_FORCE, HEATING_STEP, Problem, film_of
 from model.statics.compiled.heat import rest_films
 from model.statics.compiled.place import let_idle, rescue
-from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, grid_of, work_of
+from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, along, rigid_approach, towards
 from rigdata.arrays import FloatArray
 
 #: Largest step of the journal, as a share of the least clearance: the films' slopes are those of where it stands.
@@ -28,11 +28,10 @@ def solve_pressures(problem: Problem, sharp: bool) -> bool:
 
     A film without force is that of the unloaded attitude, in which nothing holds the pad: the loaded one counts.
     """
-    grids, _, pads, works, state, case = problem
-    lost = False
+    pads, state, case, lost = problem.pads, problem.state, problem.case, False
     for k in range(len(pads.order)):
         m = pads.order[k]
-        pad, grid, work = pads.each[m], grid_of(grids, m), work_of(works, m)
+        pad, (grid, work) = pads.each[m], film_of(problem, m)
         pad.supplied = case.fresh + case.mixing * pads.each[pads.order[k - 1]].passed / case.length
         while not pad.idle:
             if not sharp and case.thermal != ACROSS:
@@ -87,22 +86,23 @@ def grow_and_bend(problem: Problem, relaxation: float, change: float) -> float:
 @inner
 def move(problem: Problem, shift: FloatArray, damping: float) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
-    grids, _, pads, works, state, case = problem
+    pads, state, case = problem.pads, problem.state, problem.case
     scale, extra = damping, np.empty((0, 0))
     closing = case.closing * state.figures[GROWING]
     moves = np.zeros((len(pads.each), 3))
     length = max(math.hypot(shift[0], shift[1]), 1e-30)
     for m in range(len(pads.each)):
-        pad, frame = pads.each[m], pads.each[m].frame
+        pad = pads.each[m]
         scale = min(scale, _LONGEST_STEP * pad.clearance / length)
         moves[m, 0], moves[m, 1] = pad.moves[0], pad.moves[1]
         if pad.solved:
-            da = frame[0, 0] * shift[0] + frame[0, 1] * shift[1] - moves[m, 1] + closing
-            db = frame[1, 0] * shift[0] + frame[1, 1] * shift[1] + pad.pivot_radius * moves[m, 0]
+            grid, work = film_of(problem, m)
+            da = towards(pad, shift) - moves[m, 1] + closing
+            db = along(pad, shift) + pad.pivot_radius * moves[m, 0]
             if state.bent.size > 0:
                 moves[m, 2] = change_shape(problem.bodies, problem, m, da, db)
-                extra = state.mismatch[m] + moves[m, 2] * axial_shape(grid_of(grids, m))
-            worst = least_share(grid_of(grids, m), work_of(works, m), da, db, extra)
+                extra = state.mismatch[m] + moves[m, 2] * axial_shape(grid)
+            worst = least_share(grid, work, da, db, extra)
             if worst * damping < _SHRINK - 1.0:
                 scale = min(scale, (_SHRINK - 1.0) / worst)
     change_state(problem, shift, moves, scale)
@@ -115,18 +115,19 @@ def change_state(problem: Problem, shift: FloatArray, moves: FloatArray, scale: 
 
     What a journal will grow by and what is missing of deformations stand in the state.
     """
-    grids, _, pads, works, state, case = problem
+    pads, state = problem.pads, problem.state
     hotter = scale * state.figures[GROWING]
     state.position[:] += scale * shift
     state.figures[GROWN] += hotter
     state.figures[GROWING] = 0.0
     for m in range(len(pads.each)):
         pad = pads.each[m]
-        pad.clearance -= case.closing * hotter
+        pad.clearance -= problem.case.closing * hotter
         # a pad that friction stops where it does not tilt stops there, whatever the step's length
         pad.tilt = 0.0 if moves[m, 0] == -pad.tilt else pad.tilt + scale * moves[m, 0]
         pad.deflection += scale * moves[m, 1]
         if state.bent.size > 0 and pad.solved:
-            works.extra[m] += scale * (state.mismatch[m] + moves[m, 2] * axial_shape(grid_of(grids, m)))
+            grid, work = film_of(problem, m)
+            work.extra[:] += scale * (state.mismatch[m] + moves[m, 2] * axial_shape(grid))
             state.bent[m] += scale * state.mismatch[m]
             pad.axial += scale * moves[m, 2]
