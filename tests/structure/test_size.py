@@ -16,20 +16,20 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (127.35, 14_917),  # a line told with the drive beside it, whole random walks (+0.7)
-    "model": (77.09, 10_302),  # curves of few films (first point of a new geometry 0.35 for 0.40)
-    "rigdata": (60.67, 8_087),
-    "diagnosis": (37.72, 4_629),
-    "cli": (22.57, 3_095),
-    "report": (23.63, 3_088),
-    "pivot": (19.70, 2_536),  # cells not tared, friction with overshoot: 21 to 85 % inside before (+1.5)
-    "clearance": (10.51, 1_256),  # how far the film lets pads lag: 18 % inside before (+0.6)
+    "measurement": (124.07, 14_566),
+    "model": (74.79, 10_098),
+    "rigdata": (59.30, 7_947),
+    "diagnosis": (36.63, 4_511),
+    "cli": (22.31, 3_081),
+    "report": (23.40, 3_060),
+    "pivot": (19.71, 2_536),
+    "clearance": (10.36, 1_246),
     "compare": (12.02, 1_610),
-    "watch": (5.64, 680),
-    "top level": (4.57, 864),  # a condition more; a column finds its unit by its name: fewer tokens, ten lines more
-    "runtime": (7.10, 1_122),
-    "exports": (4.69, 717),
-    "view": (3.72, 485),
+    "watch": (5.58, 670),
+    "top level": (4.57, 864),
+    "runtime": (7.09, 1_122),
+    "exports": (4.49, 698),
+    "view": (3.67, 471),
 }
 MEASUREMENT = ("check", "phasors", "bands", "estimate", "terms", "estimators", "runs", "identification", "results")
 COUNTED = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
