@@ -72,7 +72,7 @@ def spare_slopes(run: Run, along: FloatArray) -> dict[str, FloatArray]:
     """
     slopes: dict[str, FloatArray] = {}
     for quantity in ("force", "displacement"):
-        names = [channel.name for channel in run.vector_channels(quantity)]
+        names = [name for name, c in run.channels.items() if c.quantity == quantity and c.axis is not None]
         if len(names) < 3:
             continue
         moved = run.vector(quantity).values @ along.T
@@ -157,9 +157,11 @@ def live_run(run: Run) -> Run:
     statistics = _statistics(run)
     alive = [c for name, c in run.channels.items() if name not in statistics or not statistics[name].constant]
     used = {name: c for name, c in run.channels.items() if c in alive or not is_spare(c, alive)}
-    run, problems = replace(run, channels=used), []
+    if len(used) < len(run.channels):
+        run = replace(run, channels=used)
+    problems = []
     for quantity in ("force", "displacement"):
-        alike = [channel.name for channel in run.of(quantity)]
+        alike = [name for name, c in run.channels.items() if c.quantity == quantity]
         moving = [_repeated(statistics[name]) for name in alike if not statistics[name].constant]
         if (
             max(moving, default=0.0) <= _NOISE_FREE
