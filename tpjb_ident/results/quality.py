@@ -41,7 +41,7 @@ def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatA
     w = weights[good, None]
     residual = F[good] - D[good] @ h.T
     power = (w * np.abs(F[good]) ** 2).sum(axis=0)
-    return float(np.min(1 - (w * np.abs(residual) ** 2).sum(axis=0) / power))
+    return float(np.clip(1 - (w * np.abs(residual) ** 2).sum(axis=0) / power, 0.0, 1.0).min())
 
 
 def amplitude(data: PointData, weights: FloatArray) -> float:
