@@ -187,6 +187,10 @@ def test_unequal_probes_are_made_alike_and_their_difference_is_in_the_interval(o
     assert found.fitted_angle == pytest.approx(ANGLES, abs=2e-3)
     errors = 1.96 * np.hypot(found.clearance_se, found.relative_calibration * found.clearance)
     assert np.all(np.abs(found.clearance - 80e-6) < errors)
+    # a diagnosis asks what the probes read: the plane stretched by 3 % along one of them
+    pushed, turned = found.as_read
+    assert np.ptp(pushed) > 1e-6
+    assert np.max(np.abs(turned - ANGLES)) == pytest.approx(0.015, rel=0.2)
 
 
 def test_a_sweep_of_three_or_four_pads_says_what_it_leaves_open(whole):

@@ -46,6 +46,16 @@ def test_two_directions_widen_the_covariance_by_what_runs_differ_by():
     np.testing.assert_allclose(more, (Deciding.unseen * np.repeat([2e8, 3e7], 4)) ** 2, rtol=1e-6)
 
 
+@pytest.mark.parametrize("as_read", [None, (np.array([7e-5, 9e-5]), np.array([0.01, 1.48]))])
+def test_a_polygon_is_observed_as_the_probes_read_it(as_read):
+    sides = {"clearance_pushed": np.array([8e-5, 8e-5]), "fitted_angle": np.array([0.0, 1.5])}
+    errors = {"clearance_pushed_se": np.full(2, 1e-7), "fitted_angle_se": np.full(2, 1e-3)}
+    polygon = SimpleNamespace(**sides, **errors, angles=np.array([0.0, 1.5]), push_load=300.0, as_read=as_read)
+    seen = observe(SimpleNamespace(points=(point(),)), polygon=polygon)
+    pushed, fitted = as_read or sides.values()
+    np.testing.assert_allclose(seen.value[-4:], [*pushed, *(fitted - polygon.angles)], atol=1e-15)
+
+
 def test_load_and_heat_are_raised_only_where_no_solved_neighbour_is_known(monkeypatch):
     asked, place = [], (5000.0, -1.5, 138.0)
 

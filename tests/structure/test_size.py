@@ -16,14 +16,14 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (124.10, 14_568),
+    "measurement": (124.11, 14_568),
     "model": (74.79, 10_098),
     "rigdata": (59.30, 7_947),
-    "diagnosis": (36.63, 4_511),
+    "diagnosis": (36.64, 4_513),
     "cli": (22.31, 3_081),
     "report": (23.40, 3_060),
     "pivot": (19.71, 2_536),
-    "clearance": (10.36, 1_246),
+    "clearance": (10.39, 1_250),
     "compare": (12.02, 1_610),
     "watch": (5.58, 670),
     "top level": (4.57, 864),

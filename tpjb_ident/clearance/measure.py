@@ -77,6 +77,8 @@ class ClearancePolygon(Presented):
     relative_calibration : (n,) ndarray
         Standard uncertainty along the pads from the probes' certificates, relative; not in the standard errors, as in
         `PivotCurve`.
+    as_read : tuple of (n,) ndarray, optional
+        Pushed clearances and fitted angles as the probes read them, where unlike gains were shared.
     """
 
     run: str
@@ -98,6 +100,7 @@ class ClearancePolygon(Presented):
     temperature: float = np.nan
     status: tuple[Condition, ...] = ()
     relative_calibration: FloatArray | float = 0.0
+    as_read: tuple[FloatArray, FloatArray] | None = None
 
     def to_frame(self) -> pd.DataFrame:
         """Table of `clearance.csv` (outputs.md): one row per pad, SI, angles in degrees."""
@@ -208,7 +211,8 @@ def measure_run(
     if differ:
         axes = float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)
         fit = alike(fit, angles, axes, ratio)
-        polygon = _polygon(run, contact, angles, fit)
+        as_read = polygon.clearance_pushed, polygon.fitted_angle
+        polygon = replace(_polygon(run, contact, angles, fit), as_read=as_read)
     # which of two unequal probes is right is as unknown as how far they are apart
     calibration = [np.hypot(relative_calibration(probes, float(angle)), 0.5 * ratio) for angle in angles]
     polygon = replace(polygon, relative_calibration=np.array(calibration))

@@ -200,8 +200,10 @@ def observe(
     dry = tuple(_add_dry(parts, curve) for curve in usable)
     if polygon is None:
         return _gathered(Layout(dynamic, locus_tests, dry), (), parts, model)
-    turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
-    for value, error in ((polygon.clearance_pushed, polygon.clearance_pushed_se), (turn, polygon.fitted_angle_se)):
+    # as read: a gain that differs is one of the things that may be wrong, and shows in K and C as well
+    pushed, fitted = polygon.as_read or (polygon.clearance_pushed, polygon.fitted_angle)
+    turn = np.array([math.remainder(t, 2 * math.pi) for t in fitted - polygon.angles])
+    for value, error in ((pushed, polygon.clearance_pushed_se), (turn, polygon.fitted_angle_se)):
         parts.append((np.asarray(value), np.diag(np.asarray(error) ** 2)))
     layout = Layout(dynamic, locus_tests, dry, float(polygon.push_load))
     return _gathered(layout, polygon.angles.tolist(), parts, model)
