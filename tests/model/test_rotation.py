@@ -70,7 +70,8 @@ def test_a_shaft_against_the_stated_sense_enters_at_the_other_edge(rocker):
     stated = with_offset(rocker, 0.6, "counter-clockwise")
     backward = predict(stated, rotation="clockwise", **POINT)
     other_edge = predict(with_offset(rocker, 0.4), rotation="clockwise", **POINT)
-    np.testing.assert_allclose(backward.h, other_edge.h, rtol=1e-12)
+    # entries that vanish by symmetry are rounding
+    np.testing.assert_allclose(backward.h, other_edge.h, rtol=0.0, atol=1e-12 * np.abs(other_edge.h).max())
     assert backward.kxx < 0.2 * predict(stated, **POINT).kxx
 
 
