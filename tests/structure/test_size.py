@@ -16,7 +16,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (124.11, 14_568),
+    "measurement": (124.13, 14_570),
     "model": (74.79, 10_098),
     "rigdata": (59.30, 7_947),
     "diagnosis": (36.64, 4_513),

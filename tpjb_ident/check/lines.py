@@ -12,6 +12,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.run import Run
+from tpjb_ident.phasors.bad_samples import window_median
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.run_data import RunPhasors
 
@@ -49,7 +50,7 @@ class RecordLines:
 def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel]) -> RecordLines:
     """One excitation line as identification has it."""
     values = phasors.mean, np.abs(phasors.residual[line]), phasors.scale
-    mean, floor, scatter = (_by_channel(_window_median(rows), phasors, channels) for rows in values)
+    mean, floor, scatter = (_by_channel(window_median(rows), phasors, channels) for rows in values)
     row = _by_channel(phasors.record[line], phasors, channels)
     omega = 2 * np.pi * phasors.lines.excitation[line].frequency
     return RecordLines(mean, floor, scatter, np.array([omega]), row[None])
@@ -60,7 +61,7 @@ def shaft_line(phasors: RunPhasors, channels: Sequence[Channel]) -> FloatArray:
     place = phasors.lines.place("1X")
     if place is None:
         return np.full(len(channels), np.nan)
-    return _by_channel(_window_median(np.abs(phasors.z[:, place])), phasors, channels)
+    return _by_channel(window_median(np.abs(phasors.z[:, place])), phasors, channels)
 
 
 def shaft_force(phasors: RunPhasors) -> float:
@@ -81,11 +82,6 @@ def shaft_force(phasors: RunPhasors) -> float:
     if not max(forward, backward) > _CLEAR * parts.std(axis=0).max() / math.sqrt(len(force)):
         return math.nan
     return math.log(forward / max(backward, 1e-3 * forward))
-
-
-def _window_median(values: FloatArray) -> FloatArray:
-    """Median over the windows (n, m) that have a value, NaN where none has, (m,)."""
-    return np.asarray(np.ma.filled(np.ma.median(np.ma.masked_invalid(values), axis=0), np.nan))
 
 
 def _by_channel(values: np.ndarray, phasors: RunPhasors, channels: Sequence[Channel]) -> np.ndarray:

@@ -29,9 +29,9 @@ def slopes_over_load(points: Sequence[OperatingPoint], h: ComplexArray) -> tuple
             values = h[members]
             slope[members] = _log_gradient(values.real, log_load) + 1j * _log_gradient(values.imag, log_load)
             known[members] = True
-    told = np.flatnonzero(known).tolist()
+    donors = np.flatnonzero(known).tolist()
     for i in np.flatnonzero(~known).tolist():
-        like = [j for j in told if points[j].static_key == points[i].static_key]
+        like = [j for j in donors if points[j].static_key == points[i].static_key]
         if like:
             j = min(like, key=lambda j: abs(points[j].excitation - points[i].excitation))
             slope[i] = slope[j].real + 1j * slope[j].imag * points[i].excitation / points[j].excitation

@@ -34,12 +34,18 @@ def white_noise(values: FloatArray) -> float:
     return robust_deviation(np.diff(values, 2)) / float(np.sqrt(6.0))
 
 
+def window_median(values: FloatArray, absent: float = np.nan) -> FloatArray:
+    """Median over the windows (n, m) that have a value, `absent` where none has, (m,)."""
+    present = np.isfinite(values)
+    ranked = np.sort(np.pad(np.where(present, values, np.inf), ((0, 1), (0, 0)), constant_values=np.inf), axis=0)
+    count, column = present.sum(axis=0), np.arange(values.shape[1])
+    middle = 0.5 * (ranked[(count - 1) // 2, column] + ranked[count // 2, column])
+    return np.where(count > 0, middle, absent)
+
+
 def usual_scale(scale: FloatArray) -> FloatArray:
     """Median over the windows with a scale (n_windows, q); infinite where none has."""
-    present = np.isfinite(scale)
-    ranked = np.sort(np.where(present, scale, np.inf), axis=0)
-    count, column = present.sum(axis=0), np.arange(scale.shape[1])
-    return np.asarray(0.5 * (ranked[(count - 1) // 2, column] + ranked[count // 2, column]))
+    return window_median(scale, np.inf)
 
 
 def is_present(values: FloatArray) -> BoolArray:
