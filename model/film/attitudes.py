@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
+from model.film.dense import product
 from model.film.energy import heat_step
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.oil_state import Running, set_viscosity
@@ -47,7 +48,7 @@ _FLATTEST = 0.015
 
 
 class Attitudes(NamedTuple):
-    """Attitudes along the wedge, rising; the first is the parallel film."""
+    """Attitudes along the wedge, rising; the first carries nothing."""
 
     curvature: FloatArray  #: (n,): A
     wedge: FloatArray  #: (n,): B
@@ -92,7 +93,7 @@ def _attitudes(ends: tuple[float, float], radius: float, length: float, running:
     if high - low < 3:
         nothing = np.zeros(1)
         return Attitudes(nothing, nothing, nothing, np.zeros((1, *work.temperature.shape)))
-    (curvature, wedge, load), rise = points_between(numbers[low:high], rises[low:high])
+    (curvature, wedge, load), rise = points_between(numbers[low - 1 : high], rises[low:high])
     return Attitudes(curvature, wedge, load / (radius**2 * length), rise.reshape(-1, *work.temperature.shape))
 
 
@@ -100,9 +101,10 @@ def _attitudes(ends: tuple[float, float], radius: float, length: float, running:
 def points_between(rows: FloatArray, rises: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Points (A, B, W) of a curve, (3, n), and their temperatures, (n, nodes): cubics through four rows (A, B, W).
 
-    A is nearly a parabola of the wedge, W nearly a power of it; from the parallel film on to the first row all is
-    straight.
+    A is nearly a parabola of the wedge, W nearly a power of it; from the first, which carries nothing, on to the next
+    all is straight.
     """
+    unloaded, rows = rows[0], rows[1:]
     last, count = len(rows) - 1, min(4, len(rows))
     points = np.zeros((3, _BETWEEN * (last + 1) + 1))
     warm = np.zeros((points.shape[1], rises.shape[1]))
@@ -110,7 +112,7 @@ def points_between(rows: FloatArray, rises: FloatArray) -> tuple[FloatArray, Flo
     for p in range(points.shape[1]):
         row, share = p // _BETWEEN - 1, p % _BETWEEN / _BETWEEN
         if row < 0:
-            points[:, p], warm[p] = share * rows[0], rises[0]
+            points[:, p], warm[p] = unloaded + share * (rows[0] - unloaded), rises[0]
             continue
         first = min(max(row - 1, 0), last + 1 - count)
         place = logarithms[row, 0] + share * (logarithms[min(row + 1, last), 0] - logarithms[row, 0])
@@ -136,7 +138,8 @@ def walk(
 ) -> tuple[int, int]:
     """Fill rows (A, B, W) and temperature rises, from the middle on flatter and deeper; first row and end.
 
-    `depth`: the largest load.
+    `depth`: the largest load. The row before the first is the film that carries nothing: parallel, or, where heat
+    carries down to `_FLATTEST`, one that opens. A soft pivot holds a pad there that a rigid one lets go.
     """
     numbers, rises = out
     middle, ahead = numbers.shape[0] // 2, grid.angle[0]
@@ -148,9 +151,11 @@ def walk(
         return middle, middle
     low, high = middle, middle + 1
     flatter = _FLATTER
-    while low > 0 and flatter < _LEAST_STEP and numbers[low, 0] != _FARTHEST:
+    while low > 1 and flatter < _LEAST_STEP and numbers[low, 0] != _FARTHEST:
         wedge = numbers[low, 1] * flatter
         if wedge < _FLATTEST * first:
+            if high - low > 2 and math.isfinite(running.heat[0]):
+                _open(grid, work, running, out, (low, high))
             break
         rises[low - 1] = rises[low]  # the parallel film, where rows are few
         known = low if high - low > 3 else low - 1
@@ -168,6 +173,21 @@ def walk(
             break
         high += 1
     return low, high
+
+
+@inner
+def _open(
+    grid: FilmGrid, work: FilmWork, running: Running, out: tuple[FloatArray, FloatArray], rows: tuple[int, int]
+) -> None:
+    """Set the row before the first to where a film opens so far that it carries nothing: load falls with the wedge."""
+    numbers, (low, high) = out[0], rows
+    wedge = product(lagrange(numbers[low : low + 2, 2], 0.2 * numbers[low, 2]), numbers[low : low + 2, 1])
+    curvature = _ahead(work, out, wedge, (low, min(low + 3, high), low))
+    if _fill(grid, work, running, out, low - 1, (curvature, wedge)):
+        weights = lagrange(numbers[low - 1 : low + 1, 2], 0.0)
+        for k in range(2):
+            numbers[low - 1, k] = weights[0] * numbers[low - 1, k] + weights[1] * numbers[low, k]
+    numbers[low - 1, 2] = 0.0
 
 
 @inner
