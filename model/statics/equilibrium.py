@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from model.conditions import has_answer
 from model.film.oil_state import Running
 from model.statics.pad_film import PadFilm
-from rigdata.arrays import FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Condition
 
 
@@ -31,6 +33,12 @@ class Equilibrium:
     status: tuple[Condition, ...]
     running: Running  #: What every film runs with for itself.
     begun: Begun
+    loose: tuple[bool, ...] = ()  #: Which pads idle clearly above their folds.
+
+    @property
+    def idle(self) -> BoolArray:
+        """Which pads carry nothing, (n,)."""
+        return np.array([film.idle for film in self.films])
 
     @property
     def converged(self) -> bool:

@@ -59,7 +59,6 @@ class Search:
         if setup.growth is not None:  # the clearances of a journal as warm as the supply
             cold = setup.change(bearing=grown(setup.bearing, setup.growth, supply, supply))
         self.films, self.works, self.grids, self.crosses = pad_films(cold)
-        self.other: BoolArray = np.zeros(len(self.films), dtype=np.bool_)  #: Pads of another equilibrium.
         #: Of every pad its curve's first point that counts, and the temperatures along the curve.
         self.rises: list[tuple[int, FloatArray]] = []
         #: What every film runs with for itself.
@@ -143,7 +142,7 @@ class Search:
         """Put journal and pads where the curves carry the load, and films as warm as they are there; returns itself."""
         self._find_curves()
         pads, state = self.pads, self.state
-        state.position[:], loaded, self.other = first_position(self.case.load, pads)
+        state.position[:], loaded = first_position(self.case.load, pads)
         pads["idle"] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
         self.load_pads(loaded)
         begun = (state.position, pads["tilt"], pads["deflection"], self.works.temperature)
@@ -184,10 +183,10 @@ class Search:
         folds = np.where(self.pads["rows"] >= 2, self.pads["attitudes"][:, 0, 0], math.inf)
         return np.asarray((self.reach - folds) / self.pads["clearance"])
 
-    def let_idle(self, numbers: list[int]) -> None:
-        """Let pads (from 0) carry nothing."""
-        self.pads["idle"][numbers] = True
-        self.pads["tilt"][numbers] = self.pads["deflection"][numbers] = 0.0
+    def let_idle(self, which: Any) -> None:
+        """Let pads carry nothing: their places (from 0), or (n,) which."""
+        self.pads["idle"][which] = True
+        self.pads["tilt"][which] = self.pads["deflection"][which] = 0.0
 
     def even_films(self) -> list[int]:
         """Numbers of idle pads that stand at a fold without load, concentric: their films count, as they are there.

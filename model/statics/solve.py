@@ -11,11 +11,12 @@ import numpy as np
 from model.conditions import named, pads_of, said
 from model.setup import Setup
 from model.statics import conditions
+from model.statics.compiled.start import stand_on_curves
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_flow import starved
 from model.statics.physics import couples_heat
 from model.statics.search import Search
-from rigdata.arrays import FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 
 #: First share of the load or the heat, where the whole of it finds no equilibrium at once, and the least step on.
 _FIRST_SHARE, _LEAST_STEP = 0.25, 0.02
@@ -35,52 +36,90 @@ def solve_equilibrium(
 
     That takes some hundred times as long as an equilibrium from a neighbour.
     """
-    load = np.asarray(load, float)
     warm = None
     if start is not None:
         search = Search(setup, load, speed)
         if search.start_from(start):
             warm = _settled(search, search.run())
             # where pads are left idle that could carry, another start may leave others
-            loose = pads_of("pads {pads} cannot keep their load", warm.status)
-            if warm.converged and not loose and sum(f.idle for f in warm.films) <= np.isnan(search.begun.tilt).sum():
+            if warm.converged and not any(warm.loose) and warm.idle.sum() <= np.isnan(search.begun.tilt).sum():
                 return warm
+    warm = warm if warm is not None and warm.converged else None
     search = Search(setup, load, speed).stand()
-    near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.pads["idle"][m]]
+    above, loaded = search.margins(), ~search.pads["idle"]
+    near = np.abs(above) < _NEAR
     result = _settled(search, search.run())
-    if near and not result.converged:  # they may find no rest where they carry
-        search = Search(setup, load, speed).stand()
-        search.let_idle(near)
-        other = _settled(search, search.run())
-        result = other if other.converged or len(other.status) > len(result.status) else result
-    if not result.converged and warm is not None and warm.converged:
-        return warm
+    of_sets = _is_of_sets(setup)
+    if of_sets and not result.converged:  # pads near their folds may find no rest where they carry
+        result = _most_loaded(setup, load, speed, result, loaded, near & loaded)
+    elif of_sets and any(result.loose):
+        near |= np.array(result.loose) | (~loaded & (above > 0.0))
+        return _most_loaded(setup, load, speed, result, ~result.idle, near)
     for attempt in _ATTEMPTS:
         if patient and not result.converged:
             result = attempt(setup, load, speed, result)
-    return result
+    return result if result.converged or warm is None else warm
+
+
+def _with_pads(setup: Setup, load: FloatArray, speed: float, loaded: BoolArray) -> Equilibrium:
+    """Equilibrium from where the curves of those pads that are loaded carry; the others idle, unless they can carry."""
+    search = Search(setup, load, speed).stand()
+    loaded = loaded & (search.pads["rows"] >= 2)
+    stand_on_curves(search.case.load, search.pads, loaded, search.state.position)
+    search.load_pads(loaded)
+    search.let_idle(~loaded)
+    return _settled(search, search.run())
+
+
+def _is_of_sets(setup: Setup) -> bool:
+    """Whether which pads carry is all that can be in doubt, in films that are soon solved."""
+    few = len(setup.bearing.pads) <= _MOST_PADS and not setup.flexible_pads and not couples_heat(setup)
+    return few and not setup.friction and not setup.rotational_stiffness
+
+
+def _most_loaded(
+    setup: Setup, load: FloatArray, speed: float, known: Equilibrium, loaded: BoolArray, doubtful: BoolArray
+) -> Equilibrium:
+    """The equilibrium with most of the doubtful pads loaded, no more than `loaded` has; what is known where none is.
+
+    Of those with as many the one that idles the last pads; that another exists is named.
+    """
+    pads = np.flatnonzero(doubtful)
+    alike = dict[tuple[bool, ...], Equilibrium]()
+    for size in range(int(loaded[pads].sum()), -1, -1):
+        for chosen in itertools.combinations(pads.tolist(), size):
+            carrying = loaded.copy()
+            carrying[pads] = np.isin(pads, chosen)
+            same = known.converged and np.all(carrying != known.idle)
+            other = known if same else _with_pads(setup, load, speed, carrying)
+            if other.converged:
+                alike.setdefault(tuple(other.idle.tolist()), other)
+            elif not known.converged and len(other.status) > len(known.status):
+                known = other  # the one with the most to say
+        if alike:
+            break
+    else:
+        return known
+    first, *others = sorted(alike, key=sum)
+    if not others or sum(others[0]) > sum(first):
+        return alike[first]
+    another = named("another equilibrium exists", (np.flatnonzero(others[0]) + 1).tolist())
+    return replace(alike[first], status=(another, *alike[first].status))
 
 
 def _try_sets(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
-    """Try every set of two pads or more, those with the most first; where none finds rest, that is named.
+    """Try every set of pads, those with the most first; where none finds rest, that is named.
 
-    Only where which pads carry is all that is in doubt, in films that are soon solved and lost none.
+    Only where which pads carry is all that is in doubt.
     """
-    count = len(failed.films)
-    few = count <= _MOST_PADS and not setup.flexible_pads and not couples_heat(setup)
     found_out = (c.severity == "error" and c != "not converged" and not c.pads for c in failed.status)
-    if not few or setup.friction or setup.rotational_stiffness or any(found_out):
+    if not _is_of_sets(setup) or any(found_out):
         return failed
-    for size in range(count, 1, -1):
-        for pads in itertools.combinations(range(count), size):
-            search = Search(setup, load, speed).stand()
-            loaded = np.isin(np.arange(count), pads)
-            search.load_pads(loaded & (search.pads["rows"] >= 2))
-            search.let_idle(np.flatnonzero(~loaded).tolist())
-            result = _settled(search, search.run())
-            if result.converged:
-                return result
-    return replace(failed, status=(*failed.status, named("no set of pads finds rest")))
+    every = np.ones(len(failed.films), bool)
+    result = _most_loaded(setup, load, speed, failed, every, every)
+    if result.converged:
+        return result
+    return replace(result, status=(*result.status, named("no set of pads finds rest")))
 
 
 def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozenset()) -> Equilibrium:
@@ -88,7 +127,7 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
 
     `held` are pads (from 0) that friction holds off, or that lack oil.
     """
-    if not result.converged or not any(f.idle for f in result.films):
+    if not result.converged:
         return result
     refused = set(held)
     near = _NEAR_SOFT if search.setup.flexible_pads or couples_heat(search.setup) else _NEAR
@@ -100,16 +139,10 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
         pad = max(doubtful, key=lambda m: float(above[m]))
         trial = Search(search.setup, search.load, search.speed, search.heat)
         trial.start_from(result)
-        trial.case = trial.case._replace(tried=pad)
         trial.load_pads(np.arange(len(trial.films)) == pad)
         other = trial.run()
         refused.add(pad)
-        if trial.pads["idle"][pad] and above[pad] < 0.0 and near == _NEAR:
-            # where its own film carries nothing, those of pads with the same curve that stand farther off do not either
-            refused.update(m for m in doubtful if search.rises[m] is search.rises[pad])
-        idle = trial.pads["idle"]
-        fewer = idle.sum() < sum(f.idle for f in result.films)
-        if other.converged and not idle[pad] and (fewer or not np.any(idle & (trial.margins() > near))):
+        if other.converged and not other.idle[pad] and other.idle.sum() < result.idle.sum():
             search, result = trial, other
 
 
@@ -119,26 +152,21 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
     One that would carry where it idles, and carrying pushes the journal off, is left idle where its film opens both
     ways; where it does not, nothing keeps it idle either.
     """
-    films, above = result.films, search.margins()
+    above = search.margins()
     even = search.even_films()
-    off, restless = [], []
-    for m, film in enumerate(films):
-        opens = search.reach[m] <= 0.0
-        if film.idle and (m in held or (above[m] > near and opens)):
-            off.append(film.number)
-        elif film.idle and above[m] > near:
-            restless.append(film.number)
-    edge = [f.number for f in films if abs(above[f.number - 1]) < _EDGE and f.number not in even]
-    another = search.other.any() and not restless
+    above_fold = result.idle & (above > near)
+    opens = above_fold & (search.reach <= 0.0)
+    opens[list(held)] |= result.idle[list(held)]
+    off, restless = ((np.flatnonzero(pads) + 1).tolist() for pads in (opens, above_fold & ~opens))
+    edge = [pad for pad in (np.flatnonzero(np.abs(above) < _EDGE) + 1).tolist() if pad not in even]
     names = (
         (restless, "pads {pads} can neither carry nor idle", restless),
         (restless, "not converged"),
         (off and not restless, "pads {pads} cannot keep their load", off),
         (even and not restless, "pads {pads} stand concentric", even),
         (edge, "pads {pads} on the edge of carrying", edge),
-        (another, "another equilibrium exists", (np.flatnonzero(~search.other) + 1).tolist()),
     )
-    return replace(result, status=(*said(names), *result.status))
+    return replace(result, status=(*said(names), *result.status), loose=tuple(result.idle & (above > _EDGE)))
 
 
 def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:

@@ -38,7 +38,6 @@ class Case(NamedTuple):
     fresh: float  #: What a groove gives of fresh oil [kg/s/m].
     length: float  #: Of the pads [m].
     asks_laws: bool  #: Some pivots have laws that only Python knows.
-    tried: int = -1  #: The search asks whether this pad carries, and ends where it does not.
 
 
 class Problem(NamedTuple):

@@ -79,7 +79,7 @@ def iterate(problem: Problem, memory: Memory) -> int:
     accuracy = case.accuracy * (_ACROSS_ACCURACY if across else 1.0)
     while True:
         if trail[_STAGE] == _BEGIN:
-            if trail[ITERATION] >= _MAX_ITERATIONS or (case.tried >= 0 and pads.each[case.tried].idle):
+            if trail[ITERATION] >= _MAX_ITERATIONS:
                 return NOT_CONVERGED
             trail[ITERATION] += 1
             trail[_STAGE] = _PRESSURE

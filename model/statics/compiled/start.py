@@ -2,12 +2,9 @@
 
 For a set of loaded pads the journal's place is the minimum of a convex energy: the sum over the pads of the integral
 of W(r), less the work of the load. Beyond its fold every curve goes on, falling fast, so that the energy stays convex.
-A pad that stands clearly beyond its fold then idles. Of pads that stand so near beyond it that what goes on of their
-curve still pushes, those sets are tried that leave the most of them loaded; of alike sets the one that idles the last
-pads counts.
+Pads that stand clearly beyond their folds then idle, one after another, the farthest first; of alike ones the last.
 """
 
-import itertools
 import math
 
 import numpy as np
@@ -21,12 +18,12 @@ from rigdata.arrays import BoolArray, FloatArray
 
 #: Share of the clearance over which a curve falls to 1/e beyond its fold.
 _TAIL = 2e-3
-#: Share of the load that may be missing, and that a pad beyond its fold may push with and count as idle.
-_GOOD_ENOUGH, _NOTHING = 2e-4, 1e-4
+#: Share of the load that may be missing.
+_GOOD_ENOUGH = 2e-4
 #: A film's own mesh moves a fold by about this share of the clearance: the search decides.
 _FOLD = 2e-3
-#: Pads near their folds whose sets are tried.
-_MOST_DOUBTFUL = 6
+#: Share of the clearance within which pads stand alike.
+_ALIKE = 1e-6
 
 
 @compiled
@@ -58,37 +55,16 @@ def pivot_curve(
     return rows
 
 
-def first_position(load: FloatArray, pads: np.ndarray) -> tuple[FloatArray, BoolArray, BoolArray]:
-    """Journal (2,) [m], which pads carry there, and which do in another equilibrium (none: there is no other).
-
-    `load` (2,) [N].
-    """
-    loaded = pads["rows"] >= 2
-    position, other = np.zeros(2), np.zeros(len(loaded), dtype=np.bool_)
-    stand_on_curves(load, pads, loaded, position)
-    beyond = _beyond(pads, position)
-    certain = loaded & ~(beyond > 0.0)
-    if not (loaded & ~certain).any():
-        return position, loaded, other
-    push = pads["attitudes"][:, 3, 0] * np.exp(-np.clip(beyond / (_TAIL * pads["clearance"]), 0.0, 60.0))
-    doubtful = np.flatnonzero(loaded & ~certain & (push > _NOTHING * math.hypot(*load)))[:_MOST_DOUBTFUL]
-    for size in range(len(doubtful), -1 if len(doubtful) else 0, -1):
-        found = []
-        for chosen in itertools.combinations(doubtful, size):  # of alike sets the one that idles the last pads first
-            mask, place = certain.copy(), position.copy()
-            mask[list(chosen)] = True
-            good = stand_on_curves(load, pads, mask, place)
-            if good and not (_beyond(pads, place) > _FOLD * pads["clearance"])[mask].any():
-                found.append((place, mask))
-        if found:
-            return *found[0], found[1][1] if len(found) > 1 else other
-    return position, certain, other
-
-
-def _beyond(pads: np.ndarray, position: FloatArray) -> FloatArray:
-    """How far pads stand beyond their folds at a position, (n,) [m]."""
-    reach = pads["preload"] + pads["frame"][:, 0] @ position
-    return np.asarray(pads["attitudes"][:, 0, 0] - reach)
+def first_position(load: FloatArray, pads: np.ndarray) -> tuple[FloatArray, BoolArray]:
+    """Journal (2,) [m], and which pads carry there; `load` (2,) [N]."""
+    position, loaded = np.zeros(2), pads["rows"] >= 2
+    while stand_on_curves(load, pads, loaded, position):
+        reach = pads["preload"] + pads["frame"][:, 0] @ position
+        beyond = np.where(loaded, (pads["attitudes"][:, 0, 0] - reach) / pads["clearance"], -1.0)
+        if beyond.max() < _FOLD:
+            break
+        loaded[np.flatnonzero(beyond > beyond.max() - _ALIKE)[-1]] = False
+    return position, loaded
 
 
 @inner
