@@ -10,7 +10,7 @@ import pytest
 
 import rigdata.units
 from model.bearing import BABBITT, STEEL, BearingError
-from model.bearing_file import load_bearing, parse_bearing
+from model.bearing_file import load_bearing
 
 SECTIONS = {
     "journal": ["diameter"],
@@ -183,13 +183,6 @@ def test_byte_order_mark_is_taken(text, tmp_path):
     path = tmp_path / "bom.toml"
     path.write_text(text, encoding="utf-8-sig")
     assert len(load_bearing(Path(path)).pads) == 5
-
-
-@pytest.mark.parametrize("supply", ["40 degC", "40 °C", "313.15 K", "104 degF"])
-def test_temperatures_count_from_zero_celsius(text, supply):
-    line = f'supply_temperature = "{supply}"'
-    oil = parse_bearing(edit(text, "oil", "supply_temperature", line), "b.toml").oil
-    assert oil.supply_temperature == 40.0
 
 
 def test_bundled_bearings_do_without_pint(rocker_file, monkeypatch):

@@ -89,17 +89,6 @@ def test_a_load_between_two_pads_is_held_and_one_beside_them_is_not(rocker):
     assert not unsupported(Setup(bearing, pivot_laws("kirk", bearing)), np.zeros(2))
 
 
-@pytest.mark.slow
-def test_what_is_unsupported_never_converges(rocker):
-    two = rocker.with_pads(rocker.pads[:2])
-    setup = Setup(two, pivot_laws("kirk", two))
-    for direction in np.linspace(-math.pi, math.pi, 12, endpoint=False):
-        if unsupported(setup, 5000.0 * np.array([math.cos(direction), math.sin(direction)])):
-            p = run(two, direction=float(direction), thermal="isothermal")
-            assert not p.converged
-            assert "no pads against the load" in p.status
-
-
 def test_limits_of_a_pad_are_told_apart(rocker):
     films = run(rocker).equilibrium.films
     assert overloaded_pads(films) == []

@@ -69,14 +69,6 @@ def test_integrals_are_those_of_the_profile():
     assert work.drag[3, 2] > 1.05  # thin oil at the pad: the rest goes with the journal
 
 
-def test_one_temperature_is_one_viscosity():
-    _, work, cross = solved(7)
-    mu = OIL.viscosity(40.0)
-    for value in (work.viscosity, cross.shear):
-        np.testing.assert_allclose(value, mu, rtol=1e-12)
-    np.testing.assert_allclose(work.drag, 1.0, rtol=1e-12)
-
-
 @pytest.mark.parametrize("steep", [0.0, 25.0])
 def test_stiffness_is_the_slope_of_the_force_with_a_profile(steep):
     grid, work, _ = solved(6, lambda eta: 40.0 + steep * (1.0 - eta))

@@ -94,24 +94,6 @@ def test_five_equal_pads_without_load_are_isotropic(rocker):
     np.testing.assert_allclose(np.diag(p.c), p.cxx, rtol=1e-6)
 
 
-def test_warm_start_does_not_change_the_answer(rocker):
-    cold = predict(rocker, 6000.0, -1.0, SPEED)
-    warm = predict(rocker, 6000.0, -1.0, SPEED, start=predict(rocker, 5000.0, DOWN, SPEED))
-    np.testing.assert_allclose(warm.k, cold.k, atol=1e-6 * cold.kyy)
-    np.testing.assert_allclose(warm.position, cold.position, atol=1e-12)
-
-
-@pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])
-def test_a_neighbour_in_other_oil_does_not_change_the_answer(rocker, thermal):
-    oil = rocker.oil
-    hot = replace(rocker, oil=replace(oil, supply_temperature=oil.supply_temperature + 10.0))
-    cold = predict(rocker, 5000.0, DOWN, SPEED, thermal=thermal)
-    alone = predict(hot, 5000.0, DOWN, SPEED, thermal=thermal)
-    assert alone.kyy > 1.05 * cold.kyy
-    warm = predict(hot, 5000.0, DOWN, SPEED, thermal=thermal, start=cold)
-    np.testing.assert_allclose(warm.k, alone.k, atol=1e-6 * alone.kyy)
-
-
 def test_where_no_pad_has_a_curve_a_neighbour_is_not_moved():
     # at full speed the films are too hot for curves; from a journal in the middle the search ends with pad 2 idle
     angles = [math.radians(60.0 * k) for k in range(6)]

@@ -9,13 +9,12 @@ import pytest
 
 from model.bearing import Bearing
 from model.effects import Effect
-from model.film.energy import dissipated, solve_energy
+from model.film.energy import solve_energy
 from model.film.oil_state import Running
 from model.growth import Growth, grown
 from model.options import Options
 from model.predict import predict
 from model.prediction import Prediction
-from tests.rigs.bearings import changed_pads
 
 SPEED = 2 * math.pi * 22
 
@@ -52,36 +51,6 @@ def test_the_pad_s_face_is_hotter_than_the_film_by_the_parabola(rocker):
         np.testing.assert_allclose(profile.mean(axis=-1), mean, rtol=1e-6)
     assert run(rocker).face_temperature[0] is not None
     np.testing.assert_allclose(run(rocker).face_temperature[0], run(rocker).temperature[0], rtol=1e-12)
-
-
-@pytest.mark.slow
-def test_heat_that_pads_take_is_what_their_solid_says(rocker):
-    cooled = changed_pads(rocker, back_convection=3000.0)
-    p = run(cooled, Options(conduction=True), thermal="tehd")
-    film = p.equilibrium.films[0]
-    assert film.deformation is not None
-    work, oil = film.work, rocker.oil
-    into_pad = film.deformation.flux @ (film.deformation.to_coarse @ (work.temperature - 40.0).ravel())
-    lost = float((film.grid.area.ravel() * into_pad).sum())
-    surface = SPEED * rocker.journal_radius
-    assert lost > 0.2 * 2.0 * dissipated(film.grid, work, surface).sum()
-    # the same heat taken away as a given loss, in one march, leaves the same temperature
-    work.exchange[:] = 0.0
-    work.gained[:] = -into_pad.reshape(work.gained.shape) * film.grid.dx * film.grid.height
-    again = np.empty_like(work.temperature)
-    heat, as_it_is = (oil.specific_heat, oil.conductivity), (oil.viscosity_40, 0.0, oil.density_40, 0.0)
-    solve_energy(film.grid, work, film.inlet, Running(SPEED * rocker.journal_radius, as_it_is, heat), again)
-    np.testing.assert_allclose(again, work.temperature, atol=2e-3)
-
-
-@pytest.mark.slow
-def test_conduction_cools_and_a_pad_that_conducts_more_cools_more(rocker):
-    hot = [run(rocker, thermal="tehd").max_temperature]
-    for convection in (0.0, 500.0):
-        cooled = changed_pads(rocker, back_convection=convection)
-        p = run(cooled, Options(conduction=True), thermal="tehd")
-        hot.append(p.max_temperature)
-    assert hot[0] > hot[1] > hot[2]
 
 
 @pytest.mark.slow

@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import trapezoid
-from scipy.interpolate import CubicSpline
 
 from tests.rigs import closed_form as cf
 from tests.studies.field import marched as mr
@@ -56,32 +54,6 @@ def test_a_march_has_the_stiffness_of_its_linearised_film(law, tolerance, mount)
     linear, signals = mr.records(law, rig)
     h = linear.film.h(25.0, 5000.0)
     np.testing.assert_allclose(stiffness(rig, signals), h, atol=tolerance * np.abs(h).max())
-
-
-@pytest.mark.slow
-def test_half_the_step_gives_the_same_motion():
-    rig, push = mr.plan(mr.ShortBearing(), replace(HEAVY, seconds=0.1, amplitude=0.05))
-    halves = CubicSpline(np.arange(len(push)), push)(np.arange(0, len(push) - 0.9, 0.5))
-    coarse = mr.march(mr.ShortBearing(), rig, push)["displacement"]
-    fine = mr.march(mr.ShortBearing(), rig, halves, 2 * mr.STEPS)["displacement"][::2]
-    settled = slice(2000, None)  # the push begins at once
-    assert np.abs(coarse - fine)[settled].max() < 1e-6 * np.ptp(fine, axis=0).max()
-
-
-@pytest.mark.slow
-def test_power_of_the_drive_goes_into_motion_film_and_cells():
-    rig, push = mr.plan(LINEAR, replace(HEAVY, seconds=0.2, amplitude=0.05, unbalance=0.0))
-    s = mr.march(LINEAR, rig, push)
-    weight = rig.loads[0] * cf.unit_vector(-90.0)[:, None]
-    d, v = s["displacement"], s["shaft_speed"] - s["housing_speed"]
-    film = np.einsum("ij,njr->nir", rig.film.k, d) + np.einsum("ij,njr->nir", rig.film.c, v)
-    springs = np.array(rig.springs)[:, None]
-    kinetic = rig.shaft_mass * s["shaft_speed"] ** 2 + rig.mass * s["housing_speed"] ** 2
-    stored = 0.5 * (kinetic + springs * s["housing"] ** 2).sum(axis=1)
-    power = (push[0:-1:2] + weight) * s["shaft_speed"] - film * v - mr.CELL_DAMPING * s["housing_speed"] ** 2
-    work = trapezoid(power.sum(axis=1), dx=1 / mr.STEPS, axis=0)
-    drive = trapezoid(np.abs(push[0:-1:2] * s["shaft_speed"]).sum(axis=1), dx=1 / mr.STEPS, axis=0)
-    assert (np.abs(stored[-1] - stored[0] - work) < 1e-4 * drive).all()
 
 
 @pytest.mark.parametrize("e", [0.1, 0.6])
