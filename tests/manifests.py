@@ -11,6 +11,13 @@ Table = Mapping[str, object]
 SET_POINT = {"shaft_speed": "22 Hz", "static_load": "5 kN", "static_load_direction": "-90 deg"}
 PROBE = {"quantity": "displacement", "axis": "0 deg", "unit": "um"}
 PROBES = {"X1A": PROBE, "X1B": PROBE | {"axis": "90 deg"}}
+#: Two probes at 45 and 135 deg, cells along and across.
+PROBES_AND_CELLS = {
+    name: {"quantity": quantity, "axis": f"{axis} deg", "unit": "um" if quantity == "displacement" else "N"}
+    for name, quantity, axis in (
+        ("PX", "displacement", 45), ("PY", "displacement", 135), ("FX", "force", 0), ("FY", "force", 90),
+    )
+}  # fmt: skip
 SWEEP = {"id": "c-1", "file": "runs/c-1.csv", "kind": "clearance"}
 
 

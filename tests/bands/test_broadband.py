@@ -301,24 +301,24 @@ CONTRADICT = "accelerometers-contradict-cells"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["multisine", "random", "sweep", "impact"])
 @pytest.mark.parametrize(
-    ("fault", "named"),
+    ("kinds", "fault", "named"),
     [
-        (None, None),
-        (_inverted, CONTRADICT),
-        (_exchanged, CONTRADICT),
-        (_late, "cells-and-accelerometers-out-of-phase"),
+        ("multisine random sweep impact", None, None),
+        ("multisine impact", _inverted, CONTRADICT),
+        ("random sweep", _exchanged, CONTRADICT),
+        ("multisine sweep", _late, "cells-and-accelerometers-out-of-phase"),
     ],
 )
-def test_accelerometers_that_contradict_the_cells_are_told_for_every_kind(tmp_path, kind, fault, named):
-    path = campaign(tmp_path, BandRig(kind=kind, seconds=4.0), seed=90001)
-    if fault is not None:
-        with h5py.File(path, "r+") as file:
-            for group in file["runs"].values():
-                fault(group)
-    (result,) = identify(load_campaign(path)).bands
-    assert [str(c) for c in untrusted(result.quality)] == ([] if named is None else [named])
+def test_accelerometers_that_contradict_the_cells_are_told_for_every_kind(tmp_path, kinds, fault, named):
+    for kind in kinds.split():
+        path = campaign(tmp_path, BandRig(kind=kind, seconds=4.0), seed=90001)
+        if fault is not None:
+            with h5py.File(path, "r+") as file:
+                for group in file["runs"].values():
+                    fault(group)
+        (result,) = identify(load_campaign(path)).bands
+        assert [str(c) for c in untrusted(result.quality)] == ([] if named is None else [named]), kind
 
 
 @pytest.mark.slow

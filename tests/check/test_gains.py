@@ -196,13 +196,3 @@ def test_a_probe_that_steps_within_an_operating_point_is_told(tmp_path, shift, t
     path = written(tmp_path / "c.h5", stiff_rig(5, Fault("offset", RUN, "X1B", value=shift), plan=plan))
     found = [(p.run, p.place) for p in check_campaign(path) if "on average beside" in p.what]
     assert found == ([(RUN, "channel X1B")] if told else [])
-
-
-@pytest.mark.slow
-def test_the_check_names_channel_and_gain_of_one_run(tmp_path):
-    path = written(
-        tmp_path / "c.h5", stiff_rig(5, Fault("scaled", RUN, "X1A", value=1.03), plan=replace(PLAN, locus=(), dry=()))
-    )
-    (found,) = check_campaign(path)
-    assert (found.run, found.severity, found.place) == (RUN, "warning", "channel X1A")
-    assert "too much" in found.what

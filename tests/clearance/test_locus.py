@@ -104,7 +104,7 @@ def test_intervals_hold_how_well_the_shaft_comes_back_where_repeats_tell_it(camp
     source, rng, inside = Repeated(campaign, [0, 1, 2, 3], np.zeros((10, 2))), np.random.default_rng(3), []
     records = {run.id: locus._read(run) for run in source.runs}
     truth = {name: record.position for name, record in records.items()}
-    for _ in range(80):
+    for _ in range(40):
         offsets = np.outer(np.arange(10), [1e-7, -2e-7]) + 5e-7 * rng.standard_normal((10, 2))
         moved = {name: replace(r, position=r.position + o) for (name, r), o in zip(records.items(), offsets)}
         monkeypatch.setattr(locus, "_read", lambda run, moved=moved: moved[run.id])

@@ -7,38 +7,10 @@ from rigdata.campaign import load_campaign
 from rigdata.problem import RigDataError
 from rigdata.vector import directions
 from tests.clearance.cases import ANGLES
+from tests.manifests import PROBES_AND_CELLS, manifest, write_files
 from tpjb_ident.clearance.measure import measure_clearance
 
 PUSH, CENTRE = 300.0, (40e-6, -25e-6)
-MANIFEST = """schema = "tpjb-rig/1"
-id = "sweep"
-bearing = "bearing.toml"
-[housing]
-mass = "30 kg"
-[acquisition]
-sample_rate = "{rate:g} Hz"
-[channels.X1]
-quantity = "displacement"
-axis = "45 deg"
-unit = "um"
-[channels.X2]
-quantity = "displacement"
-axis = "135 deg"
-unit = "um"
-[channels.L1]
-quantity = "force"
-axis = "0 deg"
-unit = "N"
-[channels.L2]
-quantity = "force"
-axis = "90 deg"
-unit = "N"
-[[runs]]
-id = "c-1"
-file = "c-1.csv"
-kind = "clearance"
-static_load = "300 N"
-"""
 
 
 def pushed(force, clearance, stiffness):
@@ -87,10 +59,10 @@ def sweep(
     probes = np.round(probes / step) * step if step else probes
     cells = force + 3.0 * rng.standard_normal(force.shape)
     columns = np.column_stack([1e6 * probes, cells])
-    np.savetxt(folder / "c-1.csv", columns, "%.6g", delimiter=",", header="X1,X2,L1,L2", comments="")
-    (folder / "campaign.toml").write_text(MANIFEST.format(rate=rate), encoding="utf-8")
-    (folder / "bearing.toml").write_text("", encoding="utf-8")
-    return load_campaign(folder), clearance
+    np.savetxt(folder / "c-1.csv", columns, "%.6g", delimiter=",", header=",".join(PROBES_AND_CELLS), comments="")
+    run = {"id": "c-1", "file": "c-1.csv", "kind": "clearance", "static_load": "300 N"}
+    text = manifest(PROBES_AND_CELLS, run, acquisition={"sample_rate": f"{rate:g} Hz"})
+    return load_campaign(write_files(folder, text)), clearance
 
 
 GOOD = {

@@ -8,6 +8,7 @@ from model.bearing_file import load_bearing
 from rigdata import RigDataError, load_campaign
 from rigdata.manifest.manifest import parse_manifest
 from tests.command_line import ended, tpjb
+from tests.manifests import PROBE, SWEEP, manifest
 
 TIME = np.arange(2000) / 1000.0
 
@@ -166,24 +167,11 @@ def test_the_pads_angles_are_drafted_where_dry_steps_tell_them(folder):
     assert 'pivot_angles = ["-90 deg", "0 deg", "90 deg", "180 deg"]' in (folder / "bearing.toml").read_text("utf-8")
 
 
-MANIFEST = """
-schema = "tpjb-rig/1"
-id = "x"
-bearing = "b.toml"
-[channels.A]
-quantity = "displacement"
-axis = "45 deg"
-unit = "V"
-sensitivity = "8 V/mm"
-polarity = -1
-[channels.B]
-like = "A"
-axis = "135 deg"
-[[runs]]
-id = "c"
-file = "c.csv"
-kind = "clearance"
-"""
+ALIKE = {
+    "A": PROBE | {"axis": "45 deg", "unit": "V", "sensitivity": "8 V/mm", "polarity": -1},
+    "B": {"like": "A", "axis": "135 deg"},
+}
+MANIFEST = manifest(ALIKE, SWEEP)
 
 
 def test_a_sensor_that_is_like_another_has_its_calibration_and_its_own_place():

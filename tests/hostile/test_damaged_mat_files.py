@@ -1,6 +1,5 @@
 """MATLAB 5 files that brought the process down inside scipy, found by fuzzing: now refused with their byte."""
 
-import random
 import struct
 import zlib
 
@@ -48,23 +47,6 @@ def test_a_type_that_is_none_is_refused_before_scipy_looks_it_up(good, kind):
     good.write_bytes(data)
     with pytest.raises(RigDataError, match="damaged"):
         read_series(good, "a.mat")
-
-
-@pytest.mark.slow
-def test_any_changed_byte_ends_in_numbers_or_in_a_named_error(good):
-    whole = good.read_bytes()
-    rng = random.Random(5)
-    outcomes = set()
-    for _ in range(400):
-        data = bytearray(whole)
-        data[128 + rng.randrange(64) + 1016 * rng.randrange(3)] = rng.randrange(256)
-        good.write_bytes(data)
-        try:
-            read_series(good, "a.mat")
-            outcomes.add("read")
-        except RigDataError:
-            outcomes.add("refused")
-    assert outcomes == {"read", "refused"}
 
 
 def test_a_compressed_bomb_is_refused_and_the_limit_can_be_moved(tmp_path, monkeypatch):

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, Oil, Pad, Pivot
+from model.bearing import Bearing
 from model.pivots import constant_pivot
 from model.predict import predict
 from model.prediction import Prediction
 from model.statics.search import Search
 from model.statics.solve import _NEAR
 from tests.rigs import random_bearings
+from tests.rigs.bearings import ring
 
 SPEED = 2 * math.pi * 22.0
 DOWN = -math.pi / 2
@@ -97,9 +98,8 @@ def test_five_equal_pads_without_load_are_isotropic(rocker):
 def test_where_no_pad_has_a_curve_a_neighbour_is_not_moved():
     # at full speed the films are too hot for curves; from a journal in the middle the search ends with pad 2 idle
     angles = [math.radians(60.0 * k) for k in range(6)]
-    pads = tuple(Pad(a, 0.733297, 0.583873, 177.845e-6, 109.787e-6, 0.0535, 0.0, 0.0535, 0.5, 3e-4) for a in angles)
-    oil = Oil(0.01128108, 0.034, 860.0, 7e-4, 2000.0, 0.13, 39.50594)
-    hot = Bearing("hot", 0.2675282, 0.196916, pads, Pivot(), oil)
+    clearances, oil = (177.845e-6, 109.787e-6), (0.01128108, 39.50594)
+    hot = ring(angles, (0.2675282, 0.196916), 0.733297, clearances, oil, 0.583873)
     alone, heavier = (predict(hot, load, 1.532345, 515.8327, pivots=1.504415e8) for load in (14560.3, 21840.5))
     assert alone.converged
     assert np.isnan(alone.equilibrium.begun.position).all()
@@ -191,32 +191,26 @@ def test_sixty_random_bearings():
 def test_a_hot_ring_without_preload_carries_on_all_pads():
     # heated, central pivots carry beyond zero: an independent program finds all five pads loaded, preloading each other
     angles = [math.radians(-54.0 + 72.0 * k) for k in range(5)]
-    pads = tuple(Pad(a, 1.07298, 0.5, 95.935e-6, 95.935e-6, 0.0311, 0.0, 0.0311, 0.5, 3e-4) for a in angles)
-    oil = Oil(0.05392, 0.034, 860.0, 7e-4, 2000.0, 0.13, 38.545)
-    ring = Bearing("ring", 0.155476, 0.143519, pads, Pivot(), oil)
-    p = predict(ring, 4094.6, -1.8745, 912.77, pivots=9.1884e8)
+    bearing = ring(angles, (0.155476, 0.143519), 1.07298, (95.935e-6, 95.935e-6), (0.05392, 38.545))
+    p = predict(bearing, 4094.6, -1.8745, 912.77, pivots=9.1884e8)
     assert p.converged
     assert p.idle_pads == ()
     assert p.pad_load.min() > 0.5 * p.load  # light load: they push one another
     assert_equilibrium(p)
-    fine = predict(ring, 4094.6, -1.8745, 912.77, pivots=9.1884e8, mesh=(160, 12))
+    fine = predict(bearing, 4094.6, -1.8745, 912.77, pivots=9.1884e8, mesh=(160, 12))
     np.testing.assert_allclose(p.k, fine.k, atol=1e-3 * p.kyy)
-    elsewhere = predict(ring, 8000.0, 0.5, 700.0, pivots=9.1884e8)
-    warm = predict(ring, 4094.6, -1.8745, 912.77, pivots=9.1884e8, start=elsewhere)
+    elsewhere = predict(bearing, 8000.0, 0.5, 700.0, pivots=9.1884e8)
+    warm = predict(bearing, 4094.6, -1.8745, 912.77, pivots=9.1884e8, start=elsewhere)
     np.testing.assert_allclose(warm.k, p.k, atol=1e-4 * p.kyy)
 
 
 @pytest.mark.slow
 def test_a_heated_film_carries_on_a_wedge_that_opens():
     # three pads without preload, the load almost on one of them: heat alone balances the other
-    pads = tuple(
-        Pad(2.0 * math.pi / 3.0 * k, 1.745329, 0.5, 85.13593e-6, 85.13593e-6, 0.0415, 0.0, 0.0415, 0.5, 3e-4)
-        for k in range(3)
-    )
-    oil = Oil(0.0324235, 0.034, 860.0, 7e-4, 2000.0, 0.13, 38.791)
-    ring = Bearing("ring", 0.207696, 0.215088, pads, Pivot(), oil)
+    angles = [2.0 * math.pi / 3.0 * k for k in range(3)]
+    bearing = ring(angles, (0.207696, 0.215088), 1.745329, (85.13593e-6, 85.13593e-6), (0.0324235, 38.791))
     p, fine, heavier = (
-        predict(ring, load, 1.79937, 577.7065, pivots=1.948773e8, mesh=mesh)
+        predict(bearing, load, 1.79937, 577.7065, pivots=1.948773e8, mesh=mesh)
         for load, mesh in ((13473.0, (40, 4)), (13473.0, (80, 8)), (20210.0, (40, 4)))
     )
     assert p.idle_pads == fine.idle_pads == (3,)
@@ -224,22 +218,18 @@ def test_a_heated_film_carries_on_a_wedge_that_opens():
     assert film.forces.force[0] > 4000.0
     assert film.tangent @ p.equilibrium.position + film.pivot_radius * film.tilt < 0.0  # the wedge
     np.testing.assert_allclose(p.h, fine.h, atol=1e-4 * np.abs(p.h).max())
-    warm = predict(ring, 13473.0, 1.79937, 577.7065, pivots=1.948773e8, mesh=(40, 4), start=heavier)
+    warm = predict(bearing, 13473.0, 1.79937, 577.7065, pivots=1.948773e8, mesh=(40, 4), start=heavier)
     np.testing.assert_allclose(warm.h, p.h, atol=1e-6 * np.abs(p.h).max())
-    between = predict(ring, 13473.0, math.pi / 3.0, 577.7065, pivots=1.948773e8, mesh=(40, 4))
+    between = predict(bearing, 13473.0, math.pi / 3.0, 577.7065, pivots=1.948773e8, mesh=(40, 4))
     assert between.converged
 
 
 @pytest.mark.slow
 def test_where_no_set_of_pads_finds_rest_that_is_named():
     # four pads without preload: where one idles the journal comes so near that it would carry, and carrying pushes off
-    pads = tuple(
-        Pad(math.pi / 2.0 * k, 1.223715, 0.5, 74.85854e-6, 74.85854e-6, 0.0254127, 0.0, 0.0254127, 0.5, 3e-4)
-        for k in range(4)
-    )
-    oil = Oil(0.02813447, 0.034, 860.0, 7e-4, 2000.0, 0.13, 45.716114)
-    ring = Bearing("ring", 0.12706343, 0.12509399, pads, Pivot(), oil)
-    p = predict(ring, 18524.038, -2.0754574, 1316.3273, pivots=2.755724547e9, mesh=(40, 4))
+    angles = [math.pi / 2.0 * k for k in range(4)]
+    bearing = ring(angles, (0.12706343, 0.12509399), 1.223715, (74.85854e-6, 74.85854e-6), (0.02813447, 45.716114))
+    p = predict(bearing, 18524.038, -2.0754574, 1316.3273, pivots=2.755724547e9, mesh=(40, 4))
     assert not p.converged
     assert "no set of pads finds rest" in p.status
 

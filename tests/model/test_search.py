@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, Oil, Pad, Pivot
 from model.film.dense import DEPTH, mixed
 from model.measured_pivot import FormulaPivot, MeasuredPivot
 from model.pad.pivot import OTHER, compliance, deflection
 from model.pivots import RIGID_PIVOT, ScaledPivot, ask_laws, constant_pivot, encoded, formula_pivot
 from model.predict import predict
 from model.statics import search
+from tests.rigs.bearings import ring
 
 CURVE = MeasuredPivot(np.array([0.0, 500.0, 2000.0, 6000.0]), np.array([0.0, 2e-6, 5e-6, 1e-5]))
 
@@ -74,13 +74,12 @@ def test_mixing_is_andersons():
 def test_two_side_pads_that_only_carry_together_are_found_from_a_neighbour_without_them():
     # hot films of no preload: each pad alone would push the journal to where it loses its load
     angles = np.radians([-90.0, 0.0, 90.0, 180.0])
-    pads = tuple(Pad(a, math.radians(70.0), 0.5, 1e-4, 1e-4, 0.02, 0.0, 0.02, 0.5, 3e-4) for a in angles.tolist())
-    ring = Bearing("ring", 0.1, 0.06, pads, Pivot(), Oil(0.03, 0.034, 860.0, 7e-4, 2000.0, 0.13, 45.0))
+    bearing = ring(angles.tolist(), (0.1, 0.06), math.radians(70.0), (1e-4, 1e-4), (0.03, 45.0))
     point = {"load": 2000.0, "speed": 600.0, "pivots": "rigid"}
-    turned = predict(ring, load_direction=-math.pi / 2 + 0.4, **point)
+    turned = predict(bearing, load_direction=-math.pi / 2 + 0.4, **point)
     assert turned.idle_pads == (3, 4)
-    cold = predict(ring, load_direction=-math.pi / 2, **point)
-    warm = predict(ring, load_direction=-math.pi / 2, start=turned, **point)
+    cold = predict(bearing, load_direction=-math.pi / 2, **point)
+    warm = predict(bearing, load_direction=-math.pi / 2, start=turned, **point)
     assert cold.idle_pads == warm.idle_pads == (3,)
     np.testing.assert_allclose(warm.h, cold.h, rtol=1e-5, atol=1e-5 * np.abs(cold.h).max())
 

@@ -13,7 +13,7 @@ from rigdata.record import VectorRecord
 from tpjb_ident.conditions import sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
-from tpjb_ident.pivot.blocks import Blocks, Hold, LoadCourse, slid
+from tpjb_ident.pivot.blocks import Blocks, Hold, LoadCourse
 from tpjb_ident.pivot.dry_record import (
     FRICTION_SE,
     FRICTION_SHARE,
@@ -245,17 +245,6 @@ def test_runs_of_one_pad_have_one_zero():
     # the loop of a straight law with a share mu of friction: 2 mu s F over the loads of both
     width = 2 * 0.01 * SCALE * np.array([500.0, 4750.0])
     assert made.hysteresis.energy == pytest.approx(0.5 * width.sum() * 4250.0, rel=1e-6)
-
-
-def test_a_bad_block_spoils_its_hold_and_a_ramp_has_blocks_for_steps():
-    good = np.ones(60, dtype=bool)
-    good[20] = False
-    made = curve(good=good)
-    np.testing.assert_array_equal(made.steps.weight, np.arange(10) != 3)
-    assert sentences(made.status) == ("bad-steps: 1 left out",)
-    ramp = curve(record(held=False), good=good)
-    assert len(ramp.steps) == 60
-    assert sentences(ramp.status) == ("bad-steps: 1 left out", "no-holds: drift cannot be told from deflection")
 
 
 def test_certificates_of_channels_that_share_a_direction():
@@ -499,23 +488,6 @@ def test_steps_of_a_converter_that_no_noise_reaches_are_known():
     clean = vectors(ANGLES[0], REACH + SCALE * (run.force @ vectors(ANGLES[0], [1.0])[0]).round(-2))
     run.displacement = np.round(clean / step) * step
     assert read(run).quantisation == pytest.approx(step / math.sqrt(6.0), rel=1e-6)
-
-
-@pytest.mark.parametrize("top", [1000.0, 4000.0])
-@pytest.mark.parametrize("way", [1, -1])
-def test_a_load_that_comes_back_moves_the_pivot_only_beyond_twice_its_friction(top, way):
-    """A play of two per cent on a way up and down again, and on one down from the top."""
-    load = top * np.array([0.5, 0.8, 1.0, 0.97, 0.95, 0.9, 0.92, 0.95, 1.02] if way > 0 else [1.0, 0.8, 0.82, 0.85])
-    last = top * np.array([0.5, 0.8, 1.0, 1.0, 0.95, 0.9, 0.9, 0.95, 1.02] if way > 0 else [1.0, 0.8, 0.8, 0.85])
-    sense = [1, 1, 1, 1, -1, -1, -1, 1, 1] if way > 0 else [-1, -1, -1, 1]
-    at, zeros = np.arange(0, 20 * len(load), 20), np.zeros(len(load))
-    time = 0.1 * np.arange(at[-1] + 1)
-    course = LoadCourse(time, np.interp(time, time[at], load), 0.1)
-    one_bin, none = np.full(len(load), 0.1), np.full(len(load), -1)
-    blocks = Blocks(time[at], one_bin, load, zeros, load, zeros, zeros, zeros, none, np.full(len(load), way))
-    moved = slid(blocks, course, 0.02)
-    np.testing.assert_allclose(moved.load, last, rtol=1e-9)
-    np.testing.assert_array_equal(moved.branch, sense)
 
 
 @pytest.mark.parametrize("friction", [0.005, 0.02])

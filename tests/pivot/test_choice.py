@@ -30,16 +30,6 @@ def fitted(name, evidence=0.0, contact=False, shape=(), gap=0.0, decay=500.0, sc
     return LawFit(LAWS[name], REFERENCE, contact, np.array(theta), spread, evidence, 0.0, 10)
 
 
-def test_a_pad_alone_weighs_evidence_with_the_stated_priors():
-    """Seven parts of ten for full contact, a fiftieth of a physical law for the spline."""
-    given = [("linear", False), ("linear", True), ("hertz-point", False), ("spline", False)]
-    evidence = [1.0, 2.5, 0.5, 4.0]
-    (weights,) = posterior_weights([[fitted(n, e, c) for (n, c), e in zip(given, evidence)]])
-    prior = np.array([0.7, 0.3, 0.7, 0.7 * 0.02])
-    by_hand = prior * np.exp(evidence)
-    np.testing.assert_allclose(weights, by_hand / by_hand.sum(), rtol=1e-12)
-
-
 TRIED = (("linear", False), ("linear", True), ("power", False), ("power", True), ("spline", False))
 EVIDENCE = ((0.3, 0.9, 0.0, -9.0, 1.0), (0.5, 0.1, 1.2, 1.1, -9.0), (1.4, -9.0, 0.2, -9.0, 2.0))
 PADS = [[(*variant, size) for variant, size in zip(TRIED, sizes)] for sizes in EVIDENCE]

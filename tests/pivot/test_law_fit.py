@@ -19,11 +19,6 @@ def data(deflection, load=LOAD, branch=None, sigma=1e-8, friction=(0.0, 1e-6)):
     return FitData(load, deflection, np.ones(len(load)) if branch is None else branch, whitener, REFERENCE, friction)
 
 
-def informed(mean, precision):
-    """The power law with another prior of its exponent."""
-    return dataclasses.replace(LAWS["power"], prior_mean=np.array([mean]), prior_precision=np.array([[precision]]))
-
-
 def reading(fit, load, branch):
     return fit.reading_gradient(load, branch)[0]
 
@@ -109,22 +104,6 @@ def test_evidence_is_the_integral_over_the_shape():
         assert fit.log_evidence == pytest.approx(by_hand + offset, abs=0.03)
 
 
-@pytest.mark.parametrize("unit", [1e-3, 1e3])
-def test_loads_in_another_unit_are_the_same_pivot(unit):
-    """W and W_r alike: scale changes by its unit, shapes and evidence by nothing."""
-    given = noisy(6, gap=2e-6)
-    other = dataclasses.replace(given, load=unit * given.load, reference_load=unit * REFERENCE)
-    for contact in (False, True):
-        a, b = fit_law(LAWS["power"], contact, given), fit_law(LAWS["power"], contact, other)
-        shift = np.zeros(len(a.theta))
-        shift[2] = -math.log(unit)
-        if contact:
-            shift[-1] = math.log(unit)
-        np.testing.assert_allclose(b.theta - shift, a.theta, rtol=1e-6, atol=1e-10)
-        np.testing.assert_allclose(b.covariance, a.covariance, rtol=1e-4, atol=1e-20)
-        assert b.log_evidence == pytest.approx(a.log_evidence, abs=1e-6)
-
-
 def test_parameters_stop_at_their_bounds_and_the_others_are_still_best():
     """A law that bends more than a power of 0.3 may, and a contact gap that would be negative."""
     given = data(3e-6 + 2e-6 * LOAD**0.27, sigma=1e-8)
@@ -151,17 +130,6 @@ def test_friction_is_believed_up_to_a_fifth(held, found):
     assert fit_law(LAWS["linear"], False, given).theta[1] == pytest.approx(found, rel=1e-5)
 
 
-@pytest.mark.parametrize("error", [1e-4, 1e-2])
-def test_friction_that_is_not_measured_is_that_of_the_prior(error):
-    """On one branch a share held back is a softer pivot: prior and its error come back, the scale takes the error."""
-    fit = fit_law(LAWS["linear"], False, data(4e-9 * LOAD, friction=(0.02, error)))
-    assert fit.theta[1] == pytest.approx(0.02, abs=0.05 * error)
-    assert math.exp(fit.theta[2]) == pytest.approx(4e-9 / 0.98, rel=0.06 * error)
-    assert math.sqrt(fit.covariance[1, 1]) == pytest.approx(error, rel=1e-3)
-    slope = 1e-8 / (4e-9 * math.sqrt(np.sum((LOAD - LOAD.mean()) ** 2)))
-    assert math.sqrt(fit.covariance[2, 2]) == pytest.approx(math.hypot(error / 0.98, slope), rel=2e-3)
-
-
 def test_a_pad_that_is_not_pressed_gives_nothing():
     fit = fit_law(LAWS["hertz-line"], False, noisy(8))
     np.testing.assert_array_equal(fit.deflection(np.array([0.0, -50.0])), 0.0)
@@ -170,25 +138,6 @@ def test_a_pad_that_is_not_pressed_gives_nothing():
         fit.log_softness(np.array([-50.0]), False)[1], fit.log_softness(np.zeros(1), False)[1]
     )
     assert reading(fit, np.array([-50.0]), np.ones(1))[0] == fit.theta[0]
-
-
-@pytest.mark.parametrize("start", [(1e-4, 0.0, -25.0, 0.3), (-1e-4, 0.0, -17.0, 1.2), (0.0, 0.0, -19.0, 5.0)])
-def test_far_starts_end_in_the_same_place(start):
-    given = noisy(10)
-    fit = fit_law(LAWS["power"], False, given)
-    far = fit_law(LAWS["power"], False, given, start=np.array(start))
-    errors = np.sqrt(np.diag(fit.covariance))
-    assert (np.abs(far.theta - fit.theta) < 0.1 * errors + 1e-12).all()
-
-
-def test_a_prior_from_elsewhere_pulls_by_its_share():
-    """Information adds up: the exponent lies between that of the data and that of the prior."""
-    given = noisy(11, sigma=2e-7)
-    alone = fit_law(informed(0.8, 1e-9), False, given)
-    information = 1.0 / alone.covariance[3, 3]
-    drawn = fit_law(informed(alone.shape[0] + 0.02, information), False, given)
-    assert drawn.shape - alone.shape == pytest.approx([0.01], rel=0.05)
-    assert 1.0 / drawn.covariance[3, 3] == pytest.approx(2 * information, rel=0.05)
 
 
 def prior_distance(logs):

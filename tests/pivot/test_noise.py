@@ -63,26 +63,6 @@ def white_series(count, seed, n=150, sigma=2e-8, duration=BLOCK):
     return [NoiseSeries(time, np.full(n, duration), sigma * rng.standard_normal(n), mean) for _ in range(count)]
 
 
-SLOPES = 1e-5 * np.random.default_rng(1).standard_normal((4, 2))
-
-
-@pytest.mark.parametrize(
-    ("changed", "unit"),
-    [
-        (lambda s, k: replace(s, values=s.values + s.mean @ SLOPES[k], mean=s.mean * [1e6, -1e-9]), 1.0),
-        (lambda s, k: replace(s, time=s.time + 900.0), 1.0),
-        (lambda s, k: replace(s, values=1e3 * s.values), 1e3),
-    ],
-    ids=["what the signal spans", "clock", "unit"],
-)
-def test_what_is_no_noise_changes_nothing(changed, unit):
-    series = white_series(4, 6)
-    a = estimate_noise(series, 1e-8)
-    b = estimate_noise([changed(s, k) for k, s in enumerate(series)][::-1], unit * 1e-8)
-    expected = [a.white * unit**2, a.flicker * unit**2, a.drift * unit]
-    np.testing.assert_allclose(numbers(b), expected, rtol=1e-5)
-
-
 @pytest.mark.parametrize("rate", [1e-9, 3e-8, 1e-6])
 def test_a_drift_that_cannot_be_learnt_is_the_one_to_be_expected(rate):
     """On a ramp: the stated rate and what flickers, as squares."""
@@ -106,26 +86,6 @@ def test_a_walk_is_told_from_flicker_that_looks_like_it_over_a_second():
     assert way @ covariance @ way == pytest.approx(4e-16 * np.ptp(series[0].time), rel=0.5)
     none = estimate_noise(white_series(10, 3, sigma=2e-8), 1e-8)
     assert none.walk < 2e-9
-
-
-def drifting(rates, seed=2, n=50, sigma=1e-9):
-    rng = np.random.default_rng(seed)
-    time = (np.arange(n) + 0.5) * BLOCK
-    return [
-        NoiseSeries(time, np.full(n, BLOCK), sigma * rng.standard_normal(n) + rate * time, np.ones((n, 1)))
-        for rate in rates
-    ]
-
-
-def test_the_drift_is_the_spread_of_the_rates_that_are_seen():
-    """Many runs: their root mean square; one run: between what it shows and the prior, a factor e wide."""
-    rates = np.array([1.0, -2.0, 1.5, -0.5, 2.0, -1.0, 1.0, 0.3] * 2) * 1e-8
-    rms = math.sqrt(np.mean(rates**2))
-    assert estimate_noise(drifting(rates), rms).drift == pytest.approx(rms, rel=0.08)
-    many = [estimate_noise(drifting(rates), prior).drift for prior in (0.2 * rms, 5 * rms)]
-    assert many == pytest.approx([rms, rms], rel=0.12)
-    few = [estimate_noise(drifting(rates[4:5]), prior).drift for prior in (2e-9, 2e-7)]
-    assert 2e-9 < few[0] < 2e-8 < few[1] < 2e-7
 
 
 def test_a_computed_record_has_next_to_no_noise():

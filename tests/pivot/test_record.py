@@ -243,22 +243,6 @@ def test_holds_without_noise_have_their_exact_level_branch_and_length(start, uni
         assert 0.8 < hold.duration < 1.02
 
 
-def test_a_slow_approach_is_cut_off_the_front_and_a_late_move_off_the_end():
-    """A level that is reached as exp(-t / 0.1 s) counts once it is within four standard deviations of the noise."""
-    time, load = staircase(hold=3.0)
-    for k in range(3):
-        begin = 0.5 + 3.5 * k
-        inside = (time >= begin) & (time < begin + 3.0)
-        load[inside] -= 300.0 * np.exp(-(time[inside] - begin) / 0.1)
-    rng = np.random.default_rng(5)
-    found = find_holds(time, load + 20.0 * rng.standard_normal(len(load)))
-    assert len(found) == 3
-    for k, one in enumerate(found):
-        # 300 exp(-t / 0.1) = 4 * 20 / sqrt(20 samples of a bin): 0.28 s
-        assert one.start == pytest.approx(0.5 + 3.5 * k + 0.28, abs=0.12)
-        assert one.level == pytest.approx(1000.0 * (k + 1), abs=4.0)
-
-
 def test_one_bad_bin_does_not_split_a_hold_but_a_move_does():
     rng = np.random.default_rng(2)
     time, load = staircase(rng, hold=2.0)
@@ -308,16 +292,6 @@ def test_a_creep_that_is_slower_than_a_ramp_is_cut_off_either_end(sense):
     assert first.stop == pytest.approx(begin + 2.51, abs=0.09)
     assert first.level == pytest.approx(1000.0, abs=0.3)
     assert second.duration > 2.8
-
-
-def test_four_bins_are_a_hold_and_two_are_none():
-    """Six whole bins stand still, of which the two beside the ramps feel them."""
-    assert find_holds(*staircase(hold=0.16, ramp=0.4)) == ()
-    holds = find_holds(*staircase(hold=0.24, ramp=0.4))
-    assert len(holds) == 3
-    for k, one in enumerate(holds):
-        begin = 0.4 + 0.64 * k
-        assert begin - 1e-9 < one.start < one.stop < begin + 0.24 + 1e-9
 
 
 def programme(levels, holds, ramp=0.3, overshoot=0.0, leak=0.0, start=250.0):

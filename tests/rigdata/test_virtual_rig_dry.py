@@ -146,19 +146,6 @@ def test_rigid_pivots_give_the_polygon_of_the_clearances():
         assert np.min(np.linalg.norm(position - corner, axis=1)) < 1e-9
 
 
-def test_pivots_give_by_their_share_of_the_push():
-    direction, position = swept(TRUTH, lag=0.0)
-    for pad, angle in enumerate(TRUTH.pivot_angles, 1):
-        at = np.argmin(np.abs((direction - angle + np.pi) % (2 * np.pi) - np.pi))
-        reach = position[at] @ [math.cos(angle), math.sin(angle)]
-        assert reach == pytest.approx(TRUTH.clearance[pad - 1] + hertzian(pad, np.array(200.0)), rel=1e-4)
-        # half way to the next pad both carry P / (2 cos 36 deg)
-        middle = np.argmin(np.abs((direction - angle - math.radians(36) + np.pi) % (2 * np.pi) - np.pi))
-        shared = position[middle] @ [math.cos(angle), math.sin(angle)]
-        half = np.array(100.0 / math.cos(math.radians(36)))
-        assert shared == pytest.approx(TRUTH.clearance[pad - 1] + hertzian(pad, half), rel=1e-6)
-
-
 def test_a_pad_out_of_reach_has_no_side():
     truth = replace(TRUTH, clearance=(80e-6, 80e-6, 300e-6, 80e-6, 80e-6), pivot_deflection=lambda pad, load: 0 * load)
     _, position = swept(truth)

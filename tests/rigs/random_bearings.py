@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import qmc
 
-from model.bearing import Bearing, Oil, Pad, Pivot
+from model.bearing import Bearing
 from model.film.energy import solve_energy
 from model.film.mesh import film_work
 from model.film.oil_state import Running
@@ -23,6 +23,7 @@ from model.film.reynolds import solve_film
 from model.predict import predict
 from model.prediction import Prediction
 from model.statics.pad_film import PadFilm
+from tests.rigs.bearings import ring
 
 #: name: (low, high, logarithmic). Preload from 0.1: with less, a pad behind whose middle the pivot stands takes up
 #: and sheds its load with a jump, and many loads have no steady state at all. Loads and pivots are drawn so that no
@@ -91,29 +92,14 @@ def _case(row: np.ndarray, ranges: dict[str, tuple[float, float, bool]]) -> Case
     v = {}
     for u, (name, (low, high, logarithmic)) in zip(row, ranges.items(), strict=True):
         v[name] = low * (high / low) ** u if logarithmic else low + u * (high - low)
-    n = int(v["pads"])
-    radius = 0.5 * v["diameter"]
+    n, diameter = int(v["pads"]), v["diameter"]
+    radius, length = 0.5 * diameter, v["length_ratio"] * diameter
     cb = radius * v["clearance_ratio"]
-    thickness = 0.2 * v["diameter"]
-    pads = tuple(
-        Pad(
-            pivot_angle=2 * math.pi * k / n,
-            arc=min(v["arc_share"] * 2 * math.pi / n, math.radians(100.0)),
-            pivot_offset=v["offset"],
-            pad_clearance=cb / (1.0 - v["preload"]),
-            assembled_clearance=cb,
-            thickness=thickness,
-            babbitt_thickness=0.0,
-            elastic_thickness=thickness,
-            mass=0.5,
-            moment_of_inertia=3e-4,
-        )
-        for k in range(n)
-    )
-    length = v["length_ratio"] * v["diameter"]
-    oil = Oil(v["viscosity"], 0.034, 860.0, 7e-4, 2000.0, 0.13, v["supply"])
-    bearing = Bearing("random", v["diameter"], length, pads, Pivot(), oil)
-    load = v["unit_load"] * length * v["diameter"]
+    angles = [2 * math.pi * k / n for k in range(n)]
+    arc = min(v["arc_share"] * 2 * math.pi / n, math.radians(100.0))
+    clearances, oil = (cb / (1.0 - v["preload"]), cb), (v["viscosity"], v["supply"])
+    bearing = ring(angles, (diameter, length), arc, clearances, oil, v["offset"])
+    load = v["unit_load"] * length * diameter
     return Case(bearing, load, v["direction"], v["surface_speed"] / radius, v["pivot_stiffness"])
 
 
