@@ -78,16 +78,6 @@ def test_order_of_windows_and_names_of_directions_do_not_matter():
     np.testing.assert_allclose(second.weights, first.weights[order], atol=1e-4)
 
 
-@pytest.mark.slow
-def test_mm_eiv_is_free_of_the_attenuation_that_regressions_have():
-    D, F, label, command = sample(5, directions=8, windows=60, noise=0.1)
-    bias = {m: abs(run(m, D, F, label, command).h[1, 1] / H[1, 1] - 1) for m in ("ols", "mm", "mm-eiv", "iv")}
-    assert bias["ols"] > 0.02
-    assert bias["mm"] > 0.02
-    assert bias["mm-eiv"] < 0.008
-    assert bias["iv"] < 0.008
-
-
 def test_r_matrix_is_eq_14_row_by_row():
     D = np.array([[1 + 1j, 2.0], [3.0, 4j]])
     F = D @ H.T

@@ -1,6 +1,5 @@
 """A kill, a full disk, two runs at once: results are whole or absent, raw data untouched."""
 
-import json
 import os
 import resource
 import subprocess
@@ -64,11 +63,3 @@ def test_two_runs_into_one_folder_at_once_leave_one_whole_set(small_campaign, tm
     assert names_below(tmp_path) == sorted(
         ["out", "out/run.json", *(f"out/{t}.{suffix}" for t in TABLES for suffix in ("csv", "parquet"))]
     )
-
-
-def test_the_bits_do_not_depend_on_the_number_of_workers(small_campaign, undisturbed, tmp_path):
-    code, _, errors = end(command("identify", small_campaign, "--workers", 2, "--out", tmp_path / "o"))
-    assert code == 0, errors
-    record = json.loads((tmp_path / "o" / "run.json").read_text())
-    assert record["commands"]["identify"]["outputs_sha256"] == undisturbed
-    assert len(undisturbed) == 10
