@@ -14,7 +14,7 @@ from model.effects import Effect
 from model.errors import OptionError
 from model.film.cross_energy import cross_operator
 from model.film.cross_film import CrossFilm, CrossOperator, cross_film, cross_pressure_change, set_cross_viscosity
-from model.film.cross_march import face_temperature, march_cross
+from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
 from model.film.energy import solve_energy
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.oil_state import Running
@@ -155,6 +155,34 @@ def test_oil_that_takes_up_any_heat_is_isothermal(rocker):
         cool, 5000.0, DOWN, SPEED, thermal="isothermal", effects=[Effect("pad_bending", compliance_factor=1.0)]
     )
     np.testing.assert_allclose(p.h, same.h, rtol=1e-5, atol=1e-5 * np.abs(same.h).max())
+
+
+def test_what_a_pad_conducts_is_that_of_its_face_s_new_temperature():
+    # a pad of our own: its coarser nodes are the face's mean at every fourth station, heat flows to its ends
+    grid, work, cross = solved(6)
+    operator, rng = balanced(), np.random.default_rng(7)
+    to_coarse = np.kron(np.eye(21)[:, np.arange(81) // 4], np.full((1, 7), 1.0 / 28.0))
+    flux = np.kron(np.eye(21)[np.arange(81) // 4], np.ones((7, 1))) @ (3e3 * np.eye(21) - 1e3 * np.eye(21, k=1))
+    alone, field = rng.standard_normal((81, 7)), np.zeros((81, 42))
+    face = alone.copy()
+    pad = (flux, to_coarse, np.eye(21))
+    more = conduct((grid, work, cross.edges, 0.13), operator, pad, alone, 1e-9, (field, face))
+    heat = (flux @ (to_coarse @ face.ravel())).reshape(face.shape)
+    fields, sources, answer = np.zeros((81, 42, 3)), np.zeros((80, 42)), np.empty((81, 7))
+    sources[:, ::6] = -station_heat(grid, heat)
+    assert more == pytest.approx(march_cross(operator, fields, sources)[0], rel=1e-6)
+    face_temperature(work, cross.edges, 0.13, fields[:, :, 0], heat, answer)
+    assert abs(answer).max() > 0.1
+    np.testing.assert_allclose(face, alone + answer, atol=1e-6)
+    np.testing.assert_allclose(field, fields[:, :, 0], atol=1e-6)
+
+
+def balanced() -> CrossOperator:
+    """Heat balances of a film of one temperature."""
+    grid, work, cross = solved(6)
+    operator = CrossOperator.place(*cross.temperature.shape)
+    cross_operator(grid, work, cross, SURFACE, (2000.0, 0.13, 1.0, 1.0, 0.0), operator)
+    return operator
 
 
 def marched(operator: CrossOperator) -> tuple[np.ndarray, np.ndarray]:
