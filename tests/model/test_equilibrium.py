@@ -234,37 +234,27 @@ def test_where_no_set_of_pads_finds_rest_that_is_named():
     assert "no set of pads finds rest" in p.status
 
 
-def even_ring(count: int, arc: float, clearance: float, oil: Oil, size: tuple[float, float]) -> Bearing:
-    """Equal pads with central pivots and no preload; `size`: radius and length [m]."""
-    thick = 0.2 * size[0]
-    pads = tuple(
-        Pad(math.tau * k / count, math.radians(arc), 0.5, clearance, clearance, thick, 0.0, thick, 0.5, 3e-4)
-        for k in range(count)
-    )
-    return Bearing("ring", 2.0 * size[0], size[1], pads, Pivot(), oil)
-
-
 @pytest.mark.slow
 def test_soft_pivots_carry_to_the_end_of_a_heated_curve():
     # heat balances a film down to a wedge that opens and carries nothing; what a pivot gives keeps that stable
-    oil = Oil(0.0415357, 0.034, 860.0, 7e-4, 2000.0, 0.13, 30.1723)
-    ring = even_ring(4, 81.42, 116.0559e-6, oil, (0.107356, 0.257307))
+    angles, oil = [math.tau * k / 4 for k in range(4)], (0.0415357, 30.1723)
+    bearing = ring(angles, (0.214712, 0.257307), math.radians(81.42), (116.0559e-6, 116.0559e-6), oil)
     case = {"pivots": 2.115937e9, "thermal": "adiabatic"}
-    lighter, p, heavier = (predict(ring, 14577.55 * x, math.pi / 4.0, 486.1686, **case) for x in (0.6, 1.0, 1.5))
+    lighter, p, heavier = (predict(bearing, 14577.55 * x, math.pi / 4.0, 486.1686, **case) for x in (0.6, 1.0, 1.5))
     assert lighter.idle_pads == p.idle_pads == ()
     assert heavier.idle_pads == (3, 4)
     assert 0.0 < p.pad_load[3] < 0.01 * p.load
     assert "pads 3, 4 on the edge of carrying" in p.status
     for start in (lighter, heavier):
-        warm = predict(ring, 14577.55, math.pi / 4.0, 486.1686, start=start, **case)
+        warm = predict(bearing, 14577.55, math.pi / 4.0, 486.1686, start=start, **case)
         np.testing.assert_allclose(warm.h, p.h, atol=1e-4 * np.abs(p.h).max())
 
 
 @pytest.mark.slow
 def test_of_two_mirror_images_the_last_pad_idles_and_the_other_is_named():
-    oil = Oil(0.0672554, 0.034, 860.0, 7e-4, 2000.0, 0.13, 30.4977)
-    ring = even_ring(6, 36.14, 114.6207e-6, oil, (0.0589491, 0.0788828))
+    angles, oil = [math.tau * k / 6 for k in range(6)], (0.0672554, 30.4977)
+    bearing = ring(angles, (0.1178982, 0.0788828), math.radians(36.14), (114.6207e-6, 114.6207e-6), oil)
     for mesh in ((40, 4), (96, 8)):
-        p = predict(ring, 598.6525, math.pi / 6.0, 456.4751, pivots=1.979934e8, thermal="adiabatic", mesh=mesh)
+        p = predict(bearing, 598.6525, math.pi / 6.0, 456.4751, pivots=1.979934e8, thermal="adiabatic", mesh=mesh)
         assert p.status == ("another equilibrium exists", "idle pads 5")
         assert p.status[0].pads == (4,)
