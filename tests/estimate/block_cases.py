@@ -144,7 +144,9 @@ def made(case: Case, seed: int = 0) -> tuple[Rig, Blocks, np.ndarray]:
             miss_error=np.zeros(n),
             shaft=shaft,
             uneven=np.zeros((n, 2)),
+            gain_scatter=np.zeros(n),
             bent=np.full(len(points), case.bent_told),
+            band=np.full(len(points), -1),
         ),
         np.array([film(p.static_load, p.excitation) for p in points]),
     )

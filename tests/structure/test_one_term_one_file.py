@@ -16,15 +16,13 @@ from tpjb_ident.estimate.term import Additive, Parameter, Term
 from tpjb_ident.terms.registry import TERMS
 
 ROOMS = ("tpjb_ident/estimate/", "tpjb_ident/identification/", "tpjb_ident/phasors/")
-#: Terms that code outside their files asks for: clocks are put right before windows are averaged, with gains and the
-#: housing in the way; a load's direction is not learnt where nothing is to be corrected; a lag is the housing's. Over a
-#: band the clocks are put right before the transform, and how much runs' gains scatter is learnt from them. The check
-#: of a rig holds its sensors against one another with the film left free, by the terms that are the sensors' own.
+#: Terms that code outside their files asks for: clocks are put right before windows are averaged, and before the
+#: transform of a band, where how much runs' gains scatter is learnt from them. The check of a rig holds its sensors
+#: against one another with the film left free, by the terms that are the sensors' own.
 CLASSES = {
     "tpjb_ident/check/rig_fit.py": {"Axis", "Corner", "Delay", "Gain", "Housing", "Tilt"},
-    "tpjb_ident/identification/campaign_solution.py": {"Clock"},
     "tpjb_ident/identification/clocks.py": {"Clock"},
-    "tpjb_ident/identification/band_solution.py": {"Clock", "Distortion", "RunGain"},
+    "tpjb_ident/identification/band_solution.py": {"RunGain"},
 }
 #: What differs from run to run is of the random part; what amplitudes leave unknown is said of the point.
 NAMES = {

@@ -6,7 +6,7 @@ import pytest
 from tests.estimate import block_cases
 from tests.estimate.block_cases import MASS, Case, away, film, made, solved
 from tests.seeds import seeds
-from tpjb_ident.terms.registry import learnt_mass
+from tpjb_ident.terms.registry import learnt_rig
 
 HERTZ = (30.0, 55.0, 80.0, 110.0)
 SOFT = np.diag([3.0e-8, 2.4e-8]) * (1 - 0.01j)
@@ -23,7 +23,7 @@ def doubted(case, seed=0):
     """Rig, its blocks, the truth, and the rig as its frequencies show it."""
     rig, blocks, truth = made(case, seed)
     solution = solved(rig, blocks, truth)
-    return blocks, truth, learnt_mass(rig, blocks, np.arange(len(blocks.points)), solution)
+    return blocks, truth, learnt_rig(rig, solution)
 
 
 @pytest.mark.parametrize("seed", seeds(3))

@@ -22,7 +22,7 @@ from scipy.signal import fftconvolve
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.bands.run_spectra import RunSpectra
-from tpjb_ident.estimate.shape import over_frequency
+from tpjb_ident.estimate.shape import MODELS, power_columns
 from tpjb_ident.estimate.term import ALLOWED_CHANGE, CHANGE_BY_ORBIT
 
 #: Undriven lines that tell, at least, and how much of what falls on driven lines must fall on them.
@@ -193,7 +193,5 @@ def _film(runs: Sequence[RunSpectra], driven: BoolArray) -> _Film:
 
 def _columns(omega: FloatArray, middle: float) -> ComplexArray:
     """Change of h (n, 2, 2, 12) by the numbers of K-C-M."""
-    shape = over_frequency("K-C-M", np.zeros(len(omega), dtype=np.intp), omega, np.array([middle]))
-    assert shape.columns is not None
-    columns = shape.columns[:, :4] + 1j * shape.columns[:, 4:]
-    return np.asarray(columns.reshape(len(omega), 2, 2, 12))
+    columns = power_columns(omega / middle, MODELS["K-C-M"])
+    return np.asarray((columns[:, :4] + 1j * columns[:, 4:]).reshape(len(omega), 2, 2, 12))

@@ -14,7 +14,7 @@ from rigdata.campaign import Campaign
 from tpjb_ident.check.findings import far
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import explanation, repairs
-from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, Sensor, film_force, stacked, vector
+from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, film_force, stacked, vector
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.sensors import alive, axes_of, campaign_rig, sensors_of
 from tpjb_ident.estimate.shape import free_force
@@ -24,7 +24,7 @@ from tpjb_ident.terms.corner import Corner
 from tpjb_ident.terms.delay import Delay
 from tpjb_ident.terms.gain import Gain
 from tpjb_ident.terms.housing import Housing
-from tpjb_ident.terms.registry import learnt_rig
+from tpjb_ident.terms.registry import solved_as_learnt
 from tpjb_ident.terms.tilt import Tilt
 
 #: Degrees of freedom of a line's noise, and blocks that the terms need, at least.
@@ -48,20 +48,17 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
         return None
     sensors = sensors_of(campaign)
     blocks = _blocks(sensors, clear)
-    rig = campaign_rig(campaign, sensors, blocks, float(static), RigStiffness())
+    rig = campaign_rig(campaign, sensors, blocks, float(static))
     shape, start = free_force(vector(rig, blocks, "displacement"), film_force(rig, blocks))
     if np.isfinite(start).all(axis=(1, 2)).sum() < _MIN_BLOCKS:
         return None
     shape = replace(shape, scatter=replace(Scatter.none(len(blocks), len(blocks)), together=True))
 
-    def solver(rig: Rig) -> Solver:
+    def solve(rig: Rig) -> Solution:
         terms = [term(rig, blocks) for term in (Gain, Axis, Delay, Corner, Housing, Tilt)]
-        return Solver(rig, blocks, terms, start, False, shape)
+        return Solver(rig, blocks, terms, start, shape).run()
 
-    solution = solver(rig).run()
-    learnt = learnt_rig(rig, solution)
-    if learnt is not rig:
-        solution = solver(learnt).run()
+    learnt, solution = solved_as_learnt(rig, solve)
     _check_accelerometers(observations, learnt, blocks, solution)
     return solution
 

@@ -79,6 +79,9 @@ class Rig:
     contradicted: Mapping[str, tuple[Condition, ...]] = field(default_factory=dict)
     bare: RigStiffness = field(default_factory=RigStiffness, repr=False)
     static: bool = True  #: whether the cells show the static load
+    to_set_point: bool = True  #: whether H is that at the set points, not at the runs' own loads
+    #: of the clocks of devices, relative: put right in the readings before they became phasors
+    rates: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def out_of_step(self) -> bool:
@@ -118,7 +121,9 @@ class Blocks:
     miss_error: FloatArray  #: (n,): standard error of the run's own mean load, relative
     shaft: ComplexArray  #: (n,): unit phasor of what turns with the shaft; NaN where the line is not the shaft's
     uneven: FloatArray  #: (n, 2): scatter of the film's force along X and Y that no repeat averages away, relative
-    bent: FloatArray  #: (P,): share of H by which the amplitude of the motion may change it, by the film's harmonics
+    gain_scatter: FloatArray  #: (n,): of its run's gain, relative: what all lines of a run have in common
+    bent: FloatArray  #: (P,): share of H by which the motion may change it, by the film's harmonics or as stated
+    band: IntArray  #: (P,): number of the band whose lines share that; -1 of a point by itself
 
     def __len__(self) -> int:
         return len(self.point)
@@ -134,7 +139,7 @@ class Blocks:
 
     def part(self, places: slice | IntArray) -> Blocks:
         """Some of the blocks."""
-        stacked_names = [f.name for f in fields(self) if f.name not in ("points", "runs", "bent")]
+        stacked_names = [f.name for f in fields(self) if f.name not in ("points", "runs", "bent", "band")]
         return replace(self, **{name: getattr(self, name)[places] for name in stacked_names})
 
 
@@ -144,6 +149,7 @@ def stacked(
     sensors: int,
     rows: Sequence[Mapping[str, Any]],
     bent: FloatArray | None = None,
+    band: IntArray | None = None,
 ) -> Blocks:
     """Blocks of rows, each what is known of it by name; one that is said nothing else of is a single still window."""
     m = sensors
@@ -151,12 +157,14 @@ def stacked(
     usual |= {"omega": 0.0, "present": np.zeros(m, dtype=bool), "along": np.zeros((m, 2)), "dof": 1.0, "windows": 1.0}
     usual |= {"calibration": np.zeros(m, dtype=int), "noise": np.zeros((m, m), complex), "slope_noise": np.eye(m) + 0j}
     usual |= {"time": 0.0, "temperature": np.nan, "shaft": np.nan + 0j, "uneven": np.zeros(2)}
-    usual |= {"miss": 0j, "miss_error": 0.0}
+    usual |= {"miss": 0j, "miss_error": 0.0, "gain_scatter": 0.0}
     columns = {
         name: np.array([row.get(name, value) for row in rows], np.asarray(value).dtype).reshape(-1, *np.shape(value))
         for name, value in usual.items()
     }
-    return Blocks(tuple(points), tuple(runs), bent=np.zeros(len(points)) if bent is None else bent, **columns)
+    bent = np.zeros(len(points)) if bent is None else bent
+    band = np.full(len(points), -1) if band is None else band
+    return Blocks(tuple(points), tuple(runs), bent=bent, band=band, **columns)
 
 
 def vector(rig: Rig, blocks: Blocks, quantity: str) -> ComplexArray:

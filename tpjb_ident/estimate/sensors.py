@@ -1,13 +1,14 @@
 """Sensors of a campaign as the equation knows them, and what its housing stands on."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
-from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, RigStiffness, Sensor, vector
+from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, Sensor, vector
 
 #: Distance of a / (w^2 d) from what it is of a floating housing, on both axes, within which the housing floats.
 _FLOATS = 0.3
@@ -72,12 +73,13 @@ def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
     return np.array(rows)
 
 
-def campaign_rig(
-    campaign: Campaign, sensors: tuple[Sensor, ...], blocks: Blocks, ratio: complex, bare: RigStiffness
-) -> Rig:
-    """The rig of a campaign's dynamic runs; `ratio`: cells over set points of all runs, zero where they show none."""
+def campaign_rig(campaign: Campaign, sensors: tuple[Sensor, ...], blocks: Blocks, ratio: complex, **known: Any) -> Rig:
+    """The rig of a campaign's dynamic runs; `ratio`: cells over set points of all runs, zero where they show none.
+
+    `known`: what else is of the rig, by name.
+    """
     mount = found_mount(sensors, blocks, getattr(campaign, "mount", None), ratio)
-    return Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, bare=bare, static=ratio != 0)
+    return Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, static=ratio != 0, **known)
 
 
 def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated_mount: str | None, ratio: complex) -> str:

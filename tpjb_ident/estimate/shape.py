@@ -61,14 +61,6 @@ def real_numbers(h: ComplexArray) -> FloatArray:
     return np.concatenate([flat.real, flat.imag], axis=-1)
 
 
-def over_frequency(model: str, group: IntArray, omega: FloatArray, middle: FloatArray) -> Shape:
-    """A model for every group of points; its numbers are K, omega C and omega^2 M at `middle`, each xx, xy, yx, yy.
-
-    `group`, `omega` (P,) [rad/s], `middle` (G,) [rad/s].
-    """
-    return Shape(group, power_columns(omega / middle[group], MODELS[model]), len(middle))
-
-
 def power_columns(w: FloatArray, count: int) -> FloatArray:
     """Change of the eight numbers of h = K + i w C + (i w)^2 M + .. by the entries of each matrix, (n, 8, 4 count)."""
     powers = (1j * w)[:, None] ** np.arange(count)
@@ -82,13 +74,13 @@ def remainder(columns: FloatArray, values: FloatArray, root: FloatArray, used: B
     `columns` (n, 8, k), `values` (n, 8, c), both weighed by `root` (n, 8, 8), `used` (n,).
     """
     design, rows = root @ columns, root @ values
-    return np.asarray(rows - design @ _numbers(design[used], rows[used]))
+    return np.asarray(rows - design @ least_squares(design[used], rows[used]))
 
 
-def _numbers(design: FloatArray, rows: FloatArray) -> FloatArray:
-    """Least squares of rows (n, 8, c) over a design (n, 8, k), (k, c)."""
-    k, c = design.shape[2], rows.shape[2]
-    return np.asarray(np.linalg.lstsq(design.reshape(-1, k), rows.reshape(-1, c), rcond=None)[0])
+def least_squares(columns: FloatArray, rows: FloatArray) -> FloatArray:
+    """Numbers (k, ..) by which columns (n, 8, k) come nearest to rows (n, 8, ..)."""
+    k, several = columns.shape[2], rows.shape[2:]
+    return np.asarray(np.linalg.lstsq(columns.reshape(-1, k), rows.reshape(-1, *several), rcond=None)[0])
 
 
 def free_force(D: ComplexArray, F: ComplexArray) -> tuple[Shape, ComplexArray]:
@@ -107,17 +99,3 @@ def free_force(D: ComplexArray, F: ComplexArray) -> tuple[Shape, ComplexArray]:
         columns[:, k, i], columns[:, k, 2 + i] = part.real, -part.imag
         columns[:, 4 + k, i], columns[:, 4 + k, 2 + i] = part.imag, part.real
     return Shape(np.arange(len(D)), columns), start
-
-
-def nearest(shape: Shape, h: ComplexArray, weight: FloatArray) -> FloatArray:
-    """Numbers (G, k) of the model nearest to h (P, 2, 2), NaN where not known; `weight` (P,)."""
-    assert shape.columns is not None
-    x = np.zeros((shape.groups, shape.numbers))
-    numbers = real_numbers(h)
-    for g in range(shape.groups):
-        used = np.flatnonzero((shape.group == g) & np.isfinite(numbers).all(axis=1) & (weight > 0))
-        if not len(used):
-            continue
-        root = np.sqrt(weight[used])[:, None, None]
-        x[g] = _numbers(shape.columns[used] * root, numbers[used, :, None] * root)[:, 0]
-    return x

@@ -55,7 +55,10 @@ class Solution:
     shares: dict[str, FloatArray] = field(repr=False)  #: (P, 8, 8) by term, (N/m)^2
     factors: FloatArray = field(repr=False)  #: (q, P, 8), N/m: a standard deviation of every shared parameter
     fitted: dict[str, Fitted] = field(repr=False)
-    terms: tuple[Term, ...] = field(repr=False)
+    terms: tuple[Term, ...] = field(repr=False)  #: those with parameters
+    all_terms: tuple[Term, ...] = field(repr=False)
+    blocks: Blocks = field(repr=False)
+    group: IntArray = field(repr=False)  #: of every point
     scatter: Scatter = field(repr=False)
     chi_square: FloatArray  #: (P,): of the blocks' equations, reduced
     spare: FloatArray  #: (P,): real equations beyond the unknowns
@@ -80,6 +83,12 @@ class Solution:
         between = np.array([self.scatter.freedom(group, components) for components in PHASES])[phase]
         return mixed_dof(total, repeat, noise_dof, between)
 
+    @property
+    def springs(self) -> ComplexArray | None:
+        """Compliance of what the housing stands on (2, 2) [m/N]; None where no accelerometer shows it."""
+        compliances = (term.standing_on(self.fitted[term.name]) for term in self.terms)
+        return next((compliance for compliance in compliances if compliance is not None), None)
+
     def words(self) -> tuple[str, ...]:
         """What the records tell of the terms' parameters."""
         return tuple(sentence for term in self.terms for sentence in term.words(self.fitted[term.name]))
@@ -100,12 +109,12 @@ class Solver:
         blocks: Blocks,
         terms: Sequence[Term],
         start: ComplexArray,
-        to_set_point: bool = True,
         shape: Shape | None = None,
     ) -> None:
-        self.rig, self.blocks, self.to_set_point = rig, blocks, to_set_point
+        self.rig, self.blocks = rig, blocks
         self.shape = shape or Shape(np.arange(len(blocks.points)))
         self.group = self.shape.group[blocks.point]
+        self.all_terms = tuple(terms)
         self.random = tuple(term for term in terms if type(term).random_effects is not Term.random_effects)
         self.terms = tuple(term for term in terms if term.parameters)
         self.shared = Table([term for term in self.terms if not term.points], 1, held=self.shape.held)
@@ -126,8 +135,8 @@ class Solver:
         try:
             return self._settled()
         except np.linalg.LinAlgError:
-            terms = tuple(dict.fromkeys((*self.terms, *self.random)))
-            nothing = Solver(self.rig, self.blocks, terms, np.full_like(self.h, np.nan), self.to_set_point, self.shape)
+            none = np.full_like(self.h, np.nan)
+            nothing = Solver(self.rig, self.blocks, self.all_terms, none, self.shape)
             return replace(nothing._settled(), ran_away=True)
 
     def _settled(self) -> Solution:
@@ -162,7 +171,7 @@ class Solver:
         for first in range(0, max(len(self.blocks), 1), _CHUNK):
             places = slice(first, first + _CHUNK)
             blocks = self.blocks.part(places)
-            yield places, blocks, self._state(blocks, places, slope, with_slope & self.to_set_point)
+            yield places, blocks, self._state(blocks, places, slope, with_slope & self.rig.to_set_point)
 
     def _sums(self, first: bool = False) -> tuple[Sums, Residuals]:
         k = self.shape.numbers
@@ -302,6 +311,9 @@ class Solver:
             factors * self.unit,
             fitted,
             self.terms,
+            self.all_terms,
+            self.blocks,
+            self.shape.group,
             self.scatter,
             chi_square / np.maximum(spare, 1.0),
             spare,

@@ -4,8 +4,11 @@ A term speaks of readings. It knows nothing of residuals, weights or points, nor
 A user's own term is a subclass handed to `tpjb_ident.estimate.solve`; docs/design.md has a worked example.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +16,9 @@ from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
 from tpjb_ident.estimate.equation import HOUSING_ROWS, State, film_change_rows
+
+if TYPE_CHECKING:
+    from tpjb_ident.estimate.solve import Solution
 
 #: Standard deviations beyond which a parameter contradicts what is stated.
 _LIMIT = 3.0
@@ -126,6 +132,21 @@ class Term:
 
     def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
         """The sensors as uncertain as the records show them; None where they are as stated."""
+        return None
+
+    def learnt(self, rig: Rig, solution: Solution) -> Rig:
+        """The rig as uncertain as a solve shows it where that contradicts what is stated; itself where not.
+
+        What the term's test says of it stays said.
+        """
+        fitted = solution.fitted.get(self.name)
+        sensors = None if fitted is None else self.widened(rig.sensors, fitted)
+        if fitted is None or sensors is None:
+            return rig
+        return replace(rig, sensors=sensors, contradicted={**rig.contradicted, self.name: self.conditions(fitted)})
+
+    def standing_on(self, fitted: Fitted) -> ComplexArray | None:
+        """Compliance of the springs under the housing (2, 2) [m/N], of the term that knows it."""
         return None
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:

@@ -39,7 +39,7 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
     blocks = _blocks(means)
     # what scatter a good rig has is not asked: a table may be computed
     shape = Shape(np.zeros(1, dtype=np.intp), scatter=replace(Scatter.none(1, len(blocks)), usual=0.0))
-    solution = Solver(_RIG, blocks, (), start[None], False, shape).run()
+    solution = Solver(_RIG, blocks, (), start[None], shape).run()
     if not np.isfinite(solution.h).all():
         return None
     run_weights = np.zeros(table.n_directions)

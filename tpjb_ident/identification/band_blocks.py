@@ -39,7 +39,6 @@ class BandBlocks:
     line_omega: FloatArray  #: (L,), rad/s
     driven: BoolArray  #: (L,): whether an excitation stands above the noise
     clear: BoolArray  #: (L,): whether it does so by far in both directions
-    bent: FloatArray  #: (B,): share by which the motion may change H
     turning: FloatArray  #: (B,): relative scatter of the film's force from run to run with the shaft's angle
 
 
@@ -74,8 +73,10 @@ def band_blocks(
                 is_driven = spectra[0].driven[bins].any()
                 rows += [values | row | at for values in response if is_driven]
             runs.append(", ".join(names))
-    blocks = stacked(operating, runs, len(sensors), rows)
     plans = [point.plan for point in points]
+    bent, _, turning = zip(*films)
+    of_point = np.repeat(np.arange(len(plans)), [len(plan.middles) for plan in plans])
+    blocks = stacked(operating, runs, len(sensors), rows, np.array(bent)[of_point], of_point)
     band = np.repeat(np.arange(len(plans)), [len(plan.frequencies) for plan in plans])
     line = np.concatenate([plan.line + np.searchsorted(band, b) for b, plan in enumerate(plans)])
     line_of = line[blocks.point]
@@ -84,7 +85,6 @@ def band_blocks(
     coherent = np.array([classic.coherence.min() for point in points for classic in point.classic])
     strong = _strengths(Rig(sensors, 1.0), blocks, line_of, len(band)) > STRONG
     quiet = np.array([point.method == "hv" for point in points])[band]
-    bent, _, turning = zip(*films)
     return BandBlocks(
         blocks.part(np.flatnonzero(driven[line_of])),
         2 * np.pi * np.concatenate([plan.middles for plan in plans]),
@@ -93,7 +93,6 @@ def band_blocks(
         2 * np.pi * np.concatenate([plan.frequencies for plan in plans]),
         driven,
         np.where(quiet, np.nan_to_num(coherent) > _LEAST_COHERENCE, strong),
-        np.array(bent),
         np.array(turning),
     )
 

@@ -7,7 +7,7 @@ that is nearest to the band's lines: it need not hold over the band, only bend h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,13 +16,11 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import Rig, film_force, vector
 from tpjb_ident.estimate.noise import GAIN_OR_LOAD, UNKNOWN_EXPONENT
 from tpjb_ident.estimate.scatter import Scatter
-from tpjb_ident.estimate.shape import MODELS, Shape, nearest, over_frequency
-from tpjb_ident.estimate.solve import Solution, Solver
+from tpjb_ident.estimate.shape import MODELS, Shape, complex_matrix, least_squares, power_columns, real_numbers
+from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.identification.band_blocks import BandBlocks, line_products
-from tpjb_ident.terms.clock import Clock
-from tpjb_ident.terms.distortion import Distortion
-from tpjb_ident.terms.registry import campaign_terms, learnt_mass, learnt_rig
+from tpjb_ident.terms.registry import solve, solved_as_learnt
 from tpjb_ident.terms.run_gain import RunGain
 
 #: Parts of a band whose h becomes a point.
@@ -61,83 +59,64 @@ class BandSolution:
     run_scatter: float  #: of the runs' gains
 
 
-def solve_bands(rig: Rig, data: BandBlocks, correct: bool, taken_off: Mapping[str, float]) -> BandSolution:
-    """Solve all bands; `taken_off`: rates of clocks."""
+def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
+    """Solve all bands."""
     crude, condition = _crude(rig, data)
     used = data.driven & (condition < ONE_LINE)
     usable = used & data.clear
     curve = _curve(data, crude, usable)
     bend = curve(data.band[data.line], data.omega) - curve(data.band, data.line_omega)[data.line]
     start = np.where(usable[data.line][:, None, None], crude[data.line] + bend, np.nan)
-    task = _Task(rig, data, correct, taken_off, np.zeros(len(data.blocks.runs)))
-    solution, task, size = _lines(task, start, used)
+    rig, solution, size = _lines(rig, data, start)
     h = np.full((len(data.band), 2, 2), np.nan + 0j)
     # at the first point of every line
     away = (solution.h - start)[np.searchsorted(data.line, np.arange(len(data.band)))]
     usable &= np.abs(away).max(axis=(1, 2)) < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
     h[usable] = crude[usable] + away[usable]
     parts = _parts(data, used, np.isfinite(h).all(axis=(1, 2)))
-    part, part_h = _part_solution(replace(task, held=solution), parts, h, used)
-    return BandSolution(task.rig, h, solution, parts, part_h, part, condition, used, size)
+    part, part_h = _part_solution(rig, data, solution, parts, h, used)
+    return BandSolution(rig, h, solution, parts, part_h, part, condition, used, size)
 
 
 def _curve(data: BandBlocks, h: ComplexArray, chosen: BoolArray) -> Callable[[IntArray, FloatArray], ComplexArray]:
     """K-C-M over every band, nearest to h (L, 2, 2) of chosen lines (L,): H at frequencies of some bands."""
-    middle = np.full(len(data.bent), np.median(data.line_omega))
+    middle, count = np.median(data.line_omega), MODELS["K-C-M"]
     chosen = chosen & np.isfinite(h).all(axis=(1, 2))
-    numbers = nearest(over_frequency("K-C-M", data.band, data.line_omega, middle), h, chosen.astype(float))
-    numbers[~np.isin(np.arange(len(middle)), data.band[chosen])] = np.nan
-    return lambda band, omega: over_frequency("K-C-M", band, omega, middle).change(numbers)
+    numbers = np.full((len(data.turning), 4 * count), np.nan)
+    for b in np.unique(data.band[chosen]):
+        mine = chosen & (data.band == b)
+        numbers[b] = least_squares(power_columns(data.line_omega[mine] / middle, count), real_numbers(h[mine]))
+
+    def at(band: IntArray, omega: FloatArray) -> ComplexArray:
+        return complex_matrix(np.einsum("nak,nk->na", power_columns(omega / middle, count), numbers[band]))
+
+    return at
 
 
-@dataclass(frozen=True)
-class _Task:
-    """What all solves of the bands share."""
-
-    rig: Rig
-    data: BandBlocks
-    correct: bool
-    taken_off: Mapping[str, float]  #: rates of devices' clocks, put right before
-    gains: FloatArray  #: (number of runs,): deviation of their gains
-    held: Solution | None = None  #: whose scatter, weights and shared parameters stay
-
-    def solved(self, start: ComplexArray, shape: Shape) -> Solution:
-        """One solve from a start (P, 2, 2), NaN where points take no part."""
-        rig, blocks = self.rig, self.data.blocks
-        film = Distortion(rig, blocks, self.data.bent, self.data.band[self.data.line])
-        prepared = [RunGain(rig, blocks, self.gains), film, Clock(rig, blocks, self.taken_off)]
-        if self.held is not None:
-            scatter = self.held.scatter
-            shape = replace(shape, scatter=scatter.fixed(shape.groups, scatter.weights), held=self.held.fitted)
-        terms = campaign_terms(rig, blocks, self.correct, prepared)
-        return Solver(rig, blocks, terms, start, self.correct, shape).run()
-
-
-def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution, _Task, float]:
-    """H of the lines, with what it shows of rig and runs: the task that the models are fitted with."""
-    data = task.data
-    by_load, spare = _own_scatter(data, task.correct)
+def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Rig, Solution, float]:
+    """H of the lines, the rig as they show it, and the scatter of the runs' gains."""
+    by_load, spare = _own_scatter(data, rig.to_set_point)
     lines = len(data.band)
     # lines of one run stand for many runs: none is judged
     scatter = replace(Scatter.none(lines, len(data.blocks)), judges=False)
     shape = Shape(data.line, count=lines, scatter=scatter)
-    size, freedom = _FIRST, np.inf
+
+    def solved(rig: Rig, size: float) -> Solution:
+        blocks = replace(data.blocks, gain_scatter=np.hypot(by_load, size * spare))
+        return solve(rig, blocks, start, shape)
+
+    size, widening = _FIRST, 1.0
     for _ in range(_ROUNDS if spare.any() else 0):
-        task = replace(task, gains=np.hypot(by_load, size * spare))
-        solution = task.solved(start, shape)
+        solution = solved(rig, size)
         term = next(t for t in solution.terms if isinstance(t, RunGain))
         size, freedom = term.scatter(solution.fitted[term.name], by_load, _USUAL)
-    task = replace(task, gains=np.hypot(by_load, size * student_widening(freedom) * spare))
-    solution = task.solved(start, shape)
-    rig = learnt_mass(learnt_rig(task.rig, solution), data.blocks, data.line, solution)
-    if rig is not task.rig:
-        task = replace(task, rig=rig)
-        solution = task.solved(start, shape)
-    return solution, task, size * float(spare.any())
+        widening = student_widening(freedom)
+    rig, solution = solved_as_learnt(rig, lambda rig: solved(rig, size * widening))
+    return rig, solution, size * float(spare.any())
 
 
 def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArray]:
-    """Scatter that a run's gain has by its missed load, which may be one, or do what nothing tells, (number of runs,).
+    """Scatter that a run's gain has by its missed load, which may be one, or do what nothing tells, by block (n,).
 
     And one for every run whose point has more than the two runs that h needs, else zero: what the film makes of the
     shaft's turning on the lines themselves differs from run to run as well, and would pass for a gain.
@@ -147,12 +126,10 @@ def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArra
     for point in blocks.points:
         families.setdefault(point.static_key[1:], set()).add(point.static_load)
     alone = np.array([not correct or len(families[point.static_key[1:]]) < 2 for point in blocks.points], dtype=float)
-    by_load, spare = np.zeros((2, len(blocks.runs)))
-    by_load[blocks.run] = np.hypot(GAIN_OR_LOAD, UNKNOWN_EXPONENT * alone[blocks.point]) * np.abs(blocks.miss.real)
-    runs, first = np.unique(blocks.run, return_index=True)
-    band = data.band[data.line[blocks.point[first]]]
-    spare[runs] = (np.bincount(band)[band] > 2) & (data.turning[band] < _FIRST)
-    return by_load, spare
+    by_load = np.hypot(GAIN_OR_LOAD, UNKNOWN_EXPONENT * alone[blocks.point]) * np.abs(blocks.miss.real)
+    band = blocks.band[blocks.point]
+    runs = np.array([len(np.unique(blocks.run[band == b])) for b in range(len(data.turning))])
+    return by_load, np.where((runs > 2) & (data.turning < _FIRST), 1.0, 0.0)[band]
 
 
 def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
@@ -171,7 +148,7 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
 def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[BandPart, ...]:
     """Parts of all bands; few tones are no band: each that is told is a point."""
     parts = []
-    for b in range(len(data.bent)):
+    for b in range(len(data.turning)):
         lines = np.flatnonzero(used & (data.band == b))
         if len(lines) < 2 * MODELS["K-C-M"]:
             groups = [lines[k : k + 1] for k in np.flatnonzero(usable[lines])]
@@ -182,10 +159,14 @@ def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[BandPa
 
 
 def _part_solution(
-    task: _Task, parts: Sequence[BandPart], h: ComplexArray, used: BoolArray
+    rig: Rig,
+    data: BandBlocks,
+    lines: Solution,
+    parts: Sequence[BandPart],
+    h: ComplexArray,
+    used: BoolArray,
 ) -> tuple[Solution, ComplexArray]:
-    """The solve of the parts, and h of each at its frequency (Q, 2, 2); `h` (L, 2, 2) of the lines."""
-    data = task.data
+    """The solve of the parts, and h of each at its frequency (Q, 2, 2); `h` (L, 2, 2) of the `lines` solved before."""
     curve = _curve(data, h, used)
     start = curve(data.band[data.line], data.omega)
     part_h = curve(np.array([part.band for part in parts], dtype=np.intp), np.array([part.omega for part in parts]))
@@ -196,7 +177,9 @@ def _part_solution(
             start[data.line == part.lines[0]] = part_h[q] = h[part.lines[0]]
     group = of_line[data.line]
     start[group < 0] = np.nan
-    solution = task.solved(start, Shape(np.maximum(group, 0), count=max(len(parts), 1)))
+    count = max(len(parts), 1)
+    shape = Shape(np.maximum(group, 0), None, count, lines.scatter.fixed(count, lines.scatter.weights), lines.fitted)
+    solution = solve(rig, lines.blocks, start, shape)
     for q in range(len(parts)):
         part_h[q] += (solution.h - start)[np.flatnonzero(group == q)[0]]
     return solution, part_h

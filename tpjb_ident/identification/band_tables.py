@@ -174,7 +174,7 @@ def _point(
     inside = [line for line in lines if low - 1e-9 <= line.frequency <= high + 1e-9]
     position, position_se = mean_position(point.mean_positions)
     amplitude = max(s.amplitude for s in point.spectra)
-    share = float(solved.data.bent[part.band])
+    share = float(solved.blocks.bent[solved.blocks.band == part.band][0])
     bent = change_conditions(FilmChange(share), share, est, amplitude, clearance)
     return PointResult(
         point=replace(point.point, excitation=2 * np.pi * round(part.omega / (2 * np.pi), 3)),

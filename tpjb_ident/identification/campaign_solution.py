@@ -10,7 +10,7 @@ from rigdata.campaign import Campaign
 from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, Sensor, film_force, vector
 from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
 from tpjb_ident.estimate.shape import complex_matrix
-from tpjb_ident.estimate.solve import Solution, Solver
+from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures
 from tpjb_ident.identification.clocks import solved_with_clocks
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means
@@ -19,7 +19,6 @@ from tpjb_ident.runs.finished_runs import RunDigest
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.runs.static_load import StaticLoads, static_loads
 from tpjb_ident.runtime.executors import Workers
-from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.mains import (
     MAINS_ON_LINE,
     MainsFit,
@@ -29,7 +28,7 @@ from tpjb_ident.terms.mains import (
     force_pickup_spread,
     mains_pickup,
 )
-from tpjb_ident.terms.registry import campaign_terms, learnt_mass, learnt_rig
+from tpjb_ident.terms.registry import solve, solved_as_learnt
 
 #: Scatter of the force from run to run with which mains is fitted, at least.
 _LEAST_SCATTER = 1e-3
@@ -76,35 +75,28 @@ def solve_campaign(
     common = MeansTask(sensors, temperatures=temperatures)
     loads = static_loads(campaign, points)
 
-    def solver(rig: Rig, blocks: Blocks, start: ComplexArray, rates: Mapping[str, float]) -> Solver:
-        terms = campaign_terms(rig, blocks, correct, [Clock(rig, blocks, rates)])
-        return Solver(rig, blocks, terms, start, correct)
-
     def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> CampaignSolution:
         task = replace(common, sensors=sensors, rates=rates)
         means = tuple(workers.map(point_means, [(data,) for data in points], task))
         film = tuple(_film(data, point) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])
         blocks = campaign_blocks(points, means, loads.misses, bent, temperatures)
-        rig = campaign_rig(campaign, loads.doubted(sensors), blocks, loads.common, bare)
-        start = np.array([point.start for point in means]) - rig.bare.at(np.array([data.omega for data in points]))
-        solution = solver(rig, blocks, start, rates).run()
+        rig = campaign_rig(
+            campaign, loads.doubted(sensors), blocks, loads.common, bare=bare, rates=rates, to_set_point=correct
+        )
+        start = np.array([point.start for point in means]) - bare.at(np.array([data.omega for data in points]))
+        rig, solution = solved_as_learnt(rig, lambda rig: solve(rig, blocks, start))
         return CampaignSolution(rig, task, blocks, means, loads, film, start, solution, np.zeros_like(blocks.z))
 
     rate = min((digest.sample_rate for digest in digests if digest.sample_rate > 0), default=np.inf)
     last = solved_with_clocks(sensors, rate, solved)
-    blocks, start, rates = last.blocks, last.start, last.task.rates
-    learnt = learnt_rig(last.rig, last.solution)
-    learnt = learnt_mass(learnt, blocks, np.arange(len(blocks.points)), last.solution)
-    if learnt is not last.rig:
-        again = solver(learnt, blocks, start, rates).run()
-        last = replace(last, rig=learnt, solution=again)
+    blocks = last.blocks
     force = force_pickup([digest.mains_force for digest in digests])
     on_line = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE) and p in blocks.point]
     pickup, fits = _mains(on_line, digests, last, force) if correct and on_line else (None, {})
     if fits:
         shift = _mains_readings(last.rig, blocks, fits)
-        again = solver(last.rig, replace(blocks, z=blocks.z - shift), start, rates).run()
+        again = solve(last.rig, replace(blocks, z=blocks.z - shift), last.start)
         last = replace(last, solution=again, mains_shift=shift, pickup=pickup, mains=fits)
     D = vector(last.rig, blocks, "displacement")
     in_cells = {p: force_pickup_spread(D[blocks.point == p], force) for p in on_line if force.any()}

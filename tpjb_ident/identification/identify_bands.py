@@ -65,8 +65,9 @@ def identify_bands(
         # without an instrument twice: all noise the force's, then all the displacement's
         for turn in range(2 if any(point.method == "hv" for point in points) else 1):
             data.append(band_blocks(points, sensors, loads.misses, temperatures, settings.clearance, turn))
-            rig = campaign_rig(campaign, loads.doubted(sensors), data[-1].blocks, loads.common, bare)
-            solutions.append(solve_bands(rig, data[-1], settings.correct, rates))
+            blocks, known = data[-1].blocks, {"bare": bare, "rates": rates, "to_set_point": settings.correct}
+            rig = campaign_rig(campaign, loads.doubted(sensors), blocks, loads.common, **known)
+            solutions.append(solve_bands(rig, data[-1]))
         return SolvedBands(tuple(points), loads, data[0], tuple(solutions), tuple(bad))
 
     solved = solved_with_clocks(sensors_of(campaign), min(run.sample_rate for run in runs), solve)

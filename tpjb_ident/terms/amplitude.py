@@ -34,10 +34,11 @@ class Amplitude(FilmTerm):
         number = len(blocks.points)
         runs = np.maximum(totals(blocks.point, np.ones(len(blocks)), number), 1.0)
         self._mean = totals(blocks.point, np.sum(np.abs(motion) ** 2, axis=1), number) / runs
-        self.points = tuple(np.flatnonzero(blocks.bent > 0).tolist())
+        shown = (blocks.bent > 0) & (blocks.band < 0)
+        self.points = tuple(np.flatnonzero(shown).tolist())
         self._several = np.zeros(number, dtype=bool)
         self._several[list(self.points)] = [_several(motion[blocks.point == p]) for p in self.points]
-        self.group = np.where(blocks.bent > 0, np.cumsum(blocks.bent > 0) - 1, -1)
+        self.group = np.where(shown, np.cumsum(shown) - 1, -1)
         for p in self.points:
             place = f"{blocks.points[p].static_load:g} N, {blocks.points[p].excitation_hz:g} Hz"
             self.parameters += numbered(place, "1", [CHANGE_AS_DEVIATION * float(blocks.bent[p])] * NUMBERS)

@@ -3,8 +3,6 @@
 A clock exists between devices only. Whatever phases do within one device, its clock is one.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
@@ -27,12 +25,11 @@ class Clock(Factor):
 
     name = "clock"
 
-    def __init__(self, rig: Rig, blocks: Blocks, taken_off: Mapping[str, float] | None = None) -> None:
-        super().__init__(rig, blocks)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
         devices = list(dict.fromkeys(sensor.device for sensor in rig.sensors))[1:]
         self._devices = devices
-        #: Rates that the windows were turned back by before they were averaged, relative.
-        self._taken_off = np.array([(taken_off or {}).get(device, 0.0) for device in devices])
+        self._taken_off = np.array([rig.rates.get(device, 0.0) for device in devices])
         self.parameters = tuple(Parameter(device or "records", "100 ppm", _QUARTZ) for device in devices)
         self.sensors = np.array(
             [[sensor.device == device for device in devices] for sensor in rig.sensors], dtype=float

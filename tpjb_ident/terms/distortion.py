@@ -10,7 +10,7 @@ up to 0.6, they change H by 0.13 to 0.62 times as much as a random band of one d
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from rigdata.arrays import ComplexArray
 from tpjb_ident.estimate.arrowhead import NUMBERS
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State, entry_changes, entry_sizes, film_force_rows
@@ -37,21 +37,19 @@ def line_scatter(rms: float) -> float:
 
 
 class Distortion(FilmTerm):
-    """Real and imaginary parts of H of every band, each changed by its own share, which no run tells; lines scatter.
-
-    `share` by band, `band` (P,) of every point.
-    """
+    """Real and imaginary parts of H of every band, each changed by its own share, which no run tells; lines scatter."""
 
     name = "distortion"
     never_estimated = True
 
-    def __init__(self, rig: Rig, blocks: Blocks, share: FloatArray | None = None, band: IntArray | None = None) -> None:
-        super().__init__(rig, blocks)
-        band = np.zeros(len(blocks.points), dtype=np.intp) if band is None else band
-        share = np.zeros(1) if share is None else share
-        self.group = np.where(share > 0, np.cumsum(share > 0) - 1, -1)[band]
-        for b in np.flatnonzero(share):
-            self.parameters += numbered(f"band {b + 1}", "1", [CHANGE_AS_DEVIATION * float(share[b])] * NUMBERS)
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
+        bands, first = np.unique(np.where(blocks.bent > 0, blocks.band, -1), return_index=True)
+        self.group = np.full(len(blocks.points), -1)
+        for k, b in enumerate(bands[bands >= 0]):
+            self.group[blocks.band == b] = k
+            share = float(blocks.bent[first[bands == b][0]])
+            self.parameters += numbered(f"band {b + 1}", "1", [CHANGE_AS_DEVIATION * share] * NUMBERS)
 
     def changes(self, blocks: Blocks, state: State) -> ComplexArray:
         """A share of every entry of H."""

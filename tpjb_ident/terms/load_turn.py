@@ -38,7 +38,7 @@ class LoadTurn(FilmTerm):
         self._aside = log_load - middle[self.group]
         aside = [self._aside[self.group == k] for k in range(len(self.families))]
         self.reach = np.array([np.sqrt(np.mean(logarithms**2)) for logarithms in aside])  # of ln W, in every family
-        for direction, *_ in self.families if np.any(blocks.miss.imag) else ():
+        for direction, *_ in self.families if rig.to_set_point and np.any(blocks.miss.imag) else ():
             self.parameters += numbered(f"{direction:g} deg", "1/rad", np.repeat(PLAUSIBLE, NUMBERS).tolist())
 
     def changes(self, blocks: Blocks, state: State) -> ComplexArray:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, IntArray
+from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.arrowhead import NUMBERS
 from tpjb_ident.estimate.blocks import Blocks, Rig
@@ -47,13 +47,16 @@ class Mass(Additive):
         """What the frequencies said of it."""
         return self.rig.contradicted.get(self.name, ())
 
+    def learnt(self, rig: Rig, solution: Solution) -> Rig:
+        """The rig, its mass as uncertain as the frequencies of a load contradict it; itself where they do not."""
+        compliance = solution.springs
+        return rig if compliance is None else _doubted(rig, solution, compliance)
 
-def with_doubted_mass(rig: Rig, blocks: Blocks, group: IntArray, solution: Solution, compliance: ComplexArray) -> Rig:
-    """The rig, its mass as uncertain as the frequencies of a load contradict it; itself where they do not.
 
-    `group` (P,) of every point in the solution, `compliance` (2, 2) of the springs under the housing [m/N].
-    """
-    groups, first = np.unique(group[blocks.point], return_index=True)
+def _doubted(rig: Rig, solution: Solution, compliance: ComplexArray) -> Rig:
+    """The rig as the frequencies show its mass; `compliance` (2, 2) of the springs under the housing [m/N]."""
+    blocks = solution.blocks
+    groups, first = np.unique(solution.group[blocks.point], return_index=True)
     omega, point = blocks.omega[first], blocks.point[first]
     flexible = (omega**2)[:, None, None] * compliance
     h = solution.h[point] + rig.bare.at(omega)

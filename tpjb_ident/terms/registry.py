@@ -1,13 +1,13 @@
 """All terms of the measurement equation, in the order of the budget: a new term is one file and its name here."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, IntArray
+from rigdata.arrays import ComplexArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.solve import Solution
+from tpjb_ident.estimate.shape import Shape
+from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.estimate.term import Term
 from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.axis import Axis
@@ -20,7 +20,7 @@ from tpjb_ident.terms.gain import Gain
 from tpjb_ident.terms.housing import STIFFEST, Housing
 from tpjb_ident.terms.load import Load
 from tpjb_ident.terms.load_turn import LoadTurn
-from tpjb_ident.terms.mass import Mass, with_doubted_mass
+from tpjb_ident.terms.mass import Mass
 from tpjb_ident.terms.run_gain import RunGain
 from tpjb_ident.terms.shaft import Shaft
 from tpjb_ident.terms.temperature import Temperature
@@ -46,45 +46,28 @@ TERMS: tuple[type[Term], ...] = (
 )
 
 
-def campaign_terms(rig: Rig, blocks: Blocks, correct: bool, prepared: Sequence[Term]) -> list[Term]:
-    """All terms of a campaign, those that are `made` of more than rig and blocks as they are.
-
-    Without corrections a load's direction is not asked for.
-    """
-    by_type = {type(term): term for term in prepared}
-    used = [term for term in TERMS if correct or term is not LoadTurn]
-    return [by_type.get(term) or term(rig, blocks) for term in used]
+def solve(rig: Rig, blocks: Blocks, start: ComplexArray, shape: Shape | None = None) -> Solution:
+    """Solve with all terms, from a start of H (P, 2, 2)."""
+    return Solver(rig, blocks, [term(rig, blocks) for term in TERMS], start, shape).run()
 
 
 def learnt_rig(rig: Rig, solution: Solution) -> Rig:
-    """The rig, its sensors as uncertain as a solve shows them where that contradicts what is stated; itself where not.
-
-    What the term's test says of them stays said.
-    """
-    for term in solution.terms:
-        fitted = solution.fitted[term.name]
-        sensors = term.widened(rig.sensors, fitted)
-        if sensors is not None:
-            contradicted = {**rig.contradicted, term.name: term.conditions(fitted)}
-            rig = replace(rig, sensors=sensors, contradicted=contradicted)
+    """The rig as uncertain as a solve shows it where that contradicts what is stated; itself where it does not."""
+    for term in solution.all_terms:
+        rig = term.learnt(rig, solution)
     return rig
 
 
-def learnt_mass(rig: Rig, blocks: Blocks, group: IntArray, solution: Solution) -> Rig:
-    """The rig, its mass as uncertain as frequencies contradict it; `group` (P,) of every point in the solution."""
-    compliance = _springs(solution)
-    return rig if compliance is None else with_doubted_mass(rig, blocks, group, solution, compliance)
+def solved_as_learnt(rig: Rig, solve: Callable[[Rig], Solution]) -> tuple[Rig, Solution]:
+    """Solve, and once more where records contradict what is stated of the rig: it as they show it, and its solution."""
+    solution = solve(rig)
+    learnt = learnt_rig(rig, solution)
+    return (rig, solution) if learnt is rig else (learnt, solve(learnt))
 
 
 def cell_stiffness(solution: Solution) -> tuple[float, float] | None:
     """Stiffness of what the housing stands on along X and Y [N/m]; None where no accelerometer shows it."""
-    compliance = _springs(solution)
-    if compliance is None:
+    if solution.springs is None:
         return None
-    x, y = 1 / np.maximum(compliance.real.diagonal(), STIFFEST)
+    x, y = 1 / np.maximum(solution.springs.real.diagonal(), STIFFEST)
     return float(x), float(y)
-
-
-def _springs(solution: Solution) -> ComplexArray | None:
-    housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
-    return None if housing is None else housing.standing_on(solution.fitted[housing.name])

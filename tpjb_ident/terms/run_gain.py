@@ -4,8 +4,6 @@ The film is a little warmer in one run than in another. At a single line that is
 the lines of a run have it in common, and only its size among the runs tells how far H may be off.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
@@ -17,17 +15,19 @@ _LEAST = 0.5
 
 
 class RunGain(Factor):
-    """Logarithm of the gain of every cell in every run; `deviation` (number of runs,), none where it is zero."""
+    """Logarithm of the gain of every cell in every run whose gain scatters."""
 
     name = "run gain"
     always_estimated = True
 
-    def __init__(self, rig: Rig, blocks: Blocks, deviation: Sequence[float] | FloatArray = ()) -> None:
-        super().__init__(rig, blocks)
-        sizes = list(deviation)
-        self._places = [(r, int(j)) for r, size in enumerate(sizes) if size > 0 for j in rig.of("force")]
+    def prepare(self, rig: Rig, blocks: Blocks) -> None:
+        """Parameters and what goes with them."""
+        runs, first = np.unique(blocks.run, return_index=True)
+        sizes = dict(zip(runs.tolist(), blocks.gain_scatter[first].tolist()))
+        self._first = dict(zip(runs.tolist(), first.tolist()))
+        self._places = [(r, int(j)) for r, size in sizes.items() if size > 0 for j in rig.of("force")]
         self.parameters = tuple(
-            Parameter(f"{rig.sensors[j].name} in {blocks.runs[r]}", "1", float(sizes[r])) for r, j in self._places
+            Parameter(f"{rig.sensors[j].name} in {blocks.runs[r]}", "1", sizes[r]) for r, j in self._places
         )
 
     def exponent(self, blocks: Blocks) -> ComplexArray:
@@ -40,12 +40,12 @@ class RunGain(Factor):
     def scatter(self, fitted: Fitted, by_load: FloatArray, usual: tuple[float, float]) -> tuple[float, float]:
         """Standard deviation of the runs' gains by what the records tell of them, and its degrees of freedom.
 
-        `own` (number of runs,): deviation that a run has for a reason of its own; `usual`: that of a good rig, and the
+        `by_load` (n,): deviation that a block's run has for a reason of its own; `usual`: that of a good rig, and the
         degrees of freedom that it counts as.
         """
         prior = np.array([p.deviation for p in self.parameters])
         share = np.clip(1 - (fitted.deviation / prior) ** 2, 0.0, 1.0)
-        expected = np.array([by_load[r] for r, _ in self._places])
+        expected = np.array([by_load[self._first[r]] for r, _ in self._places])
         freedom = float(share.sum()) / len(self.rig.of("force"))  # a warmer film moves all cells of a run alike
         size, counted = usual
         usual_variance = counted / (counted + freedom) * size**2
