@@ -26,7 +26,7 @@ CLASSES = {
 }
 #: What differs from run to run is of the random part; what amplitudes leave unknown is said of the point.
 NAMES = {
-    "tpjb_ident/identification/shared_changes.py": {"load direction", "load miss"},
+    "tpjb_ident/identification/estimates.py": {"load direction", "load miss"},
     "tpjb_ident/identification/point.py": {"amplitude"},
 }
 #: Columns of the blocks that have the name of a term.

@@ -69,19 +69,22 @@ class Solution:
     housing_noise: float  #: scatter of the housing's equations over its acceleration
     ran_away: bool = False  #: no point has an answer
 
-    def freedom(self, group: int, chosen: BoolArray, noise_dof: float) -> FloatArray:
-        """Degrees of freedom of a group's random part (k,): its records' noise and its runs' scatter.
+    def blocks_of(self, group: int) -> BoolArray:
+        """Blocks of a group, (n,)."""
+        return np.asarray(self.group[self.blocks.point] == group)
 
-        `chosen` (n,): its blocks, `noise_dof`: real ones of their noise.
-        """
-        total = np.diag(self.records[group])
-        if not chosen.any():
-            return np.full(len(total), noise_dof)
+    def noise_freedom(self, group: int) -> float:
+        """Real degrees of freedom of the noise of a group's records."""
+        return 2 * float(np.median(self.blocks.dof[self.blocks_of(group)]))
+
+    def freedom(self, group: int) -> FloatArray:
+        """Degrees of freedom of a group's random part (k,): its records' noise and its runs' scatter."""
+        total, chosen = np.diag(self.records[group]), self.blocks_of(group)
         share = np.average(self.scatter_share[chosen], axis=0, weights=np.maximum(self.scatter.weights[chosen], 1e-9))
         phase = (np.arange(len(total)) // 4) % 2  # stiffness, damping, mass: four numbers each
         repeat = np.array([1 - share[components].mean() for components in PHASES])[phase] * total
         between = np.array([self.scatter.freedom(group, components) for components in PHASES])[phase]
-        return mixed_dof(total, repeat, noise_dof, between)
+        return mixed_dof(total, repeat, self.noise_freedom(group), between)
 
     @property
     def springs(self) -> ComplexArray | None:

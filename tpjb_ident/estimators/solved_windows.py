@@ -48,7 +48,7 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
         solution.h[0],
         means.weights * run_weights[table.direction],
         solution.records[0],
-        solution.freedom(0, np.ones(len(blocks), dtype=bool), 2 * means.spare),
+        solution.freedom(0),
         not_locked(means.wandering, table.n_directions),
         float(solution.chi_square[0]),
         attenuation(means.mean[:, :2], means.count, means.noise[:2, :2]),
@@ -66,7 +66,7 @@ def _blocks(means: WindowMeans) -> Blocks:
     noise = unbiased_noise(means.noise, means.spare)
     rows: list[dict[str, object]] = []
     for g in np.flatnonzero(means.count > 0):
-        row = {"run": g, "omega": 1.0, "z": means.mean[g], "noise": noise / means.count[g]}
+        row = {"run": g, "omega": 1.0, "z": means.mean[g], "noise": noise / means.count[g], "dof": means.spare}
         rows.append(row | {"present": np.ones(4, dtype=bool), "along": _AXES})
     names = [str(g) for g in range(len(means.count))]
     return stacked([OperatingPoint(0.0, excitation=1.0)], names, 4, rows)

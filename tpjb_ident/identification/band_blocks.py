@@ -24,6 +24,8 @@ from tpjb_ident.terms.distortion import band_change, line_scatter
 STRONG = 10.0
 #: and coherence of the force with the displacements where nothing else tells signal from noise.
 _LEAST_COHERENCE = 0.5
+#: What is taken for the source of motion: without an instrument first one, then the other.
+_INSTRUMENTS = {"periods": ("periods",) * 2, "iv": ("command",) * 2, "hv": ("displacement", "force")}
 #: Noise that responses have at least, of the run's largest: one without an instrument may have none.
 _LEAST = 1e-8
 
@@ -111,7 +113,7 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
     elif not film.seen:
         rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
         one_sided = max(s.one_sided for s in point.spectra)
-        stated = band_change("pair" if pair else point.group.kind, rms, peak, one_sided)
+        stated = band_change("pair" if pair else point.kind, rms, peak, one_sided)
         scatter = np.fmin(scatter, (line_scatter(rms) if film.even else stated) / np.sqrt(2))
         change = np.fmin(change, stated)
     uneven = np.hypot(repeats * scatter, film.turning / np.sqrt(2))
@@ -135,7 +137,7 @@ def _run_rows(
     present = np.array([channel is not None for channel in channels])
     places = [-1 if channel is None else names.index(channel.name) for channel in channels]
     gain = np.array([1.0 if c is None else warm_gain(c, temperature) for c in channels])
-    responses = [line_response(runs, bins, point.instruments[turn], point.open) for bins in point.plan.bins]
+    responses = [line_response(runs, bins, _INSTRUMENTS[point.method][turn], point.open) for bins in point.plan.bins]
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
     time = 0.5 * len(runs[0].phasors.start) * runs[0].phasors.length
     groups = []

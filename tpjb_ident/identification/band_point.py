@@ -19,6 +19,7 @@ from tpjb_ident.bands.run_spectra import OPEN_ENDS, RunSpectra, run_spectra
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs.finished_runs import ExcludedRun
+from tpjb_ident.runs.point_data import pad_means
 
 #: Lines over a band where a record resolves more, and bins that a line takes at least.
 _LINES, _BINS = 60, 18
@@ -28,16 +29,6 @@ _GROUP = 12
 _LEAST_BINS = 12
 #: Lines that a band must give.
 _LEAST_LINES = 3
-
-
-@dataclass(frozen=True)
-class BandGroup:
-    """Runs at one operating point, excited alike."""
-
-    point: OperatingPoint
-    kind: str
-    band: tuple[float, float]
-    runs: tuple[Run, ...]
 
 
 @dataclass(frozen=True)
@@ -53,21 +44,27 @@ class LinePlan:
 
 @dataclass(frozen=True)
 class BandPoint:
-    """One group of runs, transformed."""
+    """Runs at one operating point, excited alike and transformed."""
 
-    group: BandGroup
+    point: OperatingPoint
+    kind: str
     spectra: list[RunSpectra]
     plan: LinePlan
 
     @property
-    def point(self) -> OperatingPoint:
-        """Set points."""
-        return self.group.point
+    def names(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(s.phasors.run for s in self.spectra)
 
     @property
-    def runs(self) -> tuple[str, ...]:
-        """Names."""
-        return tuple(s.phasors.run for s in self.spectra)
+    def has_accelerometers(self) -> bool:
+        """Whether they measure the housing's inertia."""
+        return self.spectra[0].phasors.acceleration is not None
+
+    @property
+    def temperatures(self) -> dict[int, float]:
+        """Mean film temperature per pad [K]."""
+        return pad_means([s.temperatures for s in self.spectra])
 
     @property
     def mean_loads(self) -> FloatArray:
@@ -87,13 +84,6 @@ class BandPoint:
         return "iv" if all(s.command is not None for s in self.spectra) else "hv"
 
     @property
-    def instruments(self) -> tuple[str, str]:
-        """What is taken for the source of motion: without an instrument first one, then the other of these."""
-        return {"periods": ("periods", "periods"), "iv": ("command", "command")}.get(
-            self.method, ("displacement", "force")
-        )
-
-    @property
     def members(self) -> list[list[int]]:
         """Runs that are taken together: each by itself, all of them where nothing tells noise from motion."""
         places = list(range(len(self.spectra)))
@@ -102,7 +92,7 @@ class BandPoint:
     @property
     def open(self) -> bool:
         """Whether the records may begin and end in motion."""
-        return self.group.kind in OPEN_ENDS
+        return self.kind in OPEN_ENDS
 
     @cached_property
     def classic(self) -> list[ClassicLine]:
@@ -113,27 +103,41 @@ class BandPoint:
 
 
 def read_point(
-    group: BandGroup, housing_mass: float, settings: PhasorSettings, fast: Mapping[str, float]
+    runs: Sequence[Run], housing_mass: float, settings: PhasorSettings, fast: Mapping[str, float]
 ) -> tuple[BandPoint | None, list[ExcludedRun]]:
-    """Transform the runs of a group, and name those that cannot be used; None where there is no other.
+    """Transform the runs of a point, and name those that cannot be used; None where there is no other.
 
     `fast`: rates of the channels' clocks by name, relative.
     """
     spectra: list[RunSpectra] = []
-    remaining = []
-    seconds = min(run.length / run.sample_rate for run in group.runs)
-    for run in group.runs:
+    unusable = []
+    first, band = runs[0], _common_band(runs)
+    seconds = min(run.length / run.sample_rate for run in runs)
+    for run in runs:
         try:
-            spectra.append(run_spectra(run, housing_mass, group.band, seconds, settings, fast))
+            spectra.append(run_spectra(run, housing_mass, band, seconds, settings, fast))
         except RigDataError as error:
-            remaining.append(ExcludedRun(run.id, run.point, error))
+            unusable.append(ExcludedRun(run.id, run.point, error))
     if not spectra:
-        return None, remaining
-    return BandPoint(group, spectra, line_plan(_alike(spectra))), remaining
+        return None, unusable
+    _refuse_unlike(spectra)
+    point = replace(first.point, excitation=0.0)
+    return BandPoint(point, first.excitation_kind, spectra, line_plan(spectra)), unusable
 
 
-def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:
-    """Runs with the same bins."""
+def _common_band(runs: Sequence[Run]) -> tuple[float, float]:
+    """What the bands of some runs have in common [Hz]."""
+    bands = np.array([run.band for run in runs if run.band is not None])
+    low, high = float(bands[:, 0].max()), float(bands[:, 1].min())
+    first = runs[0]
+    if not low < high:
+        text = f"runs at {first.point} have no common excitation_band"
+        raise RigDataError(Problem("error", first.file, "excitation_band", text, "Check the bands", first.id))
+    return low, high
+
+
+def _refuse_unlike(spectra: Sequence[RunSpectra]) -> None:
+    """Runs of one point have the same bins."""
     first = spectra[0]
     for spectrum in spectra[1:]:
         is_same = len(spectrum.frequencies) == len(first.frequencies)
@@ -145,25 +149,14 @@ def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:
                 f"runs at {first.phasors.point} repeat with different periods ({', '.join(sentences)}); "
                 "excite the runs of one point with one period, or list them as different kinds of excitation"
             )
-    return spectra
 
 
-def band_groups(runs: tuple[Run, ...]) -> list[BandGroup]:
+def band_groups(runs: Sequence[Run]) -> list[list[Run]]:
     """Group broadband runs by operating point and kind of excitation, sorted."""
     groups: dict[tuple[object, ...], list[Run]] = {}
     for run in runs:
         groups.setdefault((*run.point.static_key, run.excitation_kind), []).append(run)
-    return [_group(groups[key]) for key in sorted(groups, key=repr)]
-
-
-def _group(runs: list[Run]) -> BandGroup:
-    bands = [run.band for run in runs if run.band is not None]
-    low, high = max(b[0] for b in bands), min(b[1] for b in bands)
-    first = runs[0]
-    if not low < high:
-        text = f"runs at {first.point} have no common excitation_band"
-        raise RigDataError(Problem("error", first.file, "excitation_band", text, "Check the bands", first.id))
-    return BandGroup(replace(first.point, excitation=0.0), first.excitation_kind, (low, high), tuple(runs))
+    return [groups[key] for key in sorted(groups, key=repr)]
 
 
 def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:

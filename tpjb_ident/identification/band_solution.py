@@ -170,15 +170,14 @@ def _part_solution(
     curve = _curve(data, h, used)
     start = curve(data.band[data.line], data.omega)
     part_h = curve(np.array([part.band for part in parts], dtype=np.intp), np.array([part.omega for part in parts]))
-    of_line = np.full(len(data.band), -1, dtype=np.intp)
+    of_line = np.full(len(data.band), len(parts))
     for q, part in enumerate(parts):
         of_line[part.lines] = q
         if len(part.lines) == 1:  # a tone by itself has no curve but its own h
             start[data.line == part.lines[0]] = part_h[q] = h[part.lines[0]]
-    group = of_line[data.line]
-    start[group < 0] = np.nan
-    count = max(len(parts), 1)
-    shape = Shape(np.maximum(group, 0), None, count, lines.scatter.fixed(count, lines.scatter.weights), lines.fitted)
+    group, count = of_line[data.line], len(parts) + 1  # the last of those that are in no part
+    start[group == len(parts)] = np.nan
+    shape = Shape(group, None, count, lines.scatter.fixed(count, lines.scatter.weights), lines.fitted)
     solution = solve(rig, lines.blocks, start, shape)
     for q in range(len(parts)):
         part_h[q] += (solution.h - start)[np.flatnonzero(group == q)[0]]

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.bands.classic import ClassicLine
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.estimate.blocks import Blocks, Rig
@@ -14,14 +14,13 @@ from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.band_solution import BandSolution
-from tpjb_ident.identification.shared_changes import shared_changes, sources_of, total
+from tpjb_ident.identification.estimates import estimate_of, shared_changes, total
 from tpjb_ident.results.band_result import BandLine, BandResult
 from tpjb_ident.results.frequency_model import FrequencyModel, fit_over_frequency, supported
 from tpjb_ident.results.linearity import FilmChange, change_conditions
-from tpjb_ident.results.point_result import PointResult, mean_position
+from tpjb_ident.results.point_result import PointResult, of_runs
 from tpjb_ident.results.quality import feeds_motion
 from tpjb_ident.runs.finished_runs import ExcludedRun
-from tpjb_ident.runs.point_data import pad_means
 from tpjb_ident.runs.static_load import StaticLoads
 
 #: Source of what the solves without an instrument are apart.
@@ -72,15 +71,6 @@ class SolvedBands:
         """Parts of a band that become points."""
         return [q for q, part in enumerate(self.first.parts) if part.band == b] if len(self.usable(b)) else []
 
-    def chosen(self, lines: IntArray) -> BoolArray:
-        """Blocks of some lines, (n,)."""
-        return np.isin(self.data.line[self.blocks.point], lines)
-
-    def noise_dof(self, lines: IntArray) -> float:
-        """Real degrees of freedom of the noise at some lines."""
-        chosen = self.chosen(lines)
-        return 2 * float(np.median(self.blocks.dof[chosen])) if chosen.any() else 1.0
-
     def estimate(
         self, solution: Solution, group: int, lines: IntArray, h: ComplexArray, method: str
     ) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
@@ -88,14 +78,12 @@ class SolvedBands:
 
         Where solves differ it is in their middle, and half of what they are apart a rectangle's half width.
         """
-        half = 0.5 * (h[-1] - h[0])
-        random, shared = sources_of(solution, group)
+        half, omega = 0.5 * (h[-1] - h[0]), float(self.data.line_omega[lines].mean())
+        est, budget = estimate_of(solution, group, h[0] + half, omega, method)
         if half.any():
-            shared[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
-        dof = solution.freedom(group, self.chosen(lines), self.noise_dof(lines))
-        omega, condition = float(self.data.line_omega[lines].mean()), float(np.median(self.first.condition[lines]))
-        est = DynamicStiffness(h[0] + half, omega, total(random.values()), dof, method, np.ones((1, 2)))
-        return replace(est, condition=condition, systematic=total(shared.values())), random | shared
+            budget[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
+            est = replace(est, systematic=est.systematic + budget[_BRACKET])
+        return replace(est, condition=float(np.median(self.first.condition[lines]))), budget
 
 
 def band_results(
@@ -113,8 +101,8 @@ def band_results(
         models = _models(solved, b, points[b], changes) if points[b] else {}
         chosen = supported(models) if models else "raw H"
         period, width = data.spectra[0].period, data.plan.resolution
-        common = lines[b], models, chosen, quality[b], data.runs, period, width, points[b]
-        results.append(BandResult(data.point, data.group.kind, *common))
+        common = lines[b], models, chosen, quality[b], data.names, period, width, points[b]
+        results.append(BandResult(data.point, data.kind, *common))
     numbers = [q for members in parts for q in members]
     more = {_BRACKET: bracket[numbers]} if bracket.any() else {}
     return (tuple(results), *shared_changes(solved.first.part, numbers, more))
@@ -128,11 +116,11 @@ def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
     alternatives = {name: value - solved.rig.bare.at(np.array([best.omega]))[0] for name, value in classic.h.items()}
     if _BRACKET in budget:
         alternatives |= {"h1": h[0], "h2": h[-1]}
-    free, shared = np.full(8, classic.freedom), total(sources_of(solved.solution, k)[1].values())
+    shared = best.systematic - budget.get(_BRACKET, 0.0)
+    scatter = {"covariance": classic.covariance, "dof": np.full(8, classic.freedom), "systematic": shared}
     table = {point.method: best}
     for name, value in alternatives.items():
-        figures = value, best.omega, classic.covariance, free, name, best.weights
-        table.setdefault(name, DynamicStiffness(*figures, systematic=shared))
+        table.setdefault(name, replace(best, h=value, method=name, condition=np.nan, **scatter))
     return BandLine(best.omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
 
 
@@ -146,7 +134,7 @@ def _models(
     used = solved.data.line_omega[solved.first.used & (solved.data.band == b)] / (2 * np.pi)
     estimates = []
     for q, p in zip(solved.parts(b), points):
-        records, dof = p.budget["random"], np.full(8, solved.noise_dof(solved.first.parts[q].lines))
+        records, dof = p.budget["random"], np.full(8, solved.first.part.noise_freedom(q))
         shared = total(p.budget.values()) - records
         estimates.append(replace(p.stiffness, covariance=records, dof=dof, systematic=shared))
     together = np.sqrt(len(changes)) * changes.reshape(len(changes), -1)
@@ -172,28 +160,21 @@ def _point(
     est, budget = solved.estimate(solved.first.part, q, part.lines, h, f"band-{point.method}")
     low, high = solved.data.line_omega[part.lines[[0, -1]]] / (2 * np.pi)
     inside = [line for line in lines if low - 1e-9 <= line.frequency <= high + 1e-9]
-    position, position_se = mean_position(point.mean_positions)
     amplitude = max(s.amplitude for s in point.spectra)
     share = float(solved.blocks.bent[solved.blocks.band == part.band][0])
     bent = change_conditions(FilmChange(share), share, est, amplitude, clearance)
     return PointResult(
+        **of_runs(point),
         point=replace(point.point, excitation=2 * np.pi * round(part.omega / (2 * np.pi), 3)),
         stiffness=est,
         by_method={est.method: est},
-        static_load_measured=float(np.linalg.norm(point.mean_loads.mean(axis=0))),
-        position=position,
-        position_se=position_se,
-        temperatures=pad_means([s.temperatures for s in point.spectra]),
-        n_records=len(point.spectra),
         n_windows=sum(line.n_rows for line in inside),
         outlier_fraction=0.0,
         coherence=float(np.median([line.coherence.min() for line in inside])) if inside else float("nan"),
         amplitude=amplitude,
         quality=merged(quality, feeds_motion(est), bent),
         rejected=(),
-        runs=point.runs,
         load_miss=solved.loads.misses[part.band],
-        inertia_corrected=point.spectra[0].phasors.acceleration is not None,
         clearance=clearance,
         budget=budget,
     )

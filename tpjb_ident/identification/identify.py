@@ -12,10 +12,10 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.estimators.estimate import method_of
 from tpjb_ident.identification.campaign_blocks import unstated
 from tpjb_ident.identification.campaign_solution import solve_campaign
+from tpjb_ident.identification.estimates import shared_changes
 from tpjb_ident.identification.identify_bands import identify_bands
 from tpjb_ident.identification.point import SOLVED, PointTask, finished_point, point_share
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.phasors.mains_frequency import mains_frequency
 from tpjb_ident.results.frequency_outliers import with_frequency_outliers
 from tpjb_ident.results.identification import Identification
@@ -153,8 +153,7 @@ def assemble(
     gathered = gather([digest.phasors for digest in digests], digests)
     report("estimating", 0, len(gathered))
     solved = solve_campaign(campaign, gathered, digests, workers, settings.correct, dry.stiffness)
-    temperatures = {digest.run: digest.temperatures for digest in digests}
-    task = PointTask(settings, solved.task, temperatures, checked, dry)
+    task = PointTask(settings, solved.task, checked, dry)
     jobs = [(data, point_share(solved, data, p)) for p, data in enumerate(gathered)]
     excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
     points = []

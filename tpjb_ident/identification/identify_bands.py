@@ -48,7 +48,7 @@ def identify_bands(
     unusable = [
         ExcludedRun(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable
     ]
-    groups = band_groups(tuple(run for run in runs if run.id not in checked.unusable))
+    groups = band_groups([run for run in runs if run.id not in checked.unusable])
 
     def solve(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> SolvedBands:
         fast = {sensor.name: rates[sensor.device] for sensor in sensors if sensor.device in rates}
@@ -74,7 +74,7 @@ def identify_bands(
     points, bad = solved.points, solved.excluded
     quality = []
     for b, point in enumerate(points):
-        of_runs = solved.loads.conditions(b), check_conditions(checked, point.runs)
+        of_runs = solved.loads.conditions(b), check_conditions(checked, point.names)
         without = without_runs(point.point, bad, any_excitation=True)
         of_records = (spectra.phasors.conditions for spectra in point.spectra)
         of_lines = solved.first.lines.conditions(), band_conditions(point, solved, b)
@@ -101,7 +101,7 @@ def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Cond
     held = [f"{d.name} {d.frequency:.4g} Hz" for d in spectra.disturbances if low <= d.frequency <= high]
     bare = solved.rig.bare
     unknown = int((~bare.known(solved.data.line_omega[usable])).sum()) if len(bare.omega) else 0
-    uncorrected = spectra.phasors.acceleration is None and spectra.phasors.housing_mass > 0
+    uncorrected = not point.has_accelerometers and spectra.phasors.housing_mass > 0
     blind = point.method == "hv" and len(usable) > 0
     coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0
     text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"

@@ -13,12 +13,12 @@ from tpjb_ident.estimators.r_matrix import phasor_table
 from tpjb_ident.estimators.solved_windows import not_locked
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.campaign_solution import CampaignSolution
+from tpjb_ident.identification.estimates import estimate_of
 from tpjb_ident.identification.point_means import MeansTask, channel_windows, means_attenuation, vectors
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.identification.shared_changes import sources_of, total
 from tpjb_ident.phasors.run_data import RunPhasors, complex_median
 from tpjb_ident.results.linearity import FilmChange, amplitude_slope, change_conditions
-from tpjb_ident.results.point_result import PointResult, mean_position
+from tpjb_ident.results.point_result import PointResult, of_runs
 from tpjb_ident.results.quality import (
     amplitude,
     coherence,
@@ -29,7 +29,7 @@ from tpjb_ident.results.quality import (
 )
 from tpjb_ident.runs.baseline import DryTest
 from tpjb_ident.runs.checked_runs import check_conditions
-from tpjb_ident.runs.point_data import PointData, pad_means
+from tpjb_ident.runs.point_data import PointData
 
 #: Name of the method that the solve stands for in the tables.
 SOLVED = "mm-eiv"
@@ -69,7 +69,6 @@ class PointTask:
 
     settings: IdentifySettings
     means: MeansTask
-    temperatures: dict[str, dict[int, float]]
     checked: Verdicts
     dry: DryTest
 
@@ -109,33 +108,29 @@ def _estimate(
     windows = means.means
     if not np.isfinite(solution.h[p]).all() or windows is None:
         return None, {}
-    random, common = sources_of(solution, p)
-    mine = solved.blocks.point == p
-    dof = solution.freedom(p, mine, 2 * float(np.median(solved.blocks.dof[mine])))
+    omega = float(np.median(solved.blocks.omega[solution.blocks_of(p)]))
+    estimate, budget = estimate_of(solution, p, solved.h[p], omega, SOLVED)
     if p in solved.mains:
         fit = solved.mains[p]
-        random["mains"] = fit.covariance
-        dof = np.minimum(dof, fit.dof)
+        budget["mains"] = fit.covariance
+        freedom = np.minimum(estimate.dof, fit.dof)
+        estimate = replace(estimate, covariance=estimate.covariance + fit.covariance, dof=freedom)
     if p in solved.in_cells:
-        common["mains on the cells"] = solved.in_cells[p]
+        budget["mains on the cells"] = solved.in_cells[p]
+        estimate = replace(estimate, systematic=estimate.systematic + solved.in_cells[p])
     weights = windows.weights * run_weight[data.run_index]
     runs = int((run_weight > 0).sum())
     flags = fit_conditions(means.condition, weights[means.usable], runs)
-    estimate = DynamicStiffness(
-        solved.h[p],
-        float(np.median(solved.blocks.omega[mine])),
-        total(random.values()),
-        dof,
-        SOLVED,
-        np.repeat(weights[:, None], 2, axis=1),
-        (*means.status, *flags, *not_locked(windows.wandering, runs)),
-        means.condition,
-        float(solution.chi_square[p]),
-        int(max(solution.spare[p], 0)),
-        means_attenuation(windows, solved.task),
-        total(common.values()),
+    estimate = replace(
+        estimate,
+        weights=np.repeat(weights[:, None], 2, axis=1),
+        status=(*means.status, *flags, *not_locked(windows.wandering, runs)),
+        condition=means.condition,
+        chi_square=float(solution.chi_square[p]),
+        spare_equations=int(max(solution.spare[p], 0)),
+        attenuation=means_attenuation(windows, solved.task),
     )
-    return estimate, random | common
+    return estimate, budget
 
 
 def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> PointResult:
@@ -161,28 +156,21 @@ def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> P
         share.conditions,
         task.dry.missing(recorded.omega),
         change_conditions(share.film, share.amplitude_left(), best, size, settings.clearance),
-        check_conditions(task.checked, [run.run for run in recorded.runs]),
+        check_conditions(task.checked, recorded.names),
     )
-    position, position_se = mean_position(recorded.mean_positions)
     return PointResult(
+        **of_runs(recorded),
         point=recorded.point,
         stiffness=best,
         by_method=by_method,
-        static_load_measured=float(np.linalg.norm(recorded.mean_loads.mean(axis=0))),
-        position=position,
-        position_se=position_se,
-        temperatures=pad_means([task.temperatures.get(run.run, {}) for run in recorded.runs]),
-        n_records=len(recorded.runs),
         n_windows=len(recorded.D),
         outlier_fraction=float((weights < REJECTED_WEIGHT).mean()),
         coherence=coherent,
         amplitude=size,
         quality=conditions,
         rejected=rejected_windows(data, best.h, weights),
-        runs=tuple(run.run for run in recorded.runs),
         load_miss=share.miss,
         linearity=linearity,
-        inertia_corrected=recorded.runs[0].acceleration is not None,
         clearance=settings.clearance,
         budget=share.budget,
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -108,8 +109,40 @@ def quality_cell(conditions: Sequence[str]) -> str:
     return "; ".join(conditions) or "ok"
 
 
-def mean_position(positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean position of a point's runs and its standard error (2,); `positions` (n_runs, 2) [m]."""
-    runs = len(positions)
+class Recorded(Protocol):
+    """The runs of a point, with sines or over a band."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the runs."""
+
+    @property
+    def mean_loads(self) -> FloatArray:
+        """Mean cell force of every run, (n_runs, 2) [N]."""
+
+    @property
+    def mean_positions(self) -> FloatArray:
+        """Mean displacement of every run, (n_runs, 2) [m]."""
+
+    @property
+    def temperatures(self) -> dict[int, float]:
+        """Mean film temperature per pad [K]."""
+
+    @property
+    def has_accelerometers(self) -> bool:
+        """Whether they measure the housing's inertia."""
+
+
+def of_runs(recorded: Recorded) -> dict[str, Any]:
+    """What a point's result has of its runs, by name."""
+    positions, runs = recorded.mean_positions, len(recorded.names)
     error = positions.std(axis=0, ddof=1) / np.sqrt(runs) if runs > 1 else np.full(2, np.nan)
-    return positions.mean(axis=0), error
+    return {
+        "static_load_measured": float(np.linalg.norm(recorded.mean_loads.mean(axis=0))),
+        "position": positions.mean(axis=0),
+        "position_se": error,
+        "temperatures": recorded.temperatures,
+        "n_records": runs,
+        "runs": recorded.names,
+        "inertia_corrected": recorded.has_accelerometers,
+    }

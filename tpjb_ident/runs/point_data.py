@@ -41,7 +41,22 @@ class PointData:
     @property
     def mass(self) -> float:
         """Housing mass whose inertia is in F [kg]: zero where no accelerometer measures it."""
-        return self.runs[0].housing_mass if self.runs[0].acceleration is not None else 0.0
+        return self.runs[0].housing_mass if self.has_accelerometers else 0.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(run.run for run in self.runs)
+
+    @property
+    def has_accelerometers(self) -> bool:
+        """Whether they measure the housing's inertia."""
+        return self.runs[0].acceleration is not None
+
+    @property
+    def temperatures(self) -> dict[int, float]:
+        """Mean film temperature per pad [K]."""
+        return pad_means([digest.temperatures for digest in self.digests])
 
     @property
     def mean_loads(self) -> FloatArray:

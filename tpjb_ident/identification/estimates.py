@@ -1,21 +1,29 @@
-"""What every source does to the entries of points: what scatters with the runs, and what points share."""
+"""From a solve to H of single points with its uncertainty by source, and what all sources do to points together."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.estimate.solve import Solution
+from tpjb_ident.estimators.stiffness import DynamicStiffness
 
 #: Terms whose uncertainty scatters with the runs; that of all others is common to the campaign.
 RUN_TERMS = ("load miss", "load direction")
 
 
-def sources_of(solution: Solution, point: int) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Covariances (8, 8) of a point of a solve by source: what scatters with the runs, and what they share."""
-    shares = {name: share[point] for name, share in solution.shares.items() if np.any(share[point])}
+def estimate_of(
+    solution: Solution, point: int, h: ComplexArray, omega: float, method: str
+) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
+    """H (2, 2) of a point of a solve, and its covariances (8, 8) by source."""
+    shared = {name: share[point] for name, share in solution.shares.items() if np.any(share[point])}
     random = {"random": solution.records[point]}
-    return random | {name: shares.pop(name) for name in RUN_TERMS if name in shares}, shares
+    random |= {name: shared.pop(name) for name in RUN_TERMS if name in shared}
+    covariance, freedom = total(random.values()), solution.freedom(point)
+    estimate = DynamicStiffness(
+        h, omega, covariance, freedom, method, np.ones((1, 2)), systematic=total(shared.values())
+    )
+    return estimate, random | shared
 
 
 def total(covariances: Iterable[FloatArray]) -> FloatArray:
