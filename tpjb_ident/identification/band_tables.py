@@ -8,15 +8,15 @@ from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.bands.classic import ClassicLine
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.shape import MODELS, real_numbers
+from tpjb_ident.estimate.shape import real_numbers
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.band_solution import BandSolution
-from tpjb_ident.identification.estimates import estimate_of, shared_changes, total
+from tpjb_ident.identification.estimates import estimate_of, shared_changes
 from tpjb_ident.results.band_result import BandLine, BandResult
-from tpjb_ident.results.frequency_model import FrequencyModel, fit_over_frequency, supported
+from tpjb_ident.results.frequency_model import fits_over_frequency
 from tpjb_ident.results.linearity import FilmChange, change_conditions
 from tpjb_ident.results.point_result import PointResult, of_runs
 from tpjb_ident.results.quality import feeds_motion
@@ -69,7 +69,7 @@ class SolvedBands:
 
     def parts(self, b: int) -> list[int]:
         """Parts of a band that become points."""
-        return [q for q, part in enumerate(self.first.parts) if part.band == b] if len(self.usable(b)) else []
+        return [q for q, part in enumerate(self.first.parts) if part.band == b]
 
     def estimate(
         self, solution: Solution, group: int, lines: IntArray, h: ComplexArray, method: str
@@ -90,22 +90,28 @@ def band_results(
     solved: SolvedBands, quality: list[tuple[Condition, ...]], clearance: float | None
 ) -> tuple[tuple[BandResult, ...], FloatArray, tuple[str, ...]]:
     """Lines, models and points of all bands, what the points share (q, 8 P) [N/m], and the names of that."""
-    bands = range(len(solved.points))
-    lines = [tuple(_line(solved, solved.points[b], int(k)) for k in solved.usable(b)) for b in bands]
-    parts = [solved.parts(b) for b in bands]
-    points = [tuple(_point(solved, q, lines[b], quality[b], clearance) for q in parts[b]) for b in bands]
     bracket = real_numbers(solved.solutions[-1].part_h - solved.first.part_h) / np.sqrt(12)
-    results = []
+
+    def shared(parts: list[int]) -> tuple[FloatArray, tuple[str, ...]]:
+        # runs are those of all parts: what scatters from run to run is common to them
+        more = {_BRACKET: bracket[parts]} if bracket.any() else {}
+        return shared_changes(solved.first.part, parts, more=more)
+
+    results, numbers = [], []
     for b, data in enumerate(solved.points):
-        changes = np.concatenate([solved.first.part.factors[:, parts[b]], bracket[None, parts[b]]])
-        models = _models(solved, b, points[b], changes) if points[b] else {}
-        chosen = supported(models) if models else "raw H"
+        lines = tuple(_line(solved, data, int(k)) for k in solved.usable(b))
+        parts = solved.parts(b) if lines else []
+        points = tuple(_point(solved, q, quality[b], clearance) for q in parts)
+        # what runs scatter by is one for all parts: no chance between them
+        free = [np.full(8, solved.first.part.noise_freedom(q)) for q in parts]
+        by_noise = [replace(p, stiffness=replace(p.stiffness, dof=dof)) for p, dof in zip(points, free)]
+        fits = fits_over_frequency(by_noise, shared(parts)[0])
+        models, chosen = (fits[0].fits, fits[0].supported) if fits else ({}, "raw H")
         period, width = data.spectra[0].period, data.plan.resolution
-        common = lines[b], models, chosen, quality[b], data.names, period, width, points[b]
+        common = lines, models, chosen, quality[b], data.names, period, width, points
         results.append(BandResult(data.point, data.kind, *common))
-    numbers = [q for members in parts for q in members]
-    more = {_BRACKET: bracket[numbers]} if bracket.any() else {}
-    return (tuple(results), *shared_changes(solved.first.part, numbers, more))
+        numbers += parts
+    return (tuple(results), *shared(numbers))
 
 
 def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
@@ -124,42 +130,13 @@ def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
     return BandLine(best.omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
 
 
-def _models(
-    solved: SolvedBands, b: int, points: tuple[PointResult, ...], changes: FloatArray
-) -> dict[str, FrequencyModel]:
-    """Models over one band, by its parts: all of them have their runs in common, and all that these share.
-
-    `changes` (q, parts, 8): one deviation of every source.
-    """
-    used = solved.data.line_omega[solved.first.used & (solved.data.band == b)] / (2 * np.pi)
-    estimates = []
-    for q, p in zip(solved.parts(b), points):
-        records, dof = p.budget["random"], np.full(8, solved.first.part.noise_freedom(q))
-        shared = total(p.budget.values()) - records
-        estimates.append(replace(p.stiffness, covariance=records, dof=dof, systematic=shared))
-    together = np.sqrt(len(changes)) * changes.reshape(len(changes), -1)
-    models = {}
-    for name, matrices in MODELS.items():
-        if len(used) < 2 * matrices:
-            continue
-        model = fit_over_frequency(estimates, name, together)
-        model = replace(model, band=(float(used.min()), float(used.max())), n_frequencies=len(used))
-        if solved.points[b].method == "hv":  # without an instrument, the bias of either solve looks like a misfit
-            model = replace(model, chi_square=np.nan, probability=np.nan, misfit=np.nan)
-        models[name] = model
-    return models
-
-
-def _point(
-    solved: SolvedBands, q: int, lines: tuple[BandLine, ...], quality: tuple[Condition, ...], clearance: float | None
-) -> PointResult:
+def _point(solved: SolvedBands, q: int, quality: tuple[Condition, ...], clearance: float | None) -> PointResult:
     """One part of a band as a point: its lines alone tell its h; K-C-M only says how h changes within it."""
     part = solved.first.parts[q]
     point = solved.points[part.band]
     h = np.array([s.part_h[q] for s in solved.solutions])
     est, budget = solved.estimate(solved.first.part, q, part.lines, h, f"band-{point.method}")
-    low, high = solved.data.line_omega[part.lines[[0, -1]]] / (2 * np.pi)
-    inside = [line for line in lines if low - 1e-9 <= line.frequency <= high + 1e-9]
+    inside = [solved.classic[k] for k in np.intersect1d(part.lines, solved.usable(part.band))]
     amplitude = max(s.amplitude for s in point.spectra)
     share = float(solved.blocks.bent[solved.blocks.band == part.band][0])
     bent = change_conditions(FilmChange(share), share, est, amplitude, clearance)
@@ -177,4 +154,5 @@ def _point(
         load_miss=solved.loads.misses[part.band],
         clearance=clearance,
         budget=budget,
+        scattering=("random",),
     )

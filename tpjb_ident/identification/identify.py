@@ -12,7 +12,7 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.estimators.estimate import method_of
 from tpjb_ident.identification.campaign_blocks import unstated
 from tpjb_ident.identification.campaign_solution import solve_campaign
-from tpjb_ident.identification.estimates import shared_changes
+from tpjb_ident.identification.estimates import RUN_TERMS, shared_changes
 from tpjb_ident.identification.identify_bands import identify_bands
 from tpjb_ident.identification.point import SOLVED, PointTask, finished_point, point_share
 from tpjb_ident.identification.settings import IdentifySettings
@@ -164,6 +164,6 @@ def assemble(
     places = [data.point for data in gathered]
     remarks = unstated(campaign) + excluded_runs(excluded, len(finished.outcomes), places, several)
     named = with_probe_doubts(checked.swept, points, settings.clearance)
-    changes, names = shared_changes(solved.solution, range(len(gathered)))
+    changes, names = shared_changes(solved.solution, range(len(gathered)), RUN_TERMS)
     springs = cell_stiffness(solved.solution)
     return Identification(campaign.id, settings.method, named, changes, remarks, (), names, springs)

@@ -13,7 +13,7 @@ from tpjb_ident.estimators.r_matrix import phasor_table
 from tpjb_ident.estimators.solved_windows import not_locked
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.campaign_solution import CampaignSolution
-from tpjb_ident.identification.estimates import estimate_of
+from tpjb_ident.identification.estimates import RUN_TERMS, estimate_of
 from tpjb_ident.identification.point_means import MeansTask, channel_windows, means_attenuation, vectors
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.run_data import RunPhasors, complex_median
@@ -109,7 +109,7 @@ def _estimate(
     if not np.isfinite(solution.h[p]).all() or windows is None:
         return None, {}
     omega = float(np.median(solved.blocks.omega[solution.blocks_of(p)]))
-    estimate, budget = estimate_of(solution, p, solved.h[p], omega, SOLVED)
+    estimate, budget = estimate_of(solution, p, solved.h[p], omega, SOLVED, RUN_TERMS)
     if p in solved.mains:
         fit = solved.mains[p]
         budget["mains"] = fit.covariance

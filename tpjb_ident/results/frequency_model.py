@@ -5,7 +5,7 @@ K-C-M is refused too the raw H is the answer.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.point_result import PointResult, by_static_point
 from tpjb_ident.schema import KINDS
 
+#: Method of points of a band where nothing tells noise from motion.
+BLIND = "band-hv"
 #: A model is refused below this probability of its chi-square.
 REFUSED = 0.01
 #: Draws of a chi-square with measured covariances, and their seed; above so many degrees of freedom one is known.
@@ -198,7 +200,8 @@ class StaticFits:
 def fits_over_frequency(points: Sequence[PointResult], changes: FloatArray | None = None) -> list[StaticFits]:
     """Fit every static point that was run at two excitation frequencies or more; `changes` (q, 8 P) [N/m].
 
-    Points with mains on the excitation line take part: their intervals say what they are worth.
+    Points with mains on the excitation line take part: their intervals say what they are worth. Without an instrument
+    the bias of h looks like a misfit: nothing is refused then.
     """
     fits = []
     for places in by_static_point(points):
@@ -207,5 +210,8 @@ def fits_over_frequency(points: Sequence[PointResult], changes: FloatArray | Non
         if len({round(e.omega, 6) for e in estimates}) > 1:
             rows = None if changes is None else changes.reshape(len(changes), -1, 8)[:, places]
             models = {model: fit_over_frequency(estimates, model, rows) for model in MODELS}
+            if any(est.method == BLIND for est in estimates):
+                unjudged = {"chi_square": np.nan, "probability": np.nan, "misfit": np.nan}
+                models = {name: replace(model, **unjudged) for name, model in models.items()}
             fits.append(StaticFits(members, tuple(places), models))
     return fits

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 _WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_KEY)
 #: Of a coefficient in ``coefficients.csv``.
 _ENDINGS = ("", "_lo", "_hi", "_se", "_se_systematic", "_random95", "_systematic95")
-#: Sources that scatter from run to run; all others are common to the runs.
-_RANDOM = ("random", "load miss", "load direction", "mains")
 _BUDGET_COLUMNS = ("coefficient", "unit", "source", "kind", "standard_uncertainty", "share", "dof")
 
 
@@ -128,7 +126,7 @@ class Identification(Presented):
         """What every source adds to every coefficient's uncertainty: ``budget.csv``."""
         import pandas as pd
 
-        rows = [row for p in self.points for row in _budget_rows(point_columns(p), p.stiffness, p.budget)]
+        rows = [row for p in self.points for row in _budget_rows(p)]
         return pd.DataFrame(rows, columns=[*POINT_KEY, *_BUDGET_COLUMNS])
 
     def frequency_fits(self) -> list[StaticFits]:
@@ -206,14 +204,13 @@ def coefficient_columns(est: DynamicStiffness) -> dict[str, float]:
     return dict(zip(names, numbers.ravel().tolist()))
 
 
-def _budget_rows(
-    point: Mapping[str, Any], est: DynamicStiffness, parts: Mapping[str, FloatArray]
-) -> list[dict[str, Any]]:
+def _budget_rows(p: PointResult) -> list[dict[str, Any]]:
     """Rows of ``budget.csv`` of one point.
 
     The intervals are its sum: the random sources together with Student's t of their degrees of freedom, the systematic
     ones normal, the two added as root sum of squares.
     """
+    est, parts = p.stiffness, p.budget
     factor = np.repeat([1.0, 1 / est.omega], 4)
     names = [f"{symbol}{entry}" for symbol in "kc" for entry in ENTRIES]
     variances = np.array([np.maximum(np.diag(part), 0.0) for part in parts.values()]).reshape(-1, 8)
@@ -222,10 +219,10 @@ def _budget_rows(
     rows = []
     for i, name in enumerate(names):
         for j, source in enumerate(parts):
-            kind, dof = ("random", float(est.dof[i])) if source in _RANDOM else ("systematic", np.inf)
+            kind, dof = ("random", float(est.dof[i])) if source in p.scattering else ("systematic", np.inf)
             unit = "N/m" if i < 4 else "Ns/m"
             values = (name, unit, source, kind, float(errors[j, i]), float(shares[j, i]), dof)
-            rows.append({**point, **dict(zip(_BUDGET_COLUMNS, values))})
+            rows.append({**point_columns(p), **dict(zip(_BUDGET_COLUMNS, values))})
     return rows
 
 

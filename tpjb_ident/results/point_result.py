@@ -63,6 +63,8 @@ class PointResult:
         Assembled clearance, where the campaign carries a bearing [m].
     budget : dict of str to (8, 8) ndarray
         Covariance of the default method's H by source [N^2/m^2]; the interval is their sum.
+    scattering : tuple of str
+        Sources that scatter from run to run; all others are common to the runs.
     """
 
     point: OperatingPoint
@@ -85,6 +87,7 @@ class PointResult:
     inertia_corrected: bool = False
     clearance: float | None = field(default=None, repr=False)
     budget: dict[str, FloatArray] = field(default_factory=dict, repr=False)
+    scattering: tuple[str, ...] = field(default=("random", "load miss", "load direction", "mains"), repr=False)
 
     def __str__(self) -> str:
         flags = f" ({', '.join(str(q) for q in self.quality)})" if self.quality else ""
