@@ -50,7 +50,6 @@ class CampaignSolution:
     pickup: Pickup | None = None
     mains: dict[int, MainsFit] = field(default_factory=dict, repr=False)  #: by point
     in_cells: dict[int, FloatArray] = field(default_factory=dict, repr=False)  #: by point, (8, 8): mains in the cells
-    cell_pickup: float = 0.0  #: N: mains in the cells
 
     @property
     def h(self) -> ComplexArray:
@@ -100,7 +99,7 @@ def solve_campaign(
         last = replace(last, solution=again, mains_shift=shift, pickup=pickup, mains=fits)
     D = vector(last.rig, blocks, "displacement")
     in_cells = {p: force_pickup_spread(D[blocks.point == p], force) for p in on_line if force.any()}
-    return replace(last, in_cells=in_cells, cell_pickup=float(np.linalg.norm(force)))
+    return replace(last, in_cells=in_cells)
 
 
 def _film(data: PointData, point: PointMeans) -> FilmChange:

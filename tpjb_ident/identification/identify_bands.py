@@ -20,6 +20,7 @@ from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated
 from tpjb_ident.identification.clocks import solved_with_clocks
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.results.identification import Identification
+from tpjb_ident.results.quality import differing_runs
 from tpjb_ident.rounding import listed
 from tpjb_ident.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.runs.finished_runs import ExcludedRun, excluded_runs, without_runs
@@ -29,8 +30,6 @@ from tpjb_ident.terms.registry import cell_stiffness
 
 #: Share of the driven lines that must be told from noise.
 _LEAST_LINES = 0.5
-#: Scatter of the runs' gains that is too much for one bearing.
-_TOO_MUCH = 0.05
 #: Disturbing lines that are named.
 _NAMED = 6
 
@@ -95,7 +94,6 @@ def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Cond
     alike, few = condition > ONE_LINE, len(usable) < max(_LEAST_LINES * len(driven), 1)
     one_line = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
     weak = f"{len(usable)} of {len(driven)} driven lines stand {STRONG:g} times (F ratio) above the noise"
-    scatter = solved.first.run_scatter
     spectra = point.spectra[0]
     low, high = spectra.frequencies[0], spectra.frequencies[-1]
     held = [f"{d.name} {d.frequency:.4g} Hz" for d in spectra.disturbances if low <= d.frequency <= high]
@@ -105,13 +103,16 @@ def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Cond
     blind = point.method == "hv" and len(usable) > 0
     coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0
     text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"
-    return fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.spectra)) + holding(
-        (scatter > _TOO_MUCH, "runs-disagree", f"runs differ by {100 * scatter:.1f} % in force over displacement"),
-        (alike, "fewer-than-two-directions", one_line),
-        (few and not alike, "excitation-too-weak", weak),
-        (held, "lines-left-out", listed(held, _NAMED)),
-        (blind, "no-instrument", text),
-        (coherent < MIN_COHERENCE, "low-coherence", f"{coherent:.2f}, median over the band"),
-        (unknown, "baseline-missing", f"at {unknown} of {len(usable)} lines of the band"),
-        (uncorrected, "inertia-not-corrected", "no accelerometers"),
+    return merged(
+        fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.spectra)),
+        differing_runs(solved.first.run_scatter),
+        holding(
+            (alike, "fewer-than-two-directions", one_line),
+            (few and not alike, "excitation-too-weak", weak),
+            (held, "lines-left-out", listed(held, _NAMED)),
+            (blind, "no-instrument", text),
+            (coherent < MIN_COHERENCE, "low-coherence", f"{coherent:.2f}, median over the band"),
+            (unknown, "baseline-missing", f"at {unknown} of {len(usable)} lines of the band"),
+            (uncorrected, "inertia-not-corrected", "no accelerometers"),
+        ),
     )

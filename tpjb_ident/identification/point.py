@@ -22,8 +22,8 @@ from tpjb_ident.results.point_result import PointResult, of_runs
 from tpjb_ident.results.quality import (
     amplitude,
     coherence,
+    differing_runs,
     directional_pattern,
-    disagreeing_runs,
     flags,
     rejected_windows,
 )
@@ -52,7 +52,6 @@ class PointShare:
     shaft: bool
     miss: ComplexArray
     film: FilmChange
-    mains_in_cells: float  #: N
 
     def amplitude_left(self) -> float:
         """Share of H by which the amplitude may still change it."""
@@ -84,14 +83,14 @@ def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare
     shift[g], factor[g] = (solution.shift + solved.mains_shift)[mine], solution.factor[mine]
     change[g], weight[g] = solution.run_change[mine], solution.scatter.weights[mine]
     estimate, budget = _estimate(solved, p, weight, data)
-    in_cells = solved.cell_pickup if p in solved.in_cells else 0.0
     conditions, shaft = _conditions(solved, p), bool(means.shaft_conditions)
     miss, film = solved.loads.misses[p], solved.film[p]
-    return PointShare(shift, factor, change, estimate, budget, conditions, shaft, miss, film, in_cells)
+    return PointShare(shift, factor, change, estimate, budget, conditions, shaft, miss, film)
 
 
 def _conditions(solved: CampaignSolution, p: int) -> tuple[Condition, ...]:
-    conditions = [*solved.loads.conditions(p), *solved.solution.conditions()]
+    runs_differ = differing_runs(solved.solution.scatter.share(p))
+    conditions = [*runs_differ, *solved.loads.conditions(p), *solved.solution.conditions()]
     if p in solved.mains and solved.pickup is not None:
         conditions.append(solved.mains[p].condition(solved.pickup))
     conditions += solved.means[p].shaft_conditions
@@ -150,7 +149,6 @@ def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> P
         best.status,
         flags(data, best, coherent),
         directional_pattern(data, weights),
-        disagreeing_runs(data, best.h, weights, share.mains_in_cells),
         linearity.condition(),
         disagreement(by_method, settings.method),
         share.conditions,

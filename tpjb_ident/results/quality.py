@@ -18,10 +18,8 @@ from tpjb_ident.terms.housing import HARMLESS, SOFT
 
 #: Share of the windows without phasors beyond which what is left may not stand for the record.
 _MAX_LOST = 0.6
-#: Share of the force that H leaves in the runs' means beyond which they have no H in common.
+#: Share of the force by which runs may differ: beyond it they have no H in common.
 _MAX_DISAGREEMENT = 0.06
-#: What a few runs show of a force of random phase may be so many times its size.
-_KNOWN_SCATTERS = 1.5
 #: Half of a probe's travel in a sweep over the clearance, least and most: a polygon reaches up to twice its clearance.
 _TRAVEL = (0.5, 2.5)
 #: Distance between two mean positions over the clearance, at most.
@@ -152,28 +150,10 @@ def directional_pattern(data: PointData, weights: FloatArray) -> tuple[Condition
     return holding((named, "directional-rejection", text))
 
 
-def disagreeing_runs(
-    data: PointData, h: ComplexArray, weights: FloatArray, scatter: float = 0.0
-) -> tuple[Condition, ...]:
-    """Runs whose mean forces H does not explain: noise averages out of means, other faults do not.
-
-    `scatter` [N]: force of random phase that the runs hold.
-    """
-    shares, sizes = [], []
-    for _, places in data.counted(weights) if np.isfinite(h).all() else ():
-        D, F = data.D[places], data.F[places]
-        # repeats of one motion, whatever phase the drive had in each
-        along = D @ np.linalg.eigh(D.conj().T @ D)[1][:, -1].conj()
-        residual = (F - D @ h.T) * np.exp(-1j * np.angle(along))[:, None]
-        sizes.append(float(np.linalg.norm(F, axis=1).mean()))
-        shares.append(float(np.linalg.norm(residual.mean(axis=0))) / sizes[-1])
-    if len(shares) < 3:
-        return ()
-    # two runs fix H: what is left over is shared by all of them
-    share = float(np.sqrt(np.mean(np.square(shares)) * len(shares) / (len(shares) - 2)))
-    limit = np.hypot(_MAX_DISAGREEMENT, _KNOWN_SCATTERS * scatter / float(np.mean(sizes)))
-    text = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * _MAX_DISAGREEMENT:.0f} %)"
-    return holding((share > limit, "runs-disagree", text))
+def differing_runs(share: float) -> tuple[Condition, ...]:
+    """Say where runs have no H in common: `share` of the film's force by which they differ beyond load and noise."""
+    text = f"the runs differ by {100 * share:.1f} % in force over displacement (limit {100 * _MAX_DISAGREEMENT:.0f} %)"
+    return holding((share > _MAX_DISAGREEMENT, "runs-disagree", text))
 
 
 def with_probe_doubts(
