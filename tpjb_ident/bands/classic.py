@@ -14,7 +14,6 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.bands.responses import nuisance, orthogonal
 from tpjb_ident.bands.run_spectra import RunSpectra
-from tpjb_ident.estimators.r_matrix import complex_to_real_covariance
 
 #: Condition number of the motions' power from which they are along one line.
 _ONE_LINE = 1e12
@@ -25,8 +24,6 @@ class ClassicLine:
     """One line by the methods of analysers."""
 
     h: dict[str, ComplexArray]  #: (2, 2) by method, N/m; none where the rows do not tell it
-    covariance: FloatArray  #: (8, 8), N^2/m^2: that of H1
-    freedom: float  #: real degrees of freedom of the noise
     coherence: FloatArray  #: (2,): of the force along X and Y with the displacements
     n_rows: int
 
@@ -40,15 +37,12 @@ def classic_line(spectra: Sequence[RunSpectra], groups: Sequence[IntArray], ends
         n, freedom = n + len(rows), freedom + len(rows) - used
     size = np.sqrt(np.diag(S).real)
     if freedom < 1 or not (size > 0).all() or not np.linalg.cond(S[:2, :2] / np.outer(size, size)[:2, :2]) < _ONE_LINE:
-        return ClassicLine({}, np.full((8, 8), np.nan), 1.0, np.full(2, np.nan), n)
-    inverse = np.linalg.inv(S[:2, :2])
-    h1, h2 = S[2:, :2] @ inverse, S[2:, 2:] @ np.linalg.inv(S[:2, 2:])
+        return ClassicLine({}, np.full(2, np.nan), n)
+    h1, h2 = S[2:, :2] @ np.linalg.inv(S[:2, :2]), S[2:, 2:] @ np.linalg.inv(S[:2, 2:])
     signal = np.linalg.eigh(S / np.outer(size, size))[1][:, 2:] * size[:, None]
-    noise = (S[2:, 2:] - h1 @ S[:2, 2:]) / freedom
-    coherence = np.clip(1 - (freedom + 2) * np.diag(noise).real / size[2:] ** 2, 0.0, 1.0)
-    covariance = complex_to_real_covariance(np.asarray(np.kron(noise, inverse.conj())))
+    noise = (freedom + 2) / freedom * np.diag(S[2:, 2:] - h1 @ S[:2, 2:]).real
     h = {"h1": h1, "h2": h2, "hv": signal[2:] @ np.linalg.inv(signal[:2])}
-    return ClassicLine(h, covariance, 2.0 * freedom, coherence, n)
+    return ClassicLine(h, np.clip(1 - noise / size[2:] ** 2, 0.0, 1.0), n)
 
 
 def _rows(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[ComplexArray, int]:

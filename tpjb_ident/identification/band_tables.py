@@ -115,18 +115,16 @@ def band_results(
 
 
 def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
-    """One line by the method that counts, and by the others."""
+    """One line by the method that counts, and by the others: how runs scatter is no matter of the method."""
     h = np.array([s.h[k] for s in solved.solutions])
     best, budget = solved.estimate(solved.solution, k, np.array([k]), h, point.method)
     classic = solved.classic[k]
     alternatives = {name: value - solved.rig.bare.at(np.array([best.omega]))[0] for name, value in classic.h.items()}
     if _BRACKET in budget:
         alternatives |= {"h1": h[0], "h2": h[-1]}
-    shared = best.systematic - budget.get(_BRACKET, 0.0)
-    scatter = {"covariance": classic.covariance, "dof": np.full(8, classic.freedom), "systematic": shared}
     table = {point.method: best}
     for name, value in alternatives.items():
-        table.setdefault(name, replace(best, h=value, method=name, condition=np.nan, **scatter))
+        table.setdefault(name, replace(best, h=value, method=name))
     return BandLine(best.omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
 
 
