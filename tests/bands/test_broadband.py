@@ -121,7 +121,7 @@ def test_noise_on_the_displacements_pulls_h1_down_and_leaves_the_command_s_estim
     found = {"iv": [], "h1": [], "h2": []}
     for seed in range(25):
         runs = bins(40, 0.3, seed)
-        classic = classic_line(runs, [np.arange(40)], ends=True)
+        classic = classic_line(runs, np.arange(40), ends=True)
         found["iv"].append(by_command(runs, 40)[1, 1].real)
         found["h1"].append(classic.h["h1"][1, 1].real)
         found["h2"].append(classic.h["h2"][1, 1].real)
@@ -135,7 +135,7 @@ def test_noise_on_the_displacements_pulls_h1_down_and_leaves_the_command_s_estim
 def test_what_the_displacement_or_the_force_explains_is_h1_and_h2():
     """Without an instrument the responses of both runs together give what analysers give."""
     runs = bins(60, 0.3, 4)
-    classic = classic_line(runs, [np.arange(60)], ends=True).h
+    classic = classic_line(runs, np.arange(60), ends=True).h
     for source, name in (("displacement", "h1"), ("force", "h2")):
         z = line_response(runs, np.arange(60), source, ends=True).z
         h = np.linalg.solve(z[:, :2], z[:, 2:]).T

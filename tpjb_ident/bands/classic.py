@@ -28,13 +28,10 @@ class ClassicLine:
     n_rows: int
 
 
-def classic_line(spectra: Sequence[RunSpectra], groups: Sequence[IntArray], ends: bool) -> ClassicLine:
-    """H1, H2, Hv and coherence over all rows of a line: periods, or bins of its groups."""
-    S, n, freedom = np.zeros((4, 4), complex), 0, -2
-    for bins in groups:
-        rows, used = _rows(spectra, bins, ends)
-        S += rows.T @ rows.conj()
-        n, freedom = n + len(rows), freedom + len(rows) - used
+def classic_line(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> ClassicLine:
+    """H1, H2, Hv and coherence over all rows of a line: periods, or bins."""
+    rows, used = _rows(spectra, bins, ends)
+    S, n, freedom = rows.T @ rows.conj(), len(rows), len(rows) - used - 2
     size = np.sqrt(np.diag(S).real)
     if freedom < 1 or not (size > 0).all() or not np.linalg.cond(S[:2, :2] / np.outer(size, size)[:2, :2]) < _ONE_LINE:
         return ClassicLine({}, np.full(2, np.nan), n)

@@ -32,16 +32,18 @@ _LEAST = 1e-8
 
 @dataclass(frozen=True)
 class BandBlocks:
-    """Blocks of all bands, and what belongs together: P groups of bins, L lines, B bands."""
+    """Blocks of all bands, a point a line: L lines, B bands."""
 
     blocks: Blocks = field(repr=False)
-    omega: FloatArray  #: (P,), rad/s: of every point
-    line: IntArray  #: (P,): number of its line, counted over all bands
-    band: IntArray  #: (L,): band of every line
-    line_omega: FloatArray  #: (L,), rad/s
+    omega: FloatArray  #: (L,), rad/s: of every line
     driven: BoolArray  #: (L,): whether an excitation stands above the noise
     clear: BoolArray  #: (L,): whether it does so by far in both directions
     turning: FloatArray  #: (B,): relative scatter of the film's force from run to run with the shaft's angle
+
+    @property
+    def band(self) -> IntArray:
+        """Band of every line, (L,)."""
+        return self.blocks.band
 
 
 def band_blocks(
@@ -60,7 +62,7 @@ def band_blocks(
     films = [_film(point, clearance) for point in points]
     for point, miss, (_, uneven, _) in zip(points, misses, films):
         first = len(operating)
-        operating += [replace(point.point, excitation=2 * np.pi * round(f, 2)) for f in point.plan.middles.tolist()]
+        operating += [replace(point.point, excitation=2 * np.pi * round(f, 2)) for f in point.plan.frequencies.tolist()]
         for members in point.members:
             spectra = [point.spectra[r] for r in members]
             names = [s.phasors.run for s in spectra]
@@ -70,29 +72,22 @@ def band_blocks(
             row |= {"run": len(runs), "temperature": warmth, "miss": missed_load(miss, members)}
             for place, response in enumerate(_run_rows(point, spectra, channels, warmth, turn)):
                 bins = point.plan.bins[place]
-                at = {"point": first + place, "omega": 2 * np.pi * point.plan.middles[place]}
+                at = {"point": first + place, "omega": 2 * np.pi * point.plan.frequencies[place]}
                 at["uneven"] = uneven[members[0], bins].mean(axis=0)
                 is_driven = spectra[0].driven[bins].any()
                 rows += [values | row | at for values in response if is_driven]
             runs.append(", ".join(names))
-    plans = [point.plan for point in points]
     bent, _, turning = zip(*films)
-    of_point = np.repeat(np.arange(len(plans)), [len(plan.middles) for plan in plans])
-    blocks = stacked(operating, runs, len(sensors), rows, np.array(bent)[of_point], of_point)
-    band = np.repeat(np.arange(len(plans)), [len(plan.frequencies) for plan in plans])
-    line = np.concatenate([plan.line + np.searchsorted(band, b) for b, plan in enumerate(plans)])
-    line_of = line[blocks.point]
+    band = np.repeat(np.arange(len(points)), [len(point.plan.bins) for point in points])
+    blocks = stacked(operating, runs, len(sensors), rows, np.array(bent)[band], band)
     stands = np.array([row["stands"] for row in rows], dtype=bool)
-    driven = np.isin(np.arange(len(band)), line_of[stands])
+    driven = np.isin(np.arange(len(band)), blocks.point[stands])
     coherent = np.array([classic.coherence.min() for point in points for classic in point.classic])
-    strong = _strengths(Rig(sensors, 1.0), blocks, line_of, len(band)) > STRONG
+    strong = _strengths(Rig(sensors, 1.0), blocks) > STRONG
     quiet = np.array([point.method == "hv" for point in points])[band]
     return BandBlocks(
-        blocks.part(np.flatnonzero(driven[line_of])),
-        2 * np.pi * np.concatenate([plan.middles for plan in plans]),
-        line,
-        band,
-        2 * np.pi * np.concatenate([plan.frequencies for plan in plans]),
+        blocks.part(np.flatnonzero(driven[blocks.point])),
+        2 * np.pi * np.concatenate([point.plan.frequencies for point in points]),
         driven,
         np.where(quiet, np.nan_to_num(coherent) > _LEAST_COHERENCE, strong),
         np.array(turning),
@@ -154,18 +149,18 @@ def _run_rows(
     return groups
 
 
-def _strengths(rig: Rig, blocks: Blocks, line: IntArray, lines: int) -> FloatArray:
-    """F ratio of every line's weaker direction of motion over its noise, (L,); `line` (n,) of the blocks."""
+def _strengths(rig: Rig, blocks: Blocks) -> FloatArray:
+    """F ratio of every line's weaker direction of motion over its noise, (L,)."""
     probes = rig.of("displacement")
     plane = np.linalg.pinv(blocks.along[:, probes] * blocks.present[:, probes, None])
     noise = plane @ blocks.noise[:, probes][:, :, probes] @ plane.transpose(0, 2, 1)
     size = np.sqrt(np.maximum(np.einsum("nii->n", noise).real / 2, 1e-300))
     white = np.nan_to_num(vector(rig, blocks, "displacement")) / size[:, None]
-    return np.asarray(np.linalg.eigvalsh(line_products(line, white, white, lines))[:, 0] / 2)
+    return np.asarray(np.linalg.eigvalsh(line_products(blocks, white, white))[:, 0] / 2)
 
 
-def line_products(line: IntArray, first: ComplexArray, second: ComplexArray, lines: int) -> ComplexArray:
-    """Sums of first times conjugate second (n, 2) by line, (L, 2, 2); `line` (n,)."""
-    table = np.zeros((lines, 2, 2), complex)
-    np.add.at(table, line, first[:, :, None] * second.conj()[:, None, :])
+def line_products(blocks: Blocks, first: ComplexArray, second: ComplexArray) -> ComplexArray:
+    """Sums of first times conjugate second (n, 2) by line, (L, 2, 2)."""
+    table = np.zeros((len(blocks.points), 2, 2), complex)
+    np.add.at(table, blocks.point, first[:, :, None] * second.conj()[:, None, :])
     return table

@@ -23,8 +23,6 @@ from tpjb_ident.runs.point_data import pad_means
 
 #: Lines over a band where a record resolves more, and bins that a line takes at least.
 _LINES, _BINS = 60, 18
-#: Bins that one response is fitted to, about: over so few it is a straight line, and enough are left for the noise.
-_GROUP = 12
 #: Bins of a line that must be left when those of shaft and mains are gone.
 _LEAST_BINS = 12
 #: Lines that a band must give.
@@ -33,11 +31,9 @@ _LEAST_LINES = 3
 
 @dataclass(frozen=True)
 class LinePlan:
-    """Groups of bins, and the line of each: one bin of a period, or some neighbouring bins of a whole record."""
+    """Bins of every line: one of a period, or some neighbouring ones of a whole record."""
 
     bins: tuple[IntArray, ...]
-    line: IntArray  #: (n_groups,)
-    middles: FloatArray  #: (n_groups,), Hz
     frequencies: FloatArray  #: (n_lines,), Hz
     resolution: float  #: Hz: width of a line
 
@@ -97,9 +93,7 @@ class BandPoint:
     @cached_property
     def classic(self) -> list[ClassicLine]:
         """Every line by the methods of analysers."""
-        lines = range(len(self.plan.frequencies))
-        groups = [[self.plan.bins[g] for g in np.flatnonzero(self.plan.line == k)] for k in lines]
-        return [classic_line(self.spectra, bins, self.open) for bins in groups]
+        return [classic_line(self.spectra, bins, self.open) for bins in self.plan.bins]
 
 
 def read_point(
@@ -166,8 +160,7 @@ def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
     period = spectra[0].period
     if period is not None:
         chosen = np.flatnonzero(free)
-        single, at = np.split(chosen, len(chosen)), frequencies[chosen]
-        return LinePlan(tuple(single), np.arange(len(chosen)), at, at, 1 / period)
+        return LinePlan(tuple(np.split(chosen, len(chosen))), frequencies[chosen], 1 / period)
     n = len(frequencies)
     width = max(_BINS, math.ceil(n / _LINES))
     count = n // width
@@ -179,10 +172,6 @@ def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
             f"needed; record {need:.3g} s or excite a wider band"
         )
     lines = [part[free[part]] for part in np.array_split(np.arange(n), count)]
-    lines = [part for part in lines if len(part) >= _LEAST_BINS]
-    groups = [np.array_split(part, max(round(len(part) / _GROUP), 1)) for part in lines]
-    bins = tuple(group for parts in groups for group in parts)
-    line = np.repeat(np.arange(len(groups)), [len(parts) for parts in groups])
-    ends = np.array([frequencies[part[[0, -1]]] for part in lines]).reshape(-1, 2)
-    middles = np.array([frequencies[group].mean() for group in bins])
-    return LinePlan(bins, line, middles, ends.mean(axis=1), width * float(frequencies[1] - frequencies[0]))
+    bins = tuple(part for part in lines if len(part) >= _LEAST_BINS)
+    middles = np.array([frequencies[part].mean() for part in bins])
+    return LinePlan(bins, middles, width * float(frequencies[1] - frequencies[0]))

@@ -64,15 +64,9 @@ def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
     crude, condition = _crude(rig, data)
     used = data.driven & (condition < ONE_LINE)
     usable = used & data.clear
-    curve = _curve(data, crude, usable)
-    bend = curve(data.band[data.line], data.omega) - curve(data.band, data.line_omega)[data.line]
-    start = np.where(usable[data.line][:, None, None], crude[data.line] + bend, np.nan)
-    rig, solution, size = _lines(rig, data, start)
-    h = np.full((len(data.band), 2, 2), np.nan + 0j)
-    # at the first point of every line
-    away = (solution.h - start)[np.searchsorted(data.line, np.arange(len(data.band)))]
-    usable &= np.abs(away).max(axis=(1, 2)) < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
-    h[usable] = crude[usable] + away[usable]
+    rig, solution, size = _lines(rig, data, np.where(usable[:, None, None], crude, np.nan))
+    usable &= np.abs(solution.h - crude).max(axis=(1, 2)) < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
+    h = np.where(usable[:, None, None], solution.h, np.nan)
     parts = _parts(data, used, np.isfinite(h).all(axis=(1, 2)))
     part, part_h = _part_solution(rig, data, solution, parts, h, used)
     return BandSolution(rig, h, solution, parts, part_h, part, condition, used, size)
@@ -80,12 +74,12 @@ def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
 
 def _curve(data: BandBlocks, h: ComplexArray, chosen: BoolArray) -> Callable[[IntArray, FloatArray], ComplexArray]:
     """K-C-M over every band, nearest to h (L, 2, 2) of chosen lines (L,): H at frequencies of some bands."""
-    middle, count = np.median(data.line_omega), MODELS["K-C-M"]
+    middle, count = np.median(data.omega), MODELS["K-C-M"]
     chosen = chosen & np.isfinite(h).all(axis=(1, 2))
     numbers = np.full((len(data.turning), 4 * count), np.nan)
     for b in np.unique(data.band[chosen]):
         mine = chosen & (data.band == b)
-        numbers[b] = least_squares(power_columns(data.line_omega[mine] / middle, count), real_numbers(h[mine]))
+        numbers[b] = least_squares(power_columns(data.omega[mine] / middle, count), real_numbers(h[mine]))
 
     def at(band: IntArray, omega: FloatArray) -> ComplexArray:
         return complex_matrix(np.einsum("nak,nk->na", power_columns(omega / middle, count), numbers[band]))
@@ -96,10 +90,9 @@ def _curve(data: BandBlocks, h: ComplexArray, chosen: BoolArray) -> Callable[[In
 def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Rig, Solution, float]:
     """H of the lines, the rig as they show it, and the scatter of the runs' gains."""
     by_load, spare = _own_scatter(data, rig.to_set_point)
-    lines = len(data.band)
+    lines = np.arange(len(data.omega))
     # lines of one run stand for many runs: none is judged
-    scatter = replace(Scatter.none(lines, len(data.blocks)), judges=False)
-    shape = Shape(data.line, count=lines, scatter=scatter)
+    shape = Shape(lines, scatter=replace(Scatter.none(len(lines), len(data.blocks)), judges=False))
 
     def solved(rig: Rig, size: float) -> Solution:
         blocks = replace(data.blocks, gain_scatter=np.hypot(by_load, size * spare))
@@ -136,13 +129,13 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
     """H of every line by least squares (L, 2, 2), and the condition number of its motions (L,)."""
     D, F = vector(rig, data.blocks, "displacement"), film_force(rig, data.blocks)
     usable = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1)
-    line, lines = data.line[data.blocks.point[usable]], len(data.band)
-    DD, FD = (line_products(line, rows[usable], D[usable], lines) for rows in (D, F))
+    used = data.blocks.part(np.flatnonzero(usable))
+    DD, FD = (line_products(used, rows[usable], D[usable]) for rows in (D, F))
     condition = np.sqrt(np.linalg.cond(DD))
-    h = np.full((lines, 2, 2), np.nan + 0j)
+    h = np.full(DD.shape, np.nan + 0j)
     regular = condition < ONE_LINE
     h[regular] = FD[regular] @ np.linalg.inv(DD[regular])
-    return h - rig.bare.at(data.line_omega), condition
+    return h - rig.bare.at(data.omega), condition
 
 
 def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[BandPart, ...]:
@@ -154,7 +147,7 @@ def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[BandPa
             groups = [lines[k : k + 1] for k in np.flatnonzero(usable[lines])]
         else:
             groups = np.array_split(lines, min(_PARTS, len(lines) // 2))
-        parts += [BandPart(b, members, float(data.line_omega[members].mean())) for members in groups]
+        parts += [BandPart(b, members, float(data.omega[members].mean())) for members in groups]
     return tuple(parts)
 
 
@@ -168,17 +161,16 @@ def _part_solution(
 ) -> tuple[Solution, ComplexArray]:
     """The solve of the parts, and h of each at its frequency (Q, 2, 2); `h` (L, 2, 2) of the `lines` solved before."""
     curve = _curve(data, h, used)
-    start = curve(data.band[data.line], data.omega)
+    start = curve(data.band, data.omega)
     part_h = curve(np.array([part.band for part in parts], dtype=np.intp), np.array([part.omega for part in parts]))
-    of_line = np.full(len(data.band), len(parts))
+    group, count = np.full(len(start), len(parts)), len(parts) + 1  # the last of those that are in no part
     for q, part in enumerate(parts):
-        of_line[part.lines] = q
+        group[part.lines] = q
         if len(part.lines) == 1:  # a tone by itself has no curve but its own h
-            start[data.line == part.lines[0]] = part_h[q] = h[part.lines[0]]
-    group, count = of_line[data.line], len(parts) + 1  # the last of those that are in no part
+            start[part.lines[0]] = part_h[q] = h[part.lines[0]]
     start[group == len(parts)] = np.nan
     shape = Shape(group, None, count, lines.scatter.fixed(count, lines.scatter.weights), lines.fitted)
     solution = solve(rig, lines.blocks, start, shape)
-    for q in range(len(parts)):
-        part_h[q] += (solution.h - start)[np.flatnonzero(group == q)[0]]
+    for q, part in enumerate(parts):
+        part_h[q] += (solution.h - start)[part.lines[0]]
     return solution, part_h

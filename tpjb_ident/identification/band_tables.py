@@ -78,7 +78,7 @@ class SolvedBands:
 
         Where solves differ it is in their middle, and half of what they are apart a rectangle's half width.
         """
-        half, omega = 0.5 * (h[-1] - h[0]), float(self.data.line_omega[lines].mean())
+        half, omega = 0.5 * (h[-1] - h[0]), float(self.data.omega[lines].mean())
         est, budget = estimate_of(solution, group, h[0] + half, omega, method)
         if half.any():
             budget[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)

@@ -98,7 +98,7 @@ def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Cond
     low, high = spectra.frequencies[0], spectra.frequencies[-1]
     held = [f"{d.name} {d.frequency:.4g} Hz" for d in spectra.disturbances if low <= d.frequency <= high]
     bare = solved.rig.bare
-    unknown = int((~bare.known(solved.data.line_omega[usable])).sum()) if len(bare.omega) else 0
+    unknown = int((~bare.known(solved.data.omega[usable])).sum()) if len(bare.omega) else 0
     uncorrected = not point.has_accelerometers and spectra.phasors.housing_mass > 0
     blind = point.method == "hv" and len(usable) > 0
     coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0
