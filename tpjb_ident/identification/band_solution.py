@@ -7,7 +7,7 @@ that is nearest to the band's lines: it need not hold over the band, only bend h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -36,26 +36,15 @@ ONE_LINE = 1e6
 
 
 @dataclass(frozen=True)
-class BandPart:
-    """Lines of one band whose h becomes a point."""
-
-    band: int
-    lines: IntArray
-    omega: float
-
-
-@dataclass(frozen=True)
 class BandSolution:
-    """All bands of a campaign; L lines, B bands, Q parts."""
+    """All bands of a campaign; L lines."""
 
     rig: Rig
-    h: ComplexArray  #: (L, 2, 2), N/m: NaN where the excitation does not tell it
     lines: Solution = field(repr=False)
-    parts: tuple[BandPart, ...] = field(repr=False)
-    part_h: ComplexArray = field(repr=False)  #: (Q, 2, 2), N/m
+    usable: BoolArray = field(repr=False)  #: (L,): lines that the excitation tells
+    parts: tuple[IntArray, ...]  #: lines of every part: h is that at the middle one
     part: Solution = field(repr=False)
     condition: FloatArray = field(repr=False)  #: (L,): condition number of the motions
-    used: BoolArray = field(repr=False)  #: (L,): lines that the parts take
     run_scatter: float  #: of the runs' gains
 
 
@@ -64,27 +53,11 @@ def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
     crude, condition = _crude(rig, data)
     used = data.driven & (condition < ONE_LINE)
     usable = used & data.clear
-    rig, solution, size = _lines(rig, data, np.where(usable[:, None, None], crude, np.nan))
-    usable &= np.abs(solution.h - crude).max(axis=(1, 2)) < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
-    h = np.where(usable[:, None, None], solution.h, np.nan)
-    parts = _parts(data, used, np.isfinite(h).all(axis=(1, 2)))
-    part, part_h = _part_solution(rig, data, solution, parts, h, used)
-    return BandSolution(rig, h, solution, parts, part_h, part, condition, used, size)
-
-
-def _curve(data: BandBlocks, h: ComplexArray, chosen: BoolArray) -> Callable[[IntArray, FloatArray], ComplexArray]:
-    """K-C-M over every band, nearest to h (L, 2, 2) of chosen lines (L,): H at frequencies of some bands."""
-    middle, count = np.median(data.omega), MODELS["K-C-M"]
-    chosen = chosen & np.isfinite(h).all(axis=(1, 2))
-    numbers = np.full((len(data.turning), 4 * count), np.nan)
-    for b in np.unique(data.band[chosen]):
-        mine = chosen & (data.band == b)
-        numbers[b] = least_squares(power_columns(data.omega[mine] / middle, count), real_numbers(h[mine]))
-
-    def at(band: IntArray, omega: FloatArray) -> ComplexArray:
-        return complex_matrix(np.einsum("nak,nk->na", power_columns(omega / middle, count), numbers[band]))
-
-    return at
+    rig, lines, size = _lines(rig, data, np.where(usable[:, None, None], crude, np.nan))
+    away = np.abs(lines.h - crude).max(axis=(1, 2))
+    usable &= away < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
+    parts = _parts(data, used, usable)
+    return BandSolution(rig, lines, usable, parts, _part_solution(rig, data, lines, parts, usable), condition, size)
 
 
 def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Rig, Solution, float]:
@@ -138,39 +111,33 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
     return h - rig.bare.at(data.omega), condition
 
 
-def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[BandPart, ...]:
+def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[IntArray, ...]:
     """Parts of all bands; few tones are no band: each that is told is a point."""
-    parts = []
+    parts: list[IntArray] = []
     for b in range(len(data.turning)):
         lines = np.flatnonzero(used & (data.band == b))
         if len(lines) < 2 * MODELS["K-C-M"]:
-            groups = [lines[k : k + 1] for k in np.flatnonzero(usable[lines])]
+            parts += [lines[k : k + 1] for k in np.flatnonzero(usable[lines])]
         else:
-            groups = np.array_split(lines, min(_PARTS, len(lines) // 2))
-        parts += [BandPart(b, members, float(data.omega[members].mean())) for members in groups]
+            parts += np.array_split(lines, min(_PARTS, len(lines) // 2))
     return tuple(parts)
 
 
 def _part_solution(
-    rig: Rig,
-    data: BandBlocks,
-    lines: Solution,
-    parts: Sequence[BandPart],
-    h: ComplexArray,
-    used: BoolArray,
-) -> tuple[Solution, ComplexArray]:
-    """The solve of the parts, and h of each at its frequency (Q, 2, 2); `h` (L, 2, 2) of the `lines` solved before."""
-    curve = _curve(data, h, used)
-    start = curve(data.band, data.omega)
-    part_h = curve(np.array([part.band for part in parts], dtype=np.intp), np.array([part.omega for part in parts]))
+    rig: Rig, data: BandBlocks, lines: Solution, parts: Sequence[IntArray], usable: BoolArray
+) -> Solution:
+    """The solve of the parts, a group each, from the curve of K-C-M nearest to the `usable` lines of a band."""
+    start = np.full_like(lines.h, np.nan)
+    columns = power_columns(data.omega / np.median(data.omega), MODELS["K-C-M"])
+    for b in np.unique(data.band[usable]):
+        mine = data.band == b
+        numbers = least_squares(columns[usable & mine], real_numbers(lines.h[usable & mine]))
+        start[mine] = complex_matrix(columns[mine] @ numbers)
     group, count = np.full(len(start), len(parts)), len(parts) + 1  # the last of those that are in no part
     for q, part in enumerate(parts):
-        group[part.lines] = q
-        if len(part.lines) == 1:  # a tone by itself has no curve but its own h
-            start[part.lines[0]] = part_h[q] = h[part.lines[0]]
+        group[part] = q
+        if len(part) == 1:  # a tone by itself has no curve but its own h
+            start[part] = lines.h[part]
     start[group == len(parts)] = np.nan
     shape = Shape(group, None, count, lines.scatter.fixed(count, lines.scatter.weights), lines.fitted)
-    solution = solve(rig, lines.blocks, start, shape)
-    for q, part in enumerate(parts):
-        part_h[q] += (solution.h - start)[part.lines[0]]
-    return solution, part_h
+    return solve(rig, lines.blocks, start, shape)

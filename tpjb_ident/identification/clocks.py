@@ -18,8 +18,8 @@ from tpjb_ident.estimate.blocks import Blocks, Sensor
 from tpjb_ident.terms.clock import START, Clock
 
 if TYPE_CHECKING:
-    from tpjb_ident.identification.band_tables import SolvedBands
     from tpjb_ident.identification.campaign_solution import CampaignSolution
+    from tpjb_ident.identification.identify_bands import SolvedBands
 
 #: Standard errors beyond which a rate is one, and phase [rad] over a record from which it matters.
 _CLEAR, _NOTABLE = 6.0, 2e-3

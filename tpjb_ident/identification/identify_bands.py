@@ -1,89 +1,232 @@
-"""A campaign's broadband runs to h over frequency: the whole path, all operating points in one solve."""
+"""A campaign's broadband runs to h over frequency: one solve of all operating points; its lines, points and models."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigdata.arrays import FloatArray, IntArray
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
+from tpjb_ident.bands.classic import ClassicLine
 from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import Condition, holding, merged
-from tpjb_ident.estimate.blocks import RigStiffness, Sensor
+from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, Sensor
 from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
+from tpjb_ident.estimate.shape import real_numbers
+from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimators.estimate import MIN_COHERENCE, fit_conditions
-from tpjb_ident.identification.band_blocks import STRONG, band_blocks
+from tpjb_ident.estimators.stiffness import DynamicStiffness
+from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
 from tpjb_ident.identification.band_point import BandPoint, band_groups, read_point
-from tpjb_ident.identification.band_solution import ONE_LINE, solve_bands
-from tpjb_ident.identification.band_tables import SolvedBands, band_results
+from tpjb_ident.identification.band_solution import ONE_LINE, BandSolution, solve_bands
 from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated
 from tpjb_ident.identification.clocks import solved_with_clocks
+from tpjb_ident.identification.estimates import estimate_of, shared_changes
 from tpjb_ident.identification.settings import IdentifySettings
+from tpjb_ident.results.band_result import BandLine, BandResult
+from tpjb_ident.results.frequency_model import fits_over_frequency
 from tpjb_ident.results.identification import Identification
-from tpjb_ident.results.quality import differing_runs
+from tpjb_ident.results.linearity import FilmChange, change_conditions
+from tpjb_ident.results.point_result import PointResult, of_runs
+from tpjb_ident.results.quality import differing_runs, feeds_motion
 from tpjb_ident.rounding import listed
 from tpjb_ident.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.runs.finished_runs import ExcludedRun, excluded_runs, without_runs
 from tpjb_ident.runs.run_jobs import Progress
-from tpjb_ident.runs.static_load import static_loads
+from tpjb_ident.runs.static_load import StaticLoads, static_loads
 from tpjb_ident.terms.registry import cell_stiffness
 
 #: Share of the driven lines that must be told from noise.
 _LEAST_LINES = 0.5
 #: Disturbing lines that are named.
 _NAMED = 6
+#: Source of what the solves without an instrument are apart.
+_BRACKET = "no instrument"
+
+
+@dataclass(frozen=True)
+class SolvedBands:
+    """All bands with their solve; where there is no instrument, one with all noise on the force, one with all on D."""
+
+    points: tuple[BandPoint, ...]
+    loads: StaticLoads
+    data: BandBlocks
+    solutions: tuple[BandSolution, ...]
+    excluded: tuple[ExcludedRun, ...]
+
+    @property
+    def first(self) -> BandSolution:
+        """The solve that counts, or the lower of two."""
+        return self.solutions[0]
+
+    @property
+    def rig(self) -> Rig:
+        """As the solve that counts knows it."""
+        return self.first.rig
+
+    @property
+    def blocks(self) -> Blocks:
+        """Of the solve that counts."""
+        return self.data.blocks
+
+    @property
+    def solution(self) -> Solution:
+        """Of the lines."""
+        return self.first.lines
+
+    @property
+    def classic(self) -> list[ClassicLine]:
+        """All lines by the methods of analysers."""
+        return [line for point in self.points for line in point.classic]
+
+    @property
+    def part_changes(self) -> FloatArray:
+        """One deviation of the parts (Q, 8) [N/m] by what solves without an instrument are apart: a rectangle's."""
+        middles = [middle(lines) for lines in self.first.parts]
+        return real_numbers(self.solutions[-1].part.h[middles] - self.first.part.h[middles]) / np.sqrt(12)
+
+    def usable(self, b: int) -> IntArray:
+        """Lines of a band with an answer."""
+        return np.flatnonzero(np.all([s.usable for s in self.solutions], axis=0) & (self.data.band == b))
+
+    def estimate(
+        self, solutions: Sequence[Solution], group: int, lines: IntArray, method: str
+    ) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
+        """H of a group of lines by all solves, at the middle one, and its covariances by source.
+
+        Where solves differ it is in their middle, and half of what they are apart a rectangle's half width.
+        """
+        k = middle(lines)
+        half = 0.5 * (solutions[-1].h[k] - solutions[0].h[k])
+        est, budget = estimate_of(solutions[0], group, solutions[0].h[k] + half, float(self.data.omega[k]), method)
+        if half.any():
+            budget[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
+            est = replace(est, systematic=est.systematic + budget[_BRACKET])
+        return replace(est, condition=float(np.median(self.first.condition[lines]))), budget
+
+
+def middle(lines: IntArray) -> int:
+    """The middle one of some lines."""
+    return int(lines[len(lines) // 2])
 
 
 def identify_bands(
     campaign: Campaign, settings: IdentifySettings, progress: Progress, bare: RigStiffness
 ) -> Identification:
     """Identify every operating point of a campaign that was excited over a band."""
-    runs = tuple(run for run in campaign.of_kind("dynamic") if is_broadband(run))
+    runs = [run for run in campaign.of_kind("dynamic") if is_broadband(run)]
     observations = []
     for done, run in enumerate(runs):
         progress(run.id, done, len(runs))
         observations.append(observe(run))
     checked = campaign_verdicts(campaign, observations)
-    unusable = [
-        ExcludedRun(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable
-    ]
-    groups = band_groups([run for run in runs if run.id not in checked.unusable])
+    bad = checked.unusable
+    unusable = [ExcludedRun(run.id, run.point, RigDataError(bad[run.id])) for run in runs if run.id in bad]
+    groups = band_groups([run for run in runs if run.id not in bad])
 
     def solve(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> SolvedBands:
         fast = {sensor.name: rates[sensor.device] for sensor in sensors if sensor.device in rates}
-        points, bad = [], list(unusable)
+        points, excluded = [], list(unusable)
         for group in groups:
             point, without = read_point(group, campaign.housing_mass, settings.phasors, fast)
             points += [] if point is None else [point]
-            bad += without
+            excluded += without
         if not points:
-            raise bad[0].error
+            raise excluded[0].error
         loads = static_loads(campaign, points)
         temperatures = run_temperatures(campaign, [(s.phasors.run, s.temperatures) for p in points for s in p.spectra])
+        known = {"bare": bare, "rates": rates, "to_set_point": settings.correct}
         data, solutions = [], []
         # without an instrument twice: all noise the force's, then all the displacement's
         for turn in range(2 if any(point.method == "hv" for point in points) else 1):
             data.append(band_blocks(points, sensors, loads.misses, temperatures, settings.clearance, turn))
-            blocks, known = data[-1].blocks, {"bare": bare, "rates": rates, "to_set_point": settings.correct}
-            rig = campaign_rig(campaign, loads.doubted(sensors), blocks, loads.common, **known)
+            rig = campaign_rig(campaign, loads.doubted(sensors), data[-1].blocks, loads.common, **known)
             solutions.append(solve_bands(rig, data[-1]))
-        return SolvedBands(tuple(points), loads, data[0], tuple(solutions), tuple(bad))
+        return SolvedBands(tuple(points), loads, data[0], tuple(solutions), tuple(excluded))
 
     solved = solved_with_clocks(sensors_of(campaign), min(run.sample_rate for run in runs), solve)
-    points, bad = solved.points, solved.excluded
-    quality = []
-    for b, point in enumerate(points):
+    results, numbers = [], []
+    for b, point in enumerate(solved.points):
         of_runs = solved.loads.conditions(b), check_conditions(checked, point.names)
-        without = without_runs(point.point, bad, any_excitation=True)
+        without = without_runs(point.point, solved.excluded, any_excitation=True)
         of_records = (spectra.phasors.conditions for spectra in point.spectra)
-        of_lines = solved.first.lines.conditions(), band_conditions(point, solved, b)
-        quality.append(merged(*of_runs, without, *of_records, *of_lines))
-    results, changes, names = band_results(solved, quality, settings.clearance)
-    places = [point.point for point in points]
-    named = excluded_runs(bad, len(runs), places, any_excitation=True, kind="run over a band") + unstated(campaign)
+        of_lines = solved.solution.conditions(), band_conditions(point, solved, b)
+        quality = merged(*of_runs, without, *of_records, *of_lines)
+        result, parts = _result(solved, b, quality, settings.clearance)
+        results.append(result)
+        numbers += parts
+    changes, names = _shared(solved, numbers)
+    places = [point.point for point in solved.points]
+    named = excluded_runs(solved.excluded, len(runs), places, any_excitation=True, kind="run over a band")
     identified = tuple(point for band in results for point in band.points)
-    springs = cell_stiffness(solved.first.part)
-    return Identification(campaign.id, settings.method, identified, changes, named, results, names, springs)
+    about = (*named, *unstated(campaign)), tuple(results), names, cell_stiffness(solved.first.part)
+    return Identification(campaign.id, settings.method, identified, changes, *about)
+
+
+def _shared(solved: SolvedBands, parts: list[int]) -> tuple[FloatArray, tuple[str, ...]]:
+    """What some parts share: what scatters from run to run is common to them too."""
+    bracket = solved.part_changes[parts]
+    return shared_changes(solved.first.part, parts, more={_BRACKET: bracket} if bracket.any() else {})
+
+
+def _result(
+    solved: SolvedBands, b: int, quality: tuple[Condition, ...], clearance: float | None
+) -> tuple[BandResult, list[int]]:
+    """Lines, models and points of one band, and the numbers of its parts."""
+    data, usable = solved.points[b], solved.usable(b)
+    lines = tuple(_line(solved, data, int(k)) for k in usable)
+    parts = [q for q, part in enumerate(solved.first.parts) if solved.data.band[part[0]] == b and len(usable)]
+    points = [_point(solved, q, quality, clearance) for q in parts]
+    # what runs scatter by is one for all parts: no chance between them
+    free = [np.full(8, solved.first.part.noise_freedom(q)) for q in parts]
+    by_noise = [replace(p, stiffness=replace(p.stiffness, dof=dof)) for p, dof in zip(points, free)]
+    fits = fits_over_frequency(by_noise, _shared(solved, parts)[0])
+    models, chosen = (fits[0].fits, fits[0].supported) if fits else ({}, "raw H")
+    figures = data.names, data.spectra[0].period, data.plan.resolution, tuple(points)
+    return BandResult(data.point, data.kind, lines, models, chosen, quality, *figures), parts
+
+
+def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
+    """One line by the method that counts, and by the others: how runs scatter is no matter of the method."""
+    solutions, classic = [s.lines for s in solved.solutions], solved.classic[k]
+    best, budget = solved.estimate(solutions, k, np.array([k]), point.method)
+    alternatives = {name: value - solved.rig.bare.at(np.array([best.omega]))[0] for name, value in classic.h.items()}
+    if _BRACKET in budget:
+        alternatives |= {"h1": solutions[0].h[k], "h2": solutions[-1].h[k]}
+    table = {point.method: best}
+    for name, value in alternatives.items():
+        table.setdefault(name, replace(best, h=value, method=name))
+    return BandLine(best.omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
+
+
+def _point(solved: SolvedBands, q: int, quality: tuple[Condition, ...], clearance: float | None) -> PointResult:
+    """One part of a band as a point: its lines alone tell its h; K-C-M only says how h changes within it."""
+    lines = solved.first.parts[q]
+    b = int(solved.data.band[lines[0]])
+    point = solved.points[b]
+    est, budget = solved.estimate([s.part for s in solved.solutions], q, lines, f"band-{point.method}")
+    inside = [solved.classic[k] for k in np.intersect1d(lines, solved.usable(b))]
+    amplitude = max(s.amplitude for s in point.spectra)
+    share = float(solved.blocks.bent[lines[0]])
+    bent = change_conditions(FilmChange(share), share, est, amplitude, clearance)
+    return PointResult(
+        **of_runs(point),
+        point=replace(point.point, excitation=2 * np.pi * round(est.omega / (2 * np.pi), 3)),
+        stiffness=est,
+        by_method={est.method: est},
+        n_windows=sum(line.n_rows for line in inside),
+        outlier_fraction=0.0,
+        coherence=float(np.median([line.coherence.min() for line in inside])) if inside else float("nan"),
+        amplitude=amplitude,
+        quality=merged(quality, feeds_motion(est), bent),
+        rejected=(),
+        load_miss=solved.loads.misses[b],
+        clearance=clearance,
+        budget=budget,
+        scattering=("random",),
+    )
 
 
 def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Condition, ...]:
