@@ -62,7 +62,8 @@ def band_blocks(
     films = [_film(point, clearance) for point in points]
     for point, miss, (_, uneven, _) in zip(points, misses, films):
         first = len(operating)
-        operating += [replace(point.point, excitation=2 * np.pi * round(f, 2)) for f in point.plan.frequencies.tolist()]
+        frequencies = point.frequencies.tolist()
+        operating += [replace(point.point, excitation=2 * np.pi * round(f, 2)) for f in frequencies]
         for members in point.members:
             spectra = [point.spectra[r] for r in members]
             names = [s.phasors.run for s in spectra]
@@ -71,14 +72,14 @@ def band_blocks(
             row = channel_columns(channels, calibrations)
             row |= {"run": len(runs), "temperature": warmth, "miss": missed_load(miss, members)}
             for place, response in enumerate(_run_rows(point, spectra, channels, warmth, turn)):
-                bins = point.plan.bins[place]
-                at = {"point": first + place, "omega": 2 * np.pi * point.plan.frequencies[place]}
+                bins = point.bins[place]
+                at = {"point": first + place, "omega": 2 * np.pi * frequencies[place]}
                 at["uneven"] = uneven[members[0], bins].mean(axis=0)
                 is_driven = spectra[0].driven[bins].any()
                 rows += [values | row | at for values in response if is_driven]
             runs.append(", ".join(names))
     bent, _, turning = zip(*films)
-    band = np.repeat(np.arange(len(points)), [len(point.plan.bins) for point in points])
+    band = np.repeat(np.arange(len(points)), [len(point.bins) for point in points])
     blocks = stacked(operating, runs, len(sensors), rows, np.array(bent)[band], band)
     stands = np.array([row["stands"] for row in rows], dtype=bool)
     driven = np.isin(np.arange(len(band)), blocks.point[stands])
@@ -87,7 +88,7 @@ def band_blocks(
     quiet = np.array([point.method == "hv" for point in points])[band]
     return BandBlocks(
         blocks.part(np.flatnonzero(driven[blocks.point])),
-        2 * np.pi * np.concatenate([point.plan.frequencies for point in points]),
+        2 * np.pi * np.concatenate([point.frequencies for point in points]),
         driven,
         np.where(quiet, np.nan_to_num(coherent) > _LEAST_COHERENCE, strong),
         np.array(turning),
@@ -132,7 +133,7 @@ def _run_rows(
     present = np.array([channel is not None for channel in channels])
     places = [-1 if channel is None else names.index(channel.name) for channel in channels]
     gain = np.array([1.0 if c is None else warm_gain(c, temperature) for c in channels])
-    responses = [line_response(runs, bins, _INSTRUMENTS[point.method][turn], point.open) for bins in point.plan.bins]
+    responses = [line_response(runs, bins, _INSTRUMENTS[point.method][turn], point.open) for bins in point.bins]
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
     time = 0.5 * len(runs[0].phasors.start) * runs[0].phasors.length
     groups = []

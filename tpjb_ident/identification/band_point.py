@@ -30,22 +30,23 @@ _LEAST_LINES = 3
 
 
 @dataclass(frozen=True)
-class LinePlan:
-    """Bins of every line: one of a period, or some neighbouring ones of a whole record."""
-
-    bins: tuple[IntArray, ...]
-    frequencies: FloatArray  #: (n_lines,), Hz
-    resolution: float  #: Hz: width of a line
-
-
-@dataclass(frozen=True)
 class BandPoint:
     """Runs at one operating point, excited alike and transformed."""
 
     point: OperatingPoint
     kind: str
     spectra: list[RunSpectra]
-    plan: LinePlan
+    bins: tuple[IntArray, ...]  #: of every line: one of a period, or some neighbouring ones of a whole record
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Of the lines, (n_lines,) [Hz]."""
+        return np.array([self.spectra[0].frequencies[bins].mean() for bins in self.bins])
+
+    @property
+    def resolution(self) -> float:
+        """Width of a line [Hz]."""
+        return max(map(len, self.bins), default=1) / self.spectra[0].phasors.length
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -93,7 +94,7 @@ class BandPoint:
     @cached_property
     def classic(self) -> list[ClassicLine]:
         """Every line by the methods of analysers."""
-        return [classic_line(self.spectra, bins, self.open) for bins in self.plan.bins]
+        return [classic_line(self.spectra, bins, self.open) for bins in self.bins]
 
 
 def read_point(
@@ -116,7 +117,7 @@ def read_point(
         return None, unusable
     _refuse_unlike(spectra)
     point = replace(first.point, excitation=0.0)
-    return BandPoint(point, first.excitation_kind, spectra, line_plan(spectra)), unusable
+    return BandPoint(point, first.excitation_kind, spectra, bins_of_lines(spectra)), unusable
 
 
 def _common_band(runs: Sequence[Run]) -> tuple[float, float]:
@@ -153,25 +154,19 @@ def band_groups(runs: Sequence[Run]) -> list[list[Run]]:
     return [groups[key] for key in sorted(groups, key=repr)]
 
 
-def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
-    """Lines of runs that have the same bins."""
-    frequencies = spectra[0].frequencies
+def bins_of_lines(spectra: Sequence[RunSpectra]) -> tuple[IntArray, ...]:
+    """Bins of the lines of runs that have the same bins."""
     free = ~np.any([s.disturbed for s in spectra], axis=0)
-    period = spectra[0].period
-    if period is not None:
-        chosen = np.flatnonzero(free)
-        return LinePlan(tuple(np.split(chosen, len(chosen))), frequencies[chosen], 1 / period)
-    n = len(frequencies)
-    width = max(_BINS, math.ceil(n / _LINES))
-    count = n // width
+    if spectra[0].period is not None:
+        return tuple(np.flatnonzero(free)[:, None])
+    n = len(free)
+    count = n // max(_BINS, math.ceil(n / _LINES))
     if count < _LEAST_LINES:
-        have = 1 / (frequencies[1] - frequencies[0]) if n > 1 else 0.0
+        have = spectra[0].phasors.length
         need = have * _LEAST_LINES * _BINS / max(n, 1)
         raise BadInputError(
             f"run {spectra[0].phasors.run}: {have:.3g} s resolve {n} bins of its band, {_LEAST_LINES * _BINS} are "
             f"needed; record {need:.3g} s or excite a wider band"
         )
     lines = [part[free[part]] for part in np.array_split(np.arange(n), count)]
-    bins = tuple(part for part in lines if len(part) >= _LEAST_BINS)
-    middles = np.array([frequencies[part].mean() for part in bins])
-    return LinePlan(bins, middles, width * float(frequencies[1] - frequencies[0]))
+    return tuple(part for part in lines if len(part) >= _LEAST_BINS)

@@ -184,7 +184,7 @@ def _result(
     by_noise = [replace(p, stiffness=replace(p.stiffness, dof=dof)) for p, dof in zip(points, free)]
     fits = fits_over_frequency(by_noise, _shared(solved, parts)[0])
     models, chosen = (fits[0].fits, fits[0].supported) if fits else ({}, "raw H")
-    figures = data.names, data.spectra[0].period, data.plan.resolution, tuple(points)
+    figures = data.names, data.spectra[0].period, data.resolution, tuple(points)
     return BandResult(data.point, data.kind, lines, models, chosen, quality, *figures), parts
 
 
