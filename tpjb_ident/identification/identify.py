@@ -131,10 +131,8 @@ def _joined(sines: Identification, bands: Identification) -> Identification:
 
 def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySettings:
     lines = settings.phasors.lines
-    mains = mains_frequency(campaign, lines.mains)
-    if mains == lines.mains:
-        return settings
-    return replace(settings, phasors=replace(settings.phasors, lines=replace(lines, mains=mains)))
+    lines = replace(lines, mains=mains_frequency(campaign, lines.mains))
+    return replace(settings, phasors=replace(settings.phasors, lines=lines))
 
 
 def assemble(

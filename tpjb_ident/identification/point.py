@@ -119,7 +119,7 @@ def _estimate(
         estimate = replace(estimate, systematic=estimate.systematic + solved.in_cells[p])
     weights = windows.weights * run_weight[data.run_index]
     runs = int((run_weight > 0).sum())
-    flags = fit_conditions(means.condition, weights[means.usable], runs)
+    flags = fit_conditions(means.condition, weights[data.whole], runs)
     estimate = replace(
         estimate,
         weights=np.repeat(weights[:, None], 2, axis=1),

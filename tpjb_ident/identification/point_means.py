@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.vector import directions, plane_vector
 from tpjb_ident.conditions import Condition
@@ -33,7 +33,6 @@ class PointMeans:
     channels: tuple[tuple[Channel | None, ...], ...]  #: (g, m): None where a run says nothing of a sensor
     condition: float
     residual: tuple[ComplexArray, float] = field(repr=False)  #: density of the noise (m, m) and its degrees of freedom
-    usable: BoolArray = field(repr=False)  #: (n,): windows with a drive and a phasor of every channel of their run
     status: tuple[Condition, ...] = ()
     shaft: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (g,): NaN where it is not on the line
     shaft_conditions: tuple[Condition, ...] = ()
@@ -70,9 +69,7 @@ def point_means(task: MeansTask, data: PointData) -> PointMeans:
     condition = displacement_condition(table.D, weights[table.valid])
     shaft, conditions = _shaft(data, means, task)
     residual = _residual_density(data, task, means, film)
-    usable = np.asarray(np.isfinite(np.where(present[data.run_index], z, 0.0)).all(axis=1))
-    more = (status, shaft, conditions)
-    return PointMeans(start, means, channels, condition, residual, usable, *more)
+    return PointMeans(start, means, channels, condition, residual, status, shaft, conditions)
 
 
 def _film(task: MeansTask, mass: float) -> FloatArray:
