@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import fdtri
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.noise import unbiased_noise
 
@@ -25,8 +24,6 @@ _NOTHING = 1e-9
 _FREEDOM = 65.0
 #: Phase sets that show the distortion of a multi-sine, and likeness from which two are one.
 _SETS, _ALIKE = 3, 0.6
-#: Chance below which noise alone does not make a response.
-_CHANCE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -153,12 +150,3 @@ def pooled_noise(responses: list[LineResponse]) -> tuple[list[ComplexArray], Flo
         noises.append(unbiased_noise(residual[near].sum(axis=0) / total, total))
         totals.append(total)
     return noises, np.array(totals)
-
-
-def stands_out(z: ComplexArray, noise: ComplexArray, freedom: float, present: BoolArray) -> bool:
-    """Whether responses (k, m) are more than the noise of their rows (m, m)."""
-    z, noise = z[:, present], noise[np.ix_(present, present)]
-    scale = np.sqrt(np.maximum(np.einsum("jj->j", noise).real, 1e-30 * np.max(np.abs(z) ** 2, axis=0) + 1e-300))
-    white = noise / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
-    share = np.einsum("kj,ji,ki->k", (z / scale).conj(), np.linalg.inv(white), z / scale).real / len(scale)
-    return bool(np.max(share, initial=0.0) > fdtri(2 * len(scale), max(2 * freedom, 1.0), 1 - _CHANCE))

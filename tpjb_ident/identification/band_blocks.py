@@ -9,7 +9,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.bands.film_products import film_products
-from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_noise, stands_out
+from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_noise
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.sensors import alive
@@ -36,8 +36,8 @@ class BandBlocks:
 
     blocks: Blocks = field(repr=False)
     omega: FloatArray  #: (L,), rad/s: of every line
-    driven: BoolArray  #: (L,): whether an excitation stands above the noise
-    clear: BoolArray  #: (L,): whether it does so by far in both directions
+    driven: BoolArray  #: (L,): whether an excitation stands above the noise in one direction
+    clear: BoolArray  #: (L,): and in both
     turning: FloatArray  #: (B,): relative scatter of the film's force from run to run with the shaft's angle
 
     @property
@@ -81,16 +81,15 @@ def band_blocks(
     bent, _, turning = zip(*films)
     band = np.repeat(np.arange(len(points)), [len(point.bins) for point in points])
     blocks = stacked(operating, runs, len(sensors), rows, np.array(bent)[band], band)
-    stands = np.array([row["stands"] for row in rows], dtype=bool)
-    driven = np.isin(np.arange(len(band)), blocks.point[stands])
+    weak, strong = _strengths(Rig(sensors, 1.0), blocks).T
+    driven = strong > STRONG
     coherent = np.array([classic.coherence.min() for point in points for classic in point.classic])
-    strong = _strengths(Rig(sensors, 1.0), blocks) > STRONG
     quiet = np.array([point.method == "hv" for point in points])[band]
     return BandBlocks(
         blocks.part(np.flatnonzero(driven[blocks.point])),
         2 * np.pi * np.concatenate([point.frequencies for point in points]),
         driven,
-        np.where(quiet, np.nan_to_num(coherent) > _LEAST_COHERENCE, strong),
+        np.where(quiet, np.nan_to_num(coherent) > _LEAST_COHERENCE, weak > STRONG),
         np.array(turning),
     )
 
@@ -130,7 +129,6 @@ def _run_rows(
 ) -> list[list[dict[str, object]]]:
     """Columns of the responses of one run, group by group."""
     names = [channel.name for channel in runs[0].phasors.channels]
-    present = np.array([channel is not None for channel in channels])
     places = [-1 if channel is None else names.index(channel.name) for channel in channels]
     gain = np.array([1.0 if c is None else warm_gain(c, temperature) for c in channels])
     responses = [line_response(runs, bins, _INSTRUMENTS[point.method][turn], point.open) for bins in point.bins]
@@ -144,20 +142,19 @@ def _run_rows(
         covariance = np.asarray(single / response.count, complex)
         z, slope = (np.pad(rows, ((0, 0), (0, 1)))[:, places] / gain for rows in (response.z, response.slope))
         row = {"noise": covariance, "dof": freedom, "time": time, "windows": response.repeats}
-        row["stands"] = stands_out(z, covariance, freedom, present)
         moving = zip(z, slope, response.slope_size)
         groups.append([row | {"z": a, "slope": change, "slope_noise": single * size} for a, change, size in moving])
     return groups
 
 
 def _strengths(rig: Rig, blocks: Blocks) -> FloatArray:
-    """F ratio of every line's weaker direction of motion over its noise, (L,)."""
+    """F ratios of every line's weaker and stronger direction of motion over its noise, (L, 2)."""
     probes = rig.of("displacement")
     plane = np.linalg.pinv(blocks.along[:, probes] * blocks.present[:, probes, None])
     noise = plane @ blocks.noise[:, probes][:, :, probes] @ plane.transpose(0, 2, 1)
     size = np.sqrt(np.maximum(np.einsum("nii->n", noise).real / 2, 1e-300))
     white = np.nan_to_num(vector(rig, blocks, "displacement")) / size[:, None]
-    return np.asarray(np.linalg.eigvalsh(line_products(blocks, white, white))[:, 0] / 2)
+    return np.asarray(np.linalg.eigvalsh(line_products(blocks, white, white)) / 2)
 
 
 def line_products(blocks: Blocks, first: ComplexArray, second: ComplexArray) -> ComplexArray:

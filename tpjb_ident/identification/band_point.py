@@ -54,9 +54,9 @@ class BandPoint:
         return tuple(s.phasors.run for s in self.spectra)
 
     @property
-    def has_accelerometers(self) -> bool:
-        """Whether they measure the housing's inertia."""
-        return self.spectra[0].phasors.acceleration is not None
+    def inertia(self) -> float:
+        """Housing mass whose inertia stays in the cells' force [kg]: none where accelerometers measure it."""
+        return self.spectra[0].phasors.housing_mass if self.spectra[0].phasors.acceleration is None else 0.0
 
     @property
     def temperatures(self) -> dict[int, float]:

@@ -30,7 +30,7 @@ from tpjb_ident.results.frequency_model import fits_over_frequency
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.results.linearity import FilmChange, change_conditions
 from tpjb_ident.results.point_result import PointResult, of_runs
-from tpjb_ident.results.quality import differing_runs, feeds_motion
+from tpjb_ident.results.quality import differing_runs, physics
 from tpjb_ident.rounding import listed
 from tpjb_ident.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.runs.finished_runs import ExcludedRun, excluded_runs, without_runs
@@ -220,7 +220,7 @@ def _point(solved: SolvedBands, q: int, quality: tuple[Condition, ...], clearanc
         outlier_fraction=0.0,
         coherence=float(np.median([line.coherence.min() for line in inside])) if inside else float("nan"),
         amplitude=amplitude,
-        quality=merged(quality, feeds_motion(est), bent),
+        quality=merged(quality, physics(est, point.inertia), bent),
         rejected=(),
         load_miss=solved.loads.misses[b],
         clearance=clearance,
@@ -231,18 +231,17 @@ def _point(solved: SolvedBands, q: int, quality: tuple[Condition, ...], clearanc
 
 def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Condition, ...]:
     """What the lines of one band say, and its runs beside each other."""
-    driven = np.flatnonzero((solved.data.band == b) & solved.data.driven)
-    usable = solved.usable(b)
+    mine = solved.data.band == b
+    driven, usable = np.flatnonzero(mine & solved.data.driven), solved.usable(b)
     condition = float(np.median(solved.first.condition[driven])) if len(driven) else 0.0
     alike, few = condition > ONE_LINE, len(usable) < max(_LEAST_LINES * len(driven), 1)
     one_line = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
-    weak = f"{len(usable)} of {len(driven)} driven lines stand {STRONG:g} times (F ratio) above the noise"
+    weak = f"{len(usable)} of {mine.sum()} lines stand {STRONG:g} times (F ratio) above the noise"
     spectra = point.spectra[0]
     low, high = spectra.frequencies[0], spectra.frequencies[-1]
     held = [f"{d.name} {d.frequency:.4g} Hz" for d in spectra.disturbances if low <= d.frequency <= high]
     bare = solved.rig.bare
     unknown = int((~bare.known(solved.data.omega[usable])).sum()) if len(bare.omega) else 0
-    uncorrected = not point.has_accelerometers and spectra.phasors.housing_mass > 0
     blind = point.method == "hv" and len(usable) > 0
     coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0
     text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"
@@ -256,6 +255,5 @@ def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Cond
             (blind, "no-instrument", text),
             (coherent < MIN_COHERENCE, "low-coherence", f"{coherent:.2f}, median over the band"),
             (unknown, "baseline-missing", f"at {unknown} of {len(usable)} lines of the band"),
-            (uncorrected, "inertia-not-corrected", "no accelerometers"),
         ),
     )

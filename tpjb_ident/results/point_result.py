@@ -132,8 +132,8 @@ class Recorded(Protocol):
         """Mean film temperature per pad [K]."""
 
     @property
-    def has_accelerometers(self) -> bool:
-        """Whether they measure the housing's inertia."""
+    def inertia(self) -> float:
+        """Housing mass whose inertia stays in the cells' force [kg]."""
 
 
 def of_runs(recorded: Recorded) -> dict[str, Any]:
@@ -147,5 +147,5 @@ def of_runs(recorded: Recorded) -> dict[str, Any]:
         "temperatures": recorded.temperatures,
         "n_records": runs,
         "runs": recorded.names,
-        "inertia_corrected": recorded.has_accelerometers,
+        "inertia_corrected": not recorded.inertia,
     }

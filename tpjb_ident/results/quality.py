@@ -86,18 +86,9 @@ def _shift(z: ComplexArray, repeats: ComplexArray) -> float:
 
 def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tuple[Condition, ...]:
     """Conditions that the point's figures give rise to."""
-    answered, first = bool(np.isfinite(stiffness.h).all()), data.runs[0]
-    low = answered and not coherence >= MIN_COHERENCE
-    # where nothing measures the housing's inertia: on soft cells
-    share = first.housing_mass * stiffness.omega**2 * SOFT * 1e-9
-    name = "inertia-not-corrected" if share > HARMLESS else "inertia-negligible"
-    text = f"no accelerometers: the housing's inertia stays in F, {100 * share:.2g} % of it on soft cells"
-    return (
-        *holding((low, "low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}")),
-        *_missing(data),
-        *holding((answered and first.acceleration is None, name, text)),
-        *feeds_motion(stiffness),
-    )
+    low = np.isfinite(stiffness.h).all() and not coherence >= MIN_COHERENCE
+    text = f"coherence {coherence:.3f} < {MIN_COHERENCE}"
+    return (*holding((low, "low-coherence", text)), *_missing(data), *physics(stiffness, data.inertia))
 
 
 def _missing(data: PointData) -> tuple[Condition, ...]:
@@ -121,14 +112,20 @@ def _in_stretch(run: RunPhasors) -> BoolArray:
     return (run.start >= run.span[0] - 1e-9) & (run.start + run.length <= run.span[1] + 1e-9)
 
 
-def feeds_motion(stiffness: DynamicStiffness) -> tuple[Condition, ...]:
-    """Say where damping, the symmetric part of Im h, is negative beyond doubt: no cross-coupled stiffness is in it."""
-    damping = stiffness.h.imag + stiffness.h.imag.T
+def physics(stiffness: DynamicStiffness, inertia: float) -> tuple[Condition, ...]:
+    """Say whether `inertia` [kg] stays in the force, which nothing measures: on soft cells.
+
+    And where damping, the symmetric part of Im h, is negative beyond doubt: no cross-coupled stiffness is in it.
+    """
     if not np.isfinite(stiffness.h).all():
         return ()
-    negative = np.linalg.eigvalsh(damping / 2)[0] < -3 * float(stiffness.standard_error[4:].max())
+    share = inertia * stiffness.omega**2 * SOFT * 1e-9
+    name = "inertia-not-corrected" if share > HARMLESS else "inertia-negligible"
+    remains = f"no accelerometers: the housing's inertia stays in F, {100 * share:.2g} % of it on soft cells"
+    damping = np.linalg.eigvalsh((stiffness.h.imag + stiffness.h.imag.T) / 2)[0]
     text = "the film would feed the motion instead of damping it: check polarity, axes and sign of forces"
-    return holding((negative, "negative-damping", text))
+    negative = damping < -3 * float(stiffness.standard_error[4:].max())
+    return holding((inertia > 0, name, remains), (negative, "negative-damping", text))
 
 
 def directional_pattern(data: PointData, weights: FloatArray) -> tuple[Condition, ...]:

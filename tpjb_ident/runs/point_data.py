@@ -41,7 +41,7 @@ class PointData:
     @property
     def mass(self) -> float:
         """Housing mass whose inertia is in F [kg]: zero where no accelerometer measures it."""
-        return self.runs[0].housing_mass if self.has_accelerometers else 0.0
+        return self.runs[0].housing_mass - self.inertia
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -49,9 +49,9 @@ class PointData:
         return tuple(run.run for run in self.runs)
 
     @property
-    def has_accelerometers(self) -> bool:
-        """Whether they measure the housing's inertia."""
-        return self.runs[0].acceleration is not None
+    def inertia(self) -> float:
+        """Housing mass whose inertia stays in the cells' force [kg]: none where accelerometers measure it."""
+        return self.runs[0].housing_mass if self.runs[0].acceleration is None else 0.0
 
     @property
     def temperatures(self) -> dict[int, float]:
