@@ -28,7 +28,7 @@ CASES = {
 def test_runs_brought_to_their_set_points_obey_h(name):
     rig, blocks, truth = made(CASES[name])
     solution = solved(rig, blocks, truth)
-    D, F = at_set_point(rig, blocks, solution)
+    D, F = at_set_point(solution)
     raw = vector(rig, blocks, "force") + rig.mass * vector(rig, blocks, "acceleration")
     off = misfit(truth[blocks.point], D, F)
     assert off < 2e-3
@@ -45,7 +45,7 @@ def test_mains_that_is_found_there_is_what_struck_the_probes():
     """Six runs of one point, one pick-up of unknown phase a run: H and its phases together, from cleaned readings."""
     rig, blocks, truth = made(Case(noise=0.0, loads=(5000.0,), directions=6))
     assert truth.shape[1:] == FILM_H.shape
-    D, F = at_set_point(rig, blocks, solved(rig, blocks, truth))
+    D, F = at_set_point(solved(rig, blocks, truth))
     rng = np.random.default_rng(4)
     pattern = 0.03 * np.median(np.abs(D)) * np.array([[1.0, 0.4 - 0.3j]])
     vectors = np.exp(2j * np.pi * rng.random((6, 1))) * pattern

@@ -58,8 +58,8 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
         terms = [term(rig, blocks) for term in (Gain, Axis, Delay, Corner, Housing, Tilt)]
         return Solver(rig, blocks, terms, start, shape).run()
 
-    learnt, solution = solved_as_learnt(rig, solve)
-    _check_accelerometers(observations, learnt, blocks, solution)
+    solution = solved_as_learnt(rig, solve)
+    _check_accelerometers(observations, solution)
     return solution
 
 
@@ -84,8 +84,9 @@ def _blocks(sensors: Sequence[Sensor], runs: Sequence[Observation]) -> Blocks:
     return replace(blocks, present=blocks.present & alive(sensors, np.abs(blocks.z).max(axis=0), _DEAD))
 
 
-def _check_accelerometers(observations: Sequence[Observation], rig: Rig, blocks: Blocks, solution: Solution) -> None:
+def _check_accelerometers(observations: Sequence[Observation], solution: Solution) -> None:
     """Name the runs whose acceleration is not what springs, or the floating housing, make of it in the others."""
+    rig, blocks = solution.rig, solution.blocks
     housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
     rows = rig.of("acceleration")
     if len(rows) != 2 or housing is None or housing.is_on_foundation(solution.fitted[housing.name]):

@@ -57,6 +57,7 @@ class Solution:
     fitted: dict[str, Fitted] = field(repr=False)
     terms: tuple[Term, ...] = field(repr=False)  #: those with parameters
     all_terms: tuple[Term, ...] = field(repr=False)
+    rig: Rig = field(repr=False)
     blocks: Blocks = field(repr=False)
     group: IntArray = field(repr=False)  #: of every point
     scatter: Scatter = field(repr=False)
@@ -315,6 +316,7 @@ class Solver:
             fitted,
             self.terms,
             self.all_terms,
+            self.rig,
             self.blocks,
             self.shape.group,
             self.scatter,

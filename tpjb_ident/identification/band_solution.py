@@ -39,7 +39,6 @@ ONE_LINE = 1e6
 class BandSolution:
     """All bands of a campaign; L lines."""
 
-    rig: Rig
     lines: Solution = field(repr=False)
     usable: BoolArray = field(repr=False)  #: (L,): lines that the excitation tells
     parts: tuple[IntArray, ...]  #: lines of every part: h is that at the middle one
@@ -53,15 +52,15 @@ def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
     crude, condition = _crude(rig, data)
     used = data.driven & (condition < ONE_LINE)
     usable = used & data.clear
-    rig, lines, size = _lines(rig, data, np.where(usable[:, None, None], crude, np.nan))
+    lines, size = _lines(rig, data, np.where(usable[:, None, None], crude, np.nan))
     away = np.abs(lines.h - crude).max(axis=(1, 2))
     usable &= away < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
     parts = _parts(data, used, usable)
-    return BandSolution(rig, lines, usable, parts, _part_solution(rig, data, lines, parts, usable), condition, size)
+    return BandSolution(lines, usable, parts, _part_solution(data, lines, parts, usable), condition, size)
 
 
-def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Rig, Solution, float]:
-    """H of the lines, the rig as they show it, and the scatter of the runs' gains."""
+def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Solution, float]:
+    """H of the lines, with the rig as they show it, and the scatter of the runs' gains."""
     by_load, spare = _own_scatter(data, rig.to_set_point)
     lines = np.arange(len(data.omega))
     # lines of one run stand for many runs: none is judged
@@ -77,8 +76,7 @@ def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Rig, Soluti
         term = next(t for t in solution.terms if isinstance(t, RunGain))
         size, freedom = term.scatter(solution.fitted[term.name], by_load, _USUAL)
         widening = student_widening(freedom)
-    rig, solution = solved_as_learnt(rig, lambda rig: solved(rig, size * widening))
-    return rig, solution, size * float(spare.any())
+    return solved_as_learnt(rig, lambda rig: solved(rig, size * widening)), size * float(spare.any())
 
 
 def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArray]:
@@ -123,9 +121,7 @@ def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[IntArr
     return tuple(parts)
 
 
-def _part_solution(
-    rig: Rig, data: BandBlocks, lines: Solution, parts: Sequence[IntArray], usable: BoolArray
-) -> Solution:
+def _part_solution(data: BandBlocks, lines: Solution, parts: Sequence[IntArray], usable: BoolArray) -> Solution:
     """The solve of the parts, a group each, from the curve of K-C-M nearest to the `usable` lines of a band."""
     start = np.full_like(lines.h, np.nan)
     columns = power_columns(data.omega / np.median(data.omega), MODELS["K-C-M"])
@@ -140,4 +136,4 @@ def _part_solution(
             start[part] = lines.h[part]
     start[group == len(parts)] = np.nan
     shape = Shape(group, None, count, lines.scatter.fixed(count, lines.scatter.weights), lines.fitted)
-    return solve(rig, lines.blocks, start, shape)
+    return solve(lines.rig, lines.blocks, start, shape)

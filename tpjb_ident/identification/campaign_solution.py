@@ -38,13 +38,10 @@ _LEAST_SCATTER = 1e-3
 class CampaignSolution:
     """H of every point of a campaign, and what was put right on the way."""
 
-    rig: Rig
     task: MeansTask
-    blocks: Blocks = field(repr=False)
     means: tuple[PointMeans, ...] = field(repr=False)
     loads: StaticLoads = field(repr=False)
     film: tuple[FilmChange, ...]
-    start: ComplexArray = field(repr=False)  #: (P, 2, 2), N/m
     solution: Solution = field(repr=False)
     mains_shift: ComplexArray = field(repr=False)  #: (n, m), SI: pick-up taken off the blocks' readings
     pickup: Pickup | None = None
@@ -84,20 +81,20 @@ def solve_campaign(
             campaign, loads.doubted(sensors), blocks, loads.common, bare=bare, rates=rates, to_set_point=correct
         )
         start = np.array([point.start for point in means]) - bare.at(np.array([data.omega for data in points]))
-        rig, solution = solved_as_learnt(rig, lambda rig: solve(rig, blocks, start))
-        return CampaignSolution(rig, task, blocks, means, loads, film, start, solution, np.zeros_like(blocks.z))
+        solution = solved_as_learnt(rig, lambda rig: solve(rig, blocks, start))
+        return CampaignSolution(task, means, loads, film, solution, np.zeros_like(blocks.z))
 
     rate = min((digest.sample_rate for digest in digests if digest.sample_rate > 0), default=np.inf)
     last = solved_with_clocks(sensors, rate, solved)
-    blocks = last.blocks
+    solution, blocks = last.solution, last.solution.blocks
     force = force_pickup([digest.mains_force for digest in digests])
     on_line = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE) and p in blocks.point]
-    pickup, fits = _mains(on_line, digests, last, force) if correct and on_line else (None, {})
+    pickup, fits = _mains(on_line, digests, solution, force) if correct and on_line else (None, {})
     if fits:
-        shift = _mains_readings(last.rig, blocks, fits)
-        again = solve(last.rig, replace(blocks, z=blocks.z - shift), last.start)
+        shift = _mains_readings(solution.rig, blocks, fits)
+        again = solve(solution.rig, replace(blocks, z=blocks.z - shift), solution.h)
         last = replace(last, solution=again, mains_shift=shift, pickup=pickup, mains=fits)
-    D = vector(last.rig, blocks, "displacement")
+    D = vector(solution.rig, blocks, "displacement")
     in_cells = {p: force_pickup_spread(D[blocks.point == p], force) for p in on_line if force.any()}
     return replace(last, in_cells=in_cells)
 
@@ -108,15 +105,15 @@ def _film(data: PointData, point: PointMeans) -> FilmChange:
 
 
 def _mains(
-    points: Sequence[int], digests: Sequence[RunDigest], solved: CampaignSolution, force: FloatArray
+    points: Sequence[int], digests: Sequence[RunDigest], solution: Solution, force: FloatArray
 ) -> tuple[Pickup | None, dict[int, MainsFit]]:
     """Angles of the mains at the points on whose line it is; `force` (2,): mains in the cells [N]."""
-    rig, blocks, solution = solved.rig, solved.blocks, solved.solution
+    rig, blocks = solution.rig, solution.blocks
     across = blocks.along[0, rig.of("displacement")]
     pickup = mains_pickup([digest.mains for digest in digests], np.arctan2(across[:, 1], across[:, 0]))
     if pickup is None:
         return None, {}
-    D, F = at_set_point(rig, blocks, solution)
+    D, F = at_set_point(solution)
     free = ~np.isin(blocks.point, points) & np.isfinite(F).all(axis=1)
     residual = F - np.einsum("nij,nj->ni", solution.h[blocks.point], D)
     share = np.sum(np.abs(residual) ** 2, axis=1) / 2 / np.sum(np.abs(F) ** 2, axis=1)
@@ -133,8 +130,9 @@ def _mains(
     return pickup, fits
 
 
-def at_set_point(rig: Rig, blocks: Blocks, solution: Solution) -> tuple[ComplexArray, ComplexArray]:
+def at_set_point(solution: Solution) -> tuple[ComplexArray, ComplexArray]:
     """Displacement and oil force (n, 2) of every block, as they would be at the set point."""
+    rig, blocks = solution.rig, solution.blocks
     clean = replace(blocks, z=(blocks.z - solution.shift) / solution.factor)
     D = vector(rig, clean, "displacement")
     return D, film_force(rig, clean) - np.einsum("nij,nj->ni", solution.run_change, D)

@@ -45,12 +45,13 @@ def solved_with_clocks(
     are taken at their times; one that was found started within a sample of the first.
     """
     answer = solve(sensors, {})
-    sensors, rates = with_found_devices(sensors, answer.blocks, START / rate)
+    sensors, rates = with_found_devices(sensors, answer.solution.blocks, START / rate)
     if rates:
         answer = solve(sensors, rates)
     for _ in range(_CLOCK_PASSES if len({sensor.device for sensor in sensors}) > 1 else 0):
-        more = Clock(answer.rig, answer.blocks).rates(answer.solution.fitted[Clock.name].value)
-        turn = max(map(abs, more.values())) * float((2 * answer.blocks.time * answer.blocks.omega).max())
+        solution, blocks = answer.solution, answer.solution.blocks
+        more = Clock(solution.rig, blocks).rates(solution.fitted[Clock.name].value)
+        turn = max(map(abs, more.values())) * float((2 * blocks.time * blocks.omega).max())
         if turn < _TURNED:
             break
         rates = {device: rates.get(device, 0.0) + change for device, change in more.items()}

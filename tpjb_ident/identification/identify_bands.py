@@ -12,7 +12,7 @@ from tpjb_ident.bands.classic import ClassicLine
 from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import Condition, holding, merged
-from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, Sensor
+from tpjb_ident.estimate.blocks import RigStiffness, Sensor
 from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
 from tpjb_ident.estimate.shape import real_numbers
 from tpjb_ident.estimate.solve import Solution
@@ -60,16 +60,6 @@ class SolvedBands:
     def first(self) -> BandSolution:
         """The solve that counts, or the lower of two."""
         return self.solutions[0]
-
-    @property
-    def rig(self) -> Rig:
-        """As the solve that counts knows it."""
-        return self.first.rig
-
-    @property
-    def blocks(self) -> Blocks:
-        """Of the solve that counts."""
-        return self.data.blocks
 
     @property
     def solution(self) -> Solution:
@@ -192,7 +182,9 @@ def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
     """One line by the method that counts, and by the others: how runs scatter is no matter of the method."""
     solutions, classic = [s.lines for s in solved.solutions], solved.classic[k]
     best, budget = solved.estimate(solutions, k, np.array([k]), point.method)
-    alternatives = {name: value - solved.rig.bare.at(np.array([best.omega]))[0] for name, value in classic.h.items()}
+    alternatives = {
+        name: value - solved.solution.rig.bare.at(np.array([best.omega]))[0] for name, value in classic.h.items()
+    }
     if _BRACKET in budget:
         alternatives |= {"h1": solutions[0].h[k], "h2": solutions[-1].h[k]}
     table = {point.method: best}
@@ -209,7 +201,7 @@ def _point(solved: SolvedBands, q: int, quality: tuple[Condition, ...], clearanc
     est, budget = solved.estimate([s.part for s in solved.solutions], q, lines, f"band-{point.method}")
     inside = [solved.classic[k] for k in np.intersect1d(lines, solved.usable(b))]
     amplitude = max(s.amplitude for s in point.spectra)
-    share = float(solved.blocks.bent[lines[0]])
+    share = float(solved.data.blocks.bent[lines[0]])
     bent = change_conditions(FilmChange(share), share, est, amplitude, clearance)
     return PointResult(
         **of_runs(point),
@@ -240,7 +232,7 @@ def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Cond
     spectra = point.spectra[0]
     low, high = spectra.frequencies[0], spectra.frequencies[-1]
     held = [f"{d.name} {d.frequency:.4g} Hz" for d in spectra.disturbances if low <= d.frequency <= high]
-    bare = solved.rig.bare
+    bare = solved.solution.rig.bare
     unknown = int((~bare.known(solved.data.omega[usable])).sum()) if len(bare.omega) else 0
     blind = point.method == "hv" and len(usable) > 0
     coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0

@@ -74,8 +74,8 @@ class PointTask:
 
 def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare:
     """The part of a campaign's solution that belongs to point `p`."""
-    blocks, solution, means = solved.blocks, solved.solution, solved.means[p]
-    runs, m = len(data.runs), len(solved.rig)
+    solution, blocks, means = solved.solution, solved.solution.blocks, solved.means[p]
+    runs, m = len(data.runs), len(solution.rig)
     shift, factor = np.zeros((runs, m), complex), np.ones((runs, m), complex)
     change, weight = np.zeros((runs, 2, 2), complex), np.zeros(runs)
     names, mine = [run.run for run in data.runs], np.flatnonzero(blocks.point == p)
@@ -107,7 +107,7 @@ def _estimate(
     windows = means.means
     if not np.isfinite(solution.h[p]).all() or windows is None:
         return None, {}
-    omega = float(np.median(solved.blocks.omega[solution.blocks_of(p)]))
+    omega = float(np.median(solution.blocks.omega[solution.blocks_of(p)]))
     estimate, budget = estimate_of(solution, p, solved.h[p], omega, SOLVED, RUN_TERMS)
     if p in solved.mains:
         fit = solved.mains[p]

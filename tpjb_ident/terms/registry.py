@@ -58,11 +58,11 @@ def learnt_rig(rig: Rig, solution: Solution) -> Rig:
     return rig
 
 
-def solved_as_learnt(rig: Rig, solve: Callable[[Rig], Solution]) -> tuple[Rig, Solution]:
-    """Solve, and once more where records contradict what is stated of the rig: it as they show it, and its solution."""
+def solved_as_learnt(rig: Rig, solve: Callable[[Rig], Solution]) -> Solution:
+    """Solve, and once more with the rig as the records show it, where they contradict what is stated of it."""
     solution = solve(rig)
     learnt = learnt_rig(rig, solution)
-    return (rig, solution) if learnt is rig else (learnt, solve(learnt))
+    return solution if learnt is rig else solve(learnt)
 
 
 def cell_stiffness(solution: Solution) -> tuple[float, float] | None:
