@@ -152,19 +152,18 @@ def stacked(
     band: IntArray | None = None,
 ) -> Blocks:
     """Blocks of rows, each what is known of it by name; one that is said nothing else of is a single still window."""
-    m = sensors
-    usual: dict[str, Any] = dict.fromkeys(("z", "slope"), np.zeros(m, complex)) | dict.fromkeys(("point", "run"), 0)
-    usual |= {"omega": 0.0, "present": np.zeros(m, dtype=bool), "along": np.zeros((m, 2)), "dof": 1.0, "windows": 1.0}
-    usual |= {"calibration": np.zeros(m, dtype=int), "noise": np.zeros((m, m), complex), "slope_noise": np.eye(m) + 0j}
-    usual |= {"time": 0.0, "temperature": np.nan, "shaft": np.nan + 0j, "uneven": np.zeros(2)}
-    usual |= {"miss": 0j, "miss_error": 0.0, "gain_scatter": 0.0}
-    columns = {
-        name: np.array([row.get(name, value) for row in rows], np.asarray(value).dtype).reshape(-1, *np.shape(value))
-        for name, value in usual.items()
-    }
-    bent = np.zeros(len(points)) if bent is None else bent
-    band = np.full(len(points), -1) if band is None else band
-    return Blocks(tuple(points), tuple(runs), bent=bent, band=band, **columns)
+    none, alone, zeros = np.zeros(sensors), np.full(len(points), -1), np.zeros(len(points))
+    still = {"slope": none + 0j, "slope_noise": np.eye(sensors) + 0j, "windows": 1.0, "time": 0.0}
+    usual = {"point": 0, "run": 0, "omega": 0.0, "z": none + 0j, "noise": np.diag(none) + 0j, "dof": 1.0, **still}
+    usual |= {"present": none > 0, "along": np.zeros((sensors, 2)), "calibration": none.astype(int)}
+    usual |= {"temperature": np.nan, "shaft": np.nan + 0j, "uneven": np.zeros(2), "gain_scatter": 0.0}
+    usual |= {"miss": 0j, "miss_error": 0.0}
+    columns = {}
+    for name, value in usual.items():
+        column = np.array([row.get(name, value) for row in rows], np.asarray(value).dtype)
+        columns[name] = column.reshape(-1, *np.shape(value))
+    of_points = {"bent": zeros if bent is None else bent, "band": alone if band is None else band}
+    return Blocks(tuple(points), tuple(runs), **columns, **of_points)
 
 
 def vector(rig: Rig, blocks: Blocks, quantity: str) -> ComplexArray:

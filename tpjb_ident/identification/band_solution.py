@@ -14,6 +14,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import Rig, film_force, vector
+from tpjb_ident.estimate.load_slope import slopes_over_load
 from tpjb_ident.estimate.noise import GAIN_OR_LOAD, UNKNOWN_EXPONENT
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.shape import MODELS, Shape, complex_matrix, least_squares, power_columns, real_numbers
@@ -61,7 +62,7 @@ def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
 
 def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Solution, float]:
     """H of the lines, with the rig as they show it, and the scatter of the runs' gains."""
-    by_load, spare = _own_scatter(data, rig.to_set_point)
+    by_load, spare = _own_scatter(rig, data, start)
     lines = np.arange(len(data.omega))
     # lines of one run stand for many runs: none is judged
     shape = Shape(lines, scatter=replace(Scatter.none(len(lines), len(data.blocks)), judges=False))
@@ -79,17 +80,14 @@ def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Solution, f
     return solved_as_learnt(rig, lambda rig: solved(rig, size * widening)), size * float(spare.any())
 
 
-def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArray]:
+def _own_scatter(rig: Rig, data: BandBlocks, h: ComplexArray) -> tuple[FloatArray, FloatArray]:
     """Scatter that a run's gain has by its missed load, which may be one, or do what nothing tells, by block (n,).
 
     And one for every run whose point has more than the two runs that h needs, else zero: what the film makes of the
     shaft's turning on the lines themselves differs from run to run as well, and would pass for a gain.
     """
     blocks = data.blocks
-    families: dict[tuple[object, ...], set[float]] = {}
-    for point in blocks.points:
-        families.setdefault(point.static_key[1:], set()).add(point.static_load)
-    alone = np.array([not correct or len(families[point.static_key[1:]]) < 2 for point in blocks.points], dtype=float)
+    alone = ~(slopes_over_load(blocks.points, h)[1] & rig.to_set_point)
     by_load = np.hypot(GAIN_OR_LOAD, UNKNOWN_EXPONENT * alone[blocks.point]) * np.abs(blocks.miss.real)
     band = blocks.band[blocks.point]
     runs = np.array([len(np.unique(blocks.run[band == b])) for b in range(len(data.turning))])
