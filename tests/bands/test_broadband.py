@@ -132,14 +132,13 @@ def test_noise_on_the_displacements_pulls_h1_down_and_leaves_the_command_s_estim
     assert ratio["h2"] > ratio["iv"]
 
 
-def test_what_the_displacement_or_the_force_explains_is_h1_and_h2():
+def test_what_the_displacement_explains_is_h1():
     """Without an instrument the responses of both runs together give what analysers give."""
     runs = bins(60, 0.3, 4)
     classic = classic_line(runs, np.arange(60), ends=True).h
-    for source, name in (("displacement", "h1"), ("force", "h2")):
-        z = line_response(runs, np.arange(60), source, ends=True).z
-        h = np.linalg.solve(z[:, :2], z[:, 2:]).T
-        assert np.abs(h - classic[name]).max() < 0.05 * np.abs(H).max()
+    z = line_response(runs, np.arange(60), "displacement", ends=True).z
+    h = np.linalg.solve(z[:, :2], z[:, 2:]).T
+    assert np.abs(h - classic["h1"]).max() < 0.05 * np.abs(H).max()
     assert classic["h1"][1, 1].real < classic["hv"][1, 1].real
     assert classic["h1"][1, 1].real < classic["h2"][1, 1].real
 

@@ -3,8 +3,8 @@
 Of a periodic excitation the mean over the periods, whose noise the periods show. Of any other the response to an
 instrument, by the local polynomial method: over a few bins the response and what the record's ends leak into its
 transform are straight lines, the excitation is not (Pintelon, Schoukens, Vandersteen and Barbe 2010,
-doi:10.1016/j.ymssp.2009.08.003). The instrument is the command. Without one it is the displacement (all noise is then
-taken to be the force's, H1) or the force (all is the displacement's, H2): truth lies between.
+doi:10.1016/j.ymssp.2009.08.003). The instrument is the command. Without one it is the displacement: all noise is then
+taken to be the force's, as H1 does.
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ class LineResponse:
 
 
 def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, ends: bool) -> LineResponse:
-    """Response over a group of bins; `instrument` is "periods", "command", "displacement" or "force".
+    """Response over a group of bins; `instrument` is "periods", "command" or "displacement".
 
     Runs are taken together where there is no instrument of their own: each moves the shaft along one line, and what it
     shows across that is noise.
@@ -83,7 +83,7 @@ def _sources(run: RunSpectra, instrument: str) -> tuple[ComplexArray, ComplexArr
         along = _driven(run)
         first, by_time = (part.command[0] @ along for part in parts if part.command is not None)
     else:
-        first, by_time = (part.D[0] if instrument == "displacement" else part.F[0] for part in parts)
+        first, by_time = (part.D[0] for part in parts)
     return first, by_time
 
 

@@ -1,4 +1,4 @@
-"""All bands of a campaign as blocks of the measurement equation: a point a group of bins, a block a run's response."""
+"""All bands of a campaign as blocks of the measurement equation: a point a line, a block a run's response."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,15 +17,15 @@ from tpjb_ident.estimate.term import worth_stating
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.campaign_blocks import channel_columns
 from tpjb_ident.identification.point_means import warm_gain
-from tpjb_ident.runs.static_load import missed_load
+from tpjb_ident.runs.static_load import StaticLoads, missed_load
 from tpjb_ident.terms.distortion import band_change, line_scatter
 
 #: F ratio from which an excitation tells the displacements from their noise,
 STRONG = 10.0
 #: and coherence of the force with the displacements where nothing else tells signal from noise.
 _LEAST_COHERENCE = 0.5
-#: What is taken for the source of motion: without an instrument first one, then the other.
-_INSTRUMENTS = {"periods": ("periods",) * 2, "iv": ("command",) * 2, "hv": ("displacement", "force")}
+#: What is taken for the source of motion by method: without an instrument all noise is the force's.
+_INSTRUMENTS = {"periods": "periods", "iv": "command", "hv": "displacement"}
 #: Noise that responses have at least, of the run's largest: one without an instrument may have none.
 _LEAST = 1e-8
 
@@ -34,6 +34,8 @@ _LEAST = 1e-8
 class BandBlocks:
     """Blocks of all bands, a point a line: L lines, B bands."""
 
+    points: tuple[BandPoint, ...]
+    loads: StaticLoads
     blocks: Blocks = field(repr=False)
     omega: FloatArray  #: (L,), rad/s: of every line
     driven: BoolArray  #: (L,): whether an excitation stands above the noise in one direction
@@ -49,18 +51,17 @@ class BandBlocks:
 def band_blocks(
     points: Sequence[BandPoint],
     sensors: tuple[Sensor, ...],
-    misses: Sequence[ComplexArray],
+    loads: StaticLoads,
     temperatures: Mapping[str, float],
     clearance: float | None,
-    turn: int = 0,
 ) -> BandBlocks:
-    """Responses of all runs; without an instrument of the runs, to the one or the other by `turn`."""
+    """Responses of all runs."""
     rows: list[dict[str, object]] = []
     calibrations: list[list[Hashable]] = [[] for _ in sensors]
     operating: list[OperatingPoint] = []
     runs: list[str] = []
     films = [_film(point, clearance) for point in points]
-    for point, miss, (_, uneven, _) in zip(points, misses, films):
+    for point, miss, (_, uneven, _) in zip(points, loads.misses, films):
         first = len(operating)
         frequencies = point.frequencies.tolist()
         operating += [replace(point.point, excitation=2 * np.pi * round(f, 2)) for f in frequencies]
@@ -71,7 +72,7 @@ def band_blocks(
             channels = _described(spectra[0], sensors)
             row = channel_columns(channels, calibrations)
             row |= {"run": len(runs), "temperature": warmth, "miss": missed_load(miss, members)}
-            for place, response in enumerate(_run_rows(point, spectra, channels, warmth, turn)):
+            for place, response in enumerate(_run_rows(point, spectra, channels, warmth)):
                 bins = point.bins[place]
                 at = {"point": first + place, "omega": 2 * np.pi * frequencies[place]}
                 at["uneven"] = uneven[members[0], bins].mean(axis=0)
@@ -86,6 +87,8 @@ def band_blocks(
     coherent = np.array([classic.coherence.min() for point in points for classic in point.classic])
     quiet = np.array([point.method == "hv" for point in points])[band]
     return BandBlocks(
+        tuple(points),
+        loads,
         blocks.part(np.flatnonzero(driven[blocks.point])),
         2 * np.pi * np.concatenate([point.frequencies for point in points]),
         driven,
@@ -125,13 +128,13 @@ def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel |
 
 
 def _run_rows(
-    point: BandPoint, runs: Sequence[RunSpectra], channels: Sequence[Channel | None], temperature: float, turn: int
+    point: BandPoint, runs: Sequence[RunSpectra], channels: Sequence[Channel | None], temperature: float
 ) -> list[list[dict[str, object]]]:
     """Columns of the responses of one run, group by group."""
     names = [channel.name for channel in runs[0].phasors.channels]
     places = [-1 if channel is None else names.index(channel.name) for channel in channels]
     gain = np.array([1.0 if c is None else warm_gain(c, temperature) for c in channels])
-    responses = [line_response(runs, bins, _INSTRUMENTS[point.method][turn], point.open) for bins in point.bins]
+    responses = [line_response(runs, bins, _INSTRUMENTS[point.method], point.open) for bins in point.bins]
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
     time = 0.5 * len(runs[0].phasors.start) * runs[0].phasors.length
     groups = []

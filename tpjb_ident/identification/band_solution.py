@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.bands.classic import ClassicLine
 from tpjb_ident.estimate.blocks import Rig, film_force, vector
 from tpjb_ident.estimate.load_slope import slopes_over_load
 from tpjb_ident.estimate.noise import GAIN_OR_LOAD, UNKNOWN_EXPONENT
@@ -40,12 +42,28 @@ ONE_LINE = 1e6
 class BandSolution:
     """All bands of a campaign; L lines."""
 
-    lines: Solution = field(repr=False)
+    data: BandBlocks
+    solution: Solution = field(repr=False)  #: of the lines
     usable: BoolArray = field(repr=False)  #: (L,): lines that the excitation tells
     parts: tuple[IntArray, ...]  #: lines of every part: h is that at the middle one
     part: Solution = field(repr=False)
     condition: FloatArray = field(repr=False)  #: (L,): condition number of the motions
     run_scatter: float  #: of the runs' gains
+
+    @cached_property
+    def classic(self) -> list[ClassicLine]:
+        """All lines by the methods of analysers."""
+        return [line for point in self.data.points for line in point.classic]
+
+    def usable_of(self, b: int) -> IntArray:
+        """Lines of a band with an answer."""
+        return np.flatnonzero(self.usable & (self.data.band == b))
+
+    def bracket(self, lines: IntArray) -> ComplexArray:
+        """Half of what H2 lies above H1 at some lines (2, 2) [N/m], between which H is if nothing tells noise."""
+        blind = [k for k in lines if self.usable[k] and self.data.points[self.data.band[k]].method == "hv"]
+        halves = [0.5 * (self.classic[k].h["h2"] - self.classic[k].h["h1"]) for k in blind]
+        return np.mean([*halves], axis=0) if halves else np.zeros((2, 2), complex)
 
 
 def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
@@ -57,7 +75,7 @@ def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
     away = np.abs(lines.h - crude).max(axis=(1, 2))
     usable &= away < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
     parts = _parts(data, used, usable)
-    return BandSolution(lines, usable, parts, _part_solution(data, lines, parts, usable), condition, size)
+    return BandSolution(data, lines, usable, parts, _part_solution(data, lines, parts, usable), condition, size)
 
 
 def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Solution, float]:

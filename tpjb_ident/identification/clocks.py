@@ -18,8 +18,8 @@ from tpjb_ident.estimate.blocks import Blocks, Sensor
 from tpjb_ident.terms.clock import START, Clock
 
 if TYPE_CHECKING:
+    from tpjb_ident.identification.band_solution import BandSolution
     from tpjb_ident.identification.campaign_solution import CampaignSolution
-    from tpjb_ident.identification.identify_bands import SolvedBands
 
 #: Standard errors beyond which a rate is one, and phase [rad] over a record from which it matters.
 _CLEAR, _NOTABLE = 6.0, 2e-3
@@ -33,7 +33,7 @@ _CLOCK_PASSES, _TURNED = 2, 1e-2
 
 
 #: Of sines, or over bands.
-Answer = TypeVar("Answer", "CampaignSolution", "SolvedBands")
+Answer = TypeVar("Answer", "CampaignSolution", "BandSolution")
 
 
 def solved_with_clocks(

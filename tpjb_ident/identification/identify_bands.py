@@ -1,14 +1,13 @@
 """A campaign's broadband runs to h over frequency: one solve of all operating points; its lines, points and models."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
-from tpjb_ident.bands.classic import ClassicLine
 from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import Condition, holding, merged
@@ -18,7 +17,7 @@ from tpjb_ident.estimate.shape import real_numbers
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimators.estimate import MIN_COHERENCE, fit_conditions
 from tpjb_ident.estimators.stiffness import DynamicStiffness
-from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
+from tpjb_ident.identification.band_blocks import STRONG, band_blocks
 from tpjb_ident.identification.band_point import BandPoint, band_groups, read_point
 from tpjb_ident.identification.band_solution import ONE_LINE, BandSolution, solve_bands
 from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated
@@ -35,7 +34,7 @@ from tpjb_ident.rounding import listed
 from tpjb_ident.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.runs.finished_runs import ExcludedRun, excluded_runs, without_runs
 from tpjb_ident.runs.run_jobs import Progress
-from tpjb_ident.runs.static_load import StaticLoads, static_loads
+from tpjb_ident.runs.static_load import static_loads
 from tpjb_ident.terms.registry import cell_stiffness
 
 #: Share of the driven lines that must be told from noise.
@@ -44,62 +43,6 @@ _LEAST_LINES = 0.5
 _NAMED = 6
 #: Source of what the solves without an instrument are apart.
 _BRACKET = "no instrument"
-
-
-@dataclass(frozen=True)
-class SolvedBands:
-    """All bands with their solve; where there is no instrument, one with all noise on the force, one with all on D."""
-
-    points: tuple[BandPoint, ...]
-    loads: StaticLoads
-    data: BandBlocks
-    solutions: tuple[BandSolution, ...]
-    excluded: tuple[ExcludedRun, ...]
-
-    @property
-    def first(self) -> BandSolution:
-        """The solve that counts, or the lower of two."""
-        return self.solutions[0]
-
-    @property
-    def solution(self) -> Solution:
-        """Of the lines."""
-        return self.first.lines
-
-    @property
-    def classic(self) -> list[ClassicLine]:
-        """All lines by the methods of analysers."""
-        return [line for point in self.points for line in point.classic]
-
-    @property
-    def part_changes(self) -> FloatArray:
-        """One deviation of the parts (Q, 8) [N/m] by what solves without an instrument are apart: a rectangle's."""
-        middles = [middle(lines) for lines in self.first.parts]
-        return real_numbers(self.solutions[-1].part.h[middles] - self.first.part.h[middles]) / np.sqrt(12)
-
-    def usable(self, b: int) -> IntArray:
-        """Lines of a band with an answer."""
-        return np.flatnonzero(np.all([s.usable for s in self.solutions], axis=0) & (self.data.band == b))
-
-    def estimate(
-        self, solutions: Sequence[Solution], group: int, lines: IntArray, method: str
-    ) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
-        """H of a group of lines by all solves, at the middle one, and its covariances by source.
-
-        Where solves differ it is in their middle, and half of what they are apart a rectangle's half width.
-        """
-        k = middle(lines)
-        half = 0.5 * (solutions[-1].h[k] - solutions[0].h[k])
-        est, budget = estimate_of(solutions[0], group, solutions[0].h[k] + half, float(self.data.omega[k]), method)
-        if half.any():
-            budget[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
-            est = replace(est, systematic=est.systematic + budget[_BRACKET])
-        return replace(est, condition=float(np.median(self.first.condition[lines]))), budget
-
-
-def middle(lines: IntArray) -> int:
-    """The middle one of some lines."""
-    return int(lines[len(lines) // 2])
 
 
 def identify_bands(
@@ -116,31 +59,30 @@ def identify_bands(
     unusable = [ExcludedRun(run.id, run.point, RigDataError(bad[run.id])) for run in runs if run.id in bad]
     groups = band_groups([run for run in runs if run.id not in bad])
 
-    def solve(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> SolvedBands:
+    excluded: list[ExcludedRun] = []
+
+    def solve(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> BandSolution:
         fast = {sensor.name: rates[sensor.device] for sensor in sensors if sensor.device in rates}
-        points, excluded = [], list(unusable)
+        points = []
+        excluded[:] = unusable
         for group in groups:
             point, without = read_point(group, campaign.housing_mass, settings.phasors, fast)
             points += [] if point is None else [point]
-            excluded += without
+            excluded.extend(without)
         if not points:
             raise excluded[0].error
         loads = static_loads(campaign, points)
         temperatures = run_temperatures(campaign, [(s.phasors.run, s.temperatures) for p in points for s in p.spectra])
+        data = band_blocks(points, sensors, loads, temperatures, settings.clearance)
         known = {"bare": bare, "rates": rates, "to_set_point": settings.correct}
-        data, solutions = [], []
-        # without an instrument twice: all noise the force's, then all the displacement's
-        for turn in range(2 if any(point.method == "hv" for point in points) else 1):
-            data.append(band_blocks(points, sensors, loads.misses, temperatures, settings.clearance, turn))
-            rig = campaign_rig(campaign, loads.doubted(sensors), data[-1].blocks, loads.common, **known)
-            solutions.append(solve_bands(rig, data[-1]))
-        return SolvedBands(tuple(points), loads, data[0], tuple(solutions), tuple(excluded))
+        return solve_bands(campaign_rig(campaign, loads.doubted(sensors), data.blocks, loads.common, **known), data)
 
     solved = solved_with_clocks(sensors_of(campaign), min(run.sample_rate for run in runs), solve)
     results, numbers = [], []
-    for b, point in enumerate(solved.points):
-        of_runs = solved.loads.conditions(b), check_conditions(checked, point.names)
-        without = without_runs(point.point, solved.excluded, any_excitation=True)
+    points = solved.data.points
+    for b, point in enumerate(points):
+        of_runs = solved.data.loads.conditions(b), check_conditions(checked, point.names)
+        without = without_runs(point.point, excluded, any_excitation=True)
         of_records = (spectra.phasors.conditions for spectra in point.spectra)
         of_lines = solved.solution.conditions(), band_conditions(point, solved, b)
         quality = merged(*of_runs, without, *of_records, *of_lines)
@@ -148,29 +90,45 @@ def identify_bands(
         results.append(result)
         numbers += parts
     changes, names = _shared(solved, numbers)
-    places = [point.point for point in solved.points]
-    named = excluded_runs(solved.excluded, len(runs), places, any_excitation=True, kind="run over a band")
+    places = [point.point for point in points]
+    named = excluded_runs(excluded, len(runs), places, any_excitation=True, kind="run over a band")
     identified = tuple(point for band in results for point in band.points)
-    about = (*named, *unstated(campaign)), tuple(results), names, cell_stiffness(solved.first.part)
+    about = (*named, *unstated(campaign)), tuple(results), names, cell_stiffness(solved.part)
     return Identification(campaign.id, settings.method, identified, changes, *about)
 
 
-def _shared(solved: SolvedBands, parts: list[int]) -> tuple[FloatArray, tuple[str, ...]]:
+def _shared(solved: BandSolution, parts: list[int]) -> tuple[FloatArray, tuple[str, ...]]:
     """What some parts share: what scatters from run to run is common to them too."""
-    bracket = solved.part_changes[parts]
-    return shared_changes(solved.first.part, parts, more={_BRACKET: bracket} if bracket.any() else {})
+    halves = np.array([solved.bracket(solved.parts[q]) for q in parts]).reshape(-1, 2, 2)
+    more = {_BRACKET: real_numbers(halves) / np.sqrt(3)} if halves.any() else {}
+    return shared_changes(solved.part, parts, more=more)
+
+
+def _estimate(
+    solved: BandSolution, solution: Solution, group: int, lines: IntArray, method: str
+) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
+    """H of a group of lines, at the middle one, and its covariances by source.
+
+    Without an instrument all noise was the force's: H is in the middle of H1 and H2, as uncertain as a rectangle.
+    """
+    k, half = lines[len(lines) // 2], solved.bracket(lines)
+    est, budget = estimate_of(solution, group, solution.h[k] + half, float(solved.data.omega[k]), method)
+    if half.any():
+        budget[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
+        est = replace(est, systematic=est.systematic + budget[_BRACKET])
+    return replace(est, condition=float(np.median(solved.condition[lines]))), budget
 
 
 def _result(
-    solved: SolvedBands, b: int, quality: tuple[Condition, ...], clearance: float | None
+    solved: BandSolution, b: int, quality: tuple[Condition, ...], clearance: float | None
 ) -> tuple[BandResult, list[int]]:
     """Lines, models and points of one band, and the numbers of its parts."""
-    data, usable = solved.points[b], solved.usable(b)
+    data, usable = solved.data.points[b], solved.usable_of(b)
     lines = tuple(_line(solved, data, int(k)) for k in usable)
-    parts = [q for q, part in enumerate(solved.first.parts) if solved.data.band[part[0]] == b and len(usable)]
+    parts = [q for q, part in enumerate(solved.parts) if solved.data.band[part[0]] == b and len(usable)]
     points = [_point(solved, q, quality, clearance) for q in parts]
     # what runs scatter by is one for all parts: no chance between them
-    free = [np.full(8, solved.first.part.noise_freedom(q)) for q in parts]
+    free = [np.full(8, solved.part.noise_freedom(q)) for q in parts]
     by_noise = [replace(p, stiffness=replace(p.stiffness, dof=dof)) for p, dof in zip(points, free)]
     fits = fits_over_frequency(by_noise, _shared(solved, parts)[0])
     models, chosen = (fits[0].fits, fits[0].supported) if fits else ({}, "raw H")
@@ -178,28 +136,24 @@ def _result(
     return BandResult(data.point, data.kind, lines, models, chosen, quality, *figures), parts
 
 
-def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
+def _line(solved: BandSolution, point: BandPoint, k: int) -> BandLine:
     """One line by the method that counts, and by the others: how runs scatter is no matter of the method."""
-    solutions, classic = [s.lines for s in solved.solutions], solved.classic[k]
-    best, budget = solved.estimate(solutions, k, np.array([k]), point.method)
-    alternatives = {
-        name: value - solved.solution.rig.bare.at(np.array([best.omega]))[0] for name, value in classic.h.items()
-    }
-    if _BRACKET in budget:
-        alternatives |= {"h1": solutions[0].h[k], "h2": solutions[-1].h[k]}
+    classic = solved.classic[k]
+    best, _ = _estimate(solved, solved.solution, k, np.array([k]), point.method)
+    (bare,) = solved.solution.rig.bare.at(np.array([best.omega]))
     table = {point.method: best}
-    for name, value in alternatives.items():
-        table.setdefault(name, replace(best, h=value, method=name))
+    for name, value in classic.h.items():
+        table.setdefault(name, replace(best, h=value - bare, method=name))
     return BandLine(best.omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
 
 
-def _point(solved: SolvedBands, q: int, quality: tuple[Condition, ...], clearance: float | None) -> PointResult:
+def _point(solved: BandSolution, q: int, quality: tuple[Condition, ...], clearance: float | None) -> PointResult:
     """One part of a band as a point: its lines alone tell its h; K-C-M only says how h changes within it."""
-    lines = solved.first.parts[q]
+    lines = solved.parts[q]
     b = int(solved.data.band[lines[0]])
-    point = solved.points[b]
-    est, budget = solved.estimate([s.part for s in solved.solutions], q, lines, f"band-{point.method}")
-    inside = [solved.classic[k] for k in np.intersect1d(lines, solved.usable(b))]
+    point = solved.data.points[b]
+    est, budget = _estimate(solved, solved.part, q, lines, f"band-{point.method}")
+    inside = [solved.classic[k] for k in lines if solved.usable[k]]
     amplitude = max(s.amplitude for s in point.spectra)
     share = float(solved.data.blocks.bent[lines[0]])
     bent = change_conditions(FilmChange(share), share, est, amplitude, clearance)
@@ -214,18 +168,18 @@ def _point(solved: SolvedBands, q: int, quality: tuple[Condition, ...], clearanc
         amplitude=amplitude,
         quality=merged(quality, physics(est, point.inertia), bent),
         rejected=(),
-        load_miss=solved.loads.misses[b],
+        load_miss=solved.data.loads.misses[b],
         clearance=clearance,
         budget=budget,
         scattering=("random",),
     )
 
 
-def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Condition, ...]:
+def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> tuple[Condition, ...]:
     """What the lines of one band say, and its runs beside each other."""
     mine = solved.data.band == b
-    driven, usable = np.flatnonzero(mine & solved.data.driven), solved.usable(b)
-    condition = float(np.median(solved.first.condition[driven])) if len(driven) else 0.0
+    driven, usable = np.flatnonzero(mine & solved.data.driven), solved.usable_of(b)
+    condition = float(np.median(solved.condition[driven])) if len(driven) else 0.0
     alike, few = condition > ONE_LINE, len(usable) < max(_LEAST_LINES * len(driven), 1)
     one_line = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
     weak = f"{len(usable)} of {mine.sum()} lines stand {STRONG:g} times (F ratio) above the noise"
@@ -239,7 +193,7 @@ def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Cond
     text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"
     return merged(
         fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.spectra)),
-        differing_runs(solved.first.run_scatter),
+        differing_runs(solved.run_scatter),
         holding(
             (alike, "fewer-than-two-directions", one_line),
             (few and not alike, "excitation-too-weak", weak),
