@@ -22,11 +22,11 @@ from tpjb_ident.runs.finished_runs import ExcludedRun
 from tpjb_ident.runs.point_data import pad_means
 
 #: Lines over a band where a record resolves more, and bins that a line takes at least.
-_LINES, _BINS = 60, 18
+_LINES, _BINS = 60, 12
 #: Bins of a line that must be left when those of shaft and mains are gone.
-_LEAST_BINS = 12
+_LEAST_BINS = 8
 #: Lines that a band must give.
-_LEAST_LINES = 3
+_LEAST_LINES = 4
 
 
 @dataclass(frozen=True)
