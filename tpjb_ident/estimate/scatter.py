@@ -76,10 +76,6 @@ class Scatter:
         zero = np.zeros((points, COMPONENTS))
         return Scatter(zero, np.ones(blocks), np.zeros(COMPONENTS), np.zeros(COMPONENTS), none, np.zeros(points))
 
-    def share(self, point: int) -> float:
-        """Scatter of a point's runs over the film's force, along X and along Y together."""
-        return float(np.sqrt(2 * self.variance[point].mean()))
-
     def freedom(self, point: int, components: slice) -> float:
         """Degrees of freedom of the mean of some components of a point, Welch and Satterthwaite."""
         if self.separate[point]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -47,6 +48,11 @@ class CampaignSolution:
     pickup: Pickup | None = None
     mains: dict[int, MainsFit] = field(default_factory=dict, repr=False)  #: by point
     in_cells: dict[int, FloatArray] = field(default_factory=dict, repr=False)  #: by point, (8, 8): mains in the cells
+
+    @cached_property
+    def misfits(self) -> FloatArray:
+        """Force of every block that H leaves, over its force, (n,)."""
+        return misfits(self.solution)
 
     @property
     def h(self) -> ComplexArray:
@@ -115,9 +121,7 @@ def _mains(
         return None, {}
     D, F = at_set_point(solution)
     free = ~np.isin(blocks.point, points) & np.isfinite(F).all(axis=1)
-    residual = F - np.einsum("nij,nj->ni", solution.h[blocks.point], D)
-    share = np.sum(np.abs(residual) ** 2, axis=1) / 2 / np.sum(np.abs(F) ** 2, axis=1)
-    typical = float(np.sqrt(np.nanmedian(share[free]) / np.log(2))) if free.any() else _LEAST_SCATTER
+    typical = float(np.sqrt(np.nanmedian(misfits(solution)[free] ** 2 / 2 / np.log(2)))) if free.any() else 0.0
     fits = {}
     for p in points:
         mine = blocks.point == p
@@ -136,6 +140,13 @@ def at_set_point(solution: Solution) -> tuple[ComplexArray, ComplexArray]:
     clean = replace(blocks, z=(blocks.z - solution.shift) / solution.factor)
     D = vector(rig, clean, "displacement")
     return D, film_force(rig, clean) - np.einsum("nij,nj->ni", solution.run_change, D)
+
+
+def misfits(solution: Solution) -> FloatArray:
+    """Force of every block that H leaves, over its force, (n,)."""
+    D, F = at_set_point(solution)
+    residual = F - np.einsum("nij,nj->ni", solution.h[solution.blocks.point], D)
+    return np.linalg.norm(residual, axis=1) / np.linalg.norm(F, axis=1)
 
 
 def _mains_readings(rig: Rig, blocks: Blocks, fits: Mapping[int, MainsFit]) -> ComplexArray:

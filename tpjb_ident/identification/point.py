@@ -89,8 +89,10 @@ def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare
 
 
 def _conditions(solved: CampaignSolution, p: int) -> tuple[Condition, ...]:
-    runs_differ = differing_runs(solved.solution.scatter.share(p))
-    conditions = [*runs_differ, *solved.loads.conditions(p), *solved.solution.conditions()]
+    counted = solved.misfits[solved.solution.blocks_of(p) & (solved.solution.scatter.weights > 0)]
+    # two runs fix H: what is left over is shared by all of them
+    share = np.sqrt(np.sum(counted**2) / (len(counted) - 2)) if len(counted) > 2 else 0.0
+    conditions = [*differing_runs(float(share)), *solved.loads.conditions(p), *solved.solution.conditions()]
     if p in solved.mains and solved.pickup is not None:
         conditions.append(solved.mains[p].condition(solved.pickup))
     conditions += solved.means[p].shaft_conditions
