@@ -28,8 +28,8 @@ from tpjb_ident.results.linearity import MAX_AMPLITUDE, NEVER_LINEAR, FilmChange
 )
 def test_a_large_motion_is_flagged_only_where_the_harmonics_do_not_show_a_linear_film(change, size, named):
     est = stiff(H, 0.003 * np.abs(H[0, 0]))
-    assert change_conditions(change, change.share, est, size * 80e-6, 80e-6) == named
-    assert change_conditions(FilmChange(), 0.0, est, 1.0, None) == ()
+    assert change_conditions(change, {}, est, size * 80e-6, 80e-6) == named
+    assert change_conditions(FilmChange(), {}, est, 1.0, None) == ()
 
 
 @pytest.mark.slow

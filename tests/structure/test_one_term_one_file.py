@@ -24,10 +24,9 @@ CLASSES = {
     "tpjb_ident/identification/clocks.py": {"Clock"},
     "tpjb_ident/identification/band_solution.py": {"RunGain"},
 }
-#: What differs from run to run is of the random part; what amplitudes leave unknown is said of the point.
+#: What differs from run to run is of the random part.
 NAMES = {
     "tpjb_ident/identification/estimates.py": {"load direction", "load miss"},
-    "tpjb_ident/identification/point.py": {"amplitude"},
 }
 #: Columns of the blocks that have the name of a term.
 COLUMNS = {field.name for field in dataclasses.fields(Blocks)}

@@ -155,8 +155,8 @@ def _point(solved: BandSolution, q: int, quality: tuple[Condition, ...], clearan
     est, budget = _estimate(solved, solved.part, q, lines, f"band-{point.method}")
     inside = [solved.classic[k] for k in lines if solved.usable[k]]
     amplitude = max(s.amplitude for s in point.spectra)
-    share = float(solved.data.blocks.bent[lines[0]])
-    bent = change_conditions(FilmChange(share), share, est, amplitude, clearance)
+    film = FilmChange(float(solved.data.blocks.bent[lines[0]]))
+    bent = change_conditions(film, budget, est, amplitude, clearance)
     return PointResult(
         **of_runs(point),
         point=replace(point.point, excitation=2 * np.pi * round(est.omega / (2 * np.pi), 3)),

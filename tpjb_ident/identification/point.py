@@ -53,14 +53,6 @@ class PointShare:
     miss: ComplexArray
     film: FilmChange
 
-    def amplitude_left(self) -> float:
-        """Share of H by which the amplitude may still change it."""
-        amplitude = self.budget.get("amplitude")
-        if amplitude is None or self.estimate is None or not self.film.share:
-            return self.film.share
-        size = float(np.linalg.norm(self.estimate.h)) / np.sqrt(2)
-        return min(float(1.96 * np.sqrt(np.diag(amplitude).max()) / size), self.film.share)
-
 
 @dataclass(frozen=True)
 class PointTask:
@@ -155,7 +147,7 @@ def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> P
         disagreement(by_method, settings.method),
         share.conditions,
         task.dry.missing(recorded.omega),
-        change_conditions(share.film, share.amplitude_left(), best, size, settings.clearance),
+        change_conditions(share.film, share.budget, best, size, settings.clearance),
         check_conditions(task.checked, recorded.names),
     )
     return PointResult(

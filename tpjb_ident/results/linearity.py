@@ -10,7 +10,7 @@ films integrated in time it is right within a fifth, so 1.3 times it is taken. W
 another line on it) the second harmonic stands in, 4.5 q2^2: for a force law x / (1 - x / c)^n the change is 2.7 q2^2.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,12 +121,20 @@ def _size(runs: Sequence[FilmLines], name: str, h: ComplexArray) -> FloatArray:
 
 
 def change_conditions(
-    change: FilmChange, uncertain: float, est: DynamicStiffness, amplitude: float, clearance: float | None
+    change: FilmChange,
+    budget: Mapping[str, FloatArray],
+    est: DynamicStiffness,
+    amplitude: float,
+    clearance: float | None,
 ) -> tuple[Condition, ...]:
-    """What to say of a point.
+    """What to say of a point, by what its `budget` leaves of the change.
 
     A large motion alone is no fault where the harmonics show that the film answers it as a linear one.
     """
+    uncertain = change.share
+    if "amplitude" in budget:  # runs of several amplitudes may have told it
+        size = float(np.linalg.norm(est.h)) / np.sqrt(2)
+        uncertain = min(float(1.96 * np.sqrt(np.diag(budget["amplitude"]).max()) / size), uncertain)
     if uncertain > _REFUSED:
         text = "by what the film makes of the motion at multiples of its frequency, the coefficients may be off by"
         return (Condition("film-not-linear", f"{text} {100 * uncertain:.0f} %. Excite less"),)
