@@ -152,18 +152,27 @@ def stacked(
     band: IntArray | None = None,
 ) -> Blocks:
     """Blocks of rows, each what is known of it by name; one that is said nothing else of is a single still window."""
-    none, alone, zeros = np.zeros(sensors), np.full(len(points), -1), np.zeros(len(points))
-    still = {"slope": none + 0j, "slope_noise": np.eye(sensors) + 0j, "windows": 1.0, "time": 0.0}
-    usual = {"point": 0, "run": 0, "omega": 0.0, "z": none + 0j, "noise": np.diag(none) + 0j, "dof": 1.0, **still}
+    none = np.zeros(sensors)
+    usual: dict[str, Any] = {
+        "point": 0,
+        "run": 0,
+        "omega": 0.0,
+        "z": none + 0j,
+        "noise": np.diag(none) + 0j,
+        "dof": 1.0,
+    }
     usual |= {"present": none > 0, "along": np.zeros((sensors, 2)), "calibration": none.astype(int)}
+    usual |= {"slope": none + 0j, "slope_noise": np.eye(sensors) + 0j, "windows": 1.0, "time": 0.0}
     usual |= {"temperature": np.nan, "shaft": np.nan + 0j, "uneven": np.zeros(2), "gain_scatter": 0.0}
     usual |= {"miss": 0j, "miss_error": 0.0}
-    columns = {}
+    columns: dict[str, Any] = {
+        "bent": np.zeros(len(points)) if bent is None else bent,
+        "band": np.full(len(points), -1) if band is None else band,
+    }
     for name, value in usual.items():
         column = np.array([row.get(name, value) for row in rows], np.asarray(value).dtype)
         columns[name] = column.reshape(-1, *np.shape(value))
-    of_points = {"bent": zeros if bent is None else bent, "band": alone if band is None else band}
-    return Blocks(tuple(points), tuple(runs), **columns, **of_points)
+    return Blocks(tuple(points), tuple(runs), **columns)
 
 
 def vector(rig: Rig, blocks: Blocks, quantity: str) -> ComplexArray:

@@ -211,7 +211,7 @@ def fits_over_frequency(points: Sequence[PointResult], changes: FloatArray | Non
             rows = None if changes is None else changes.reshape(len(changes), -1, 8)[:, places]
             models = {model: fit_over_frequency(estimates, model, rows) for model in MODELS}
             if any(est.method == BLIND for est in estimates):
-                unjudged = {"chi_square": np.nan, "probability": np.nan, "misfit": np.nan}
-                models = {name: replace(model, **unjudged) for name, model in models.items()}
+                for name, model in models.items():
+                    models[name] = replace(model, chi_square=np.nan, probability=np.nan, misfit=np.nan)
             fits.append(StaticFits(members, tuple(places), models))
     return fits
