@@ -15,7 +15,7 @@ from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.sensors import alive
 from tpjb_ident.estimate.term import worth_stating
 from tpjb_ident.identification.band_point import BandPoint
-from tpjb_ident.identification.campaign_blocks import channel_columns
+from tpjb_ident.identification.campaign_solution import channel_columns
 from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.runs.static_load import StaticLoads, missed_load
 from tpjb_ident.terms.distortion import band_change, line_scatter

@@ -10,8 +10,7 @@ from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.conditions import merged
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.estimators.estimate import method_of
-from tpjb_ident.identification.campaign_blocks import unstated
-from tpjb_ident.identification.campaign_solution import solve_campaign
+from tpjb_ident.identification.campaign_solution import solve_campaign, unstated
 from tpjb_ident.identification.estimates import RUN_TERMS, shared_changes
 from tpjb_ident.identification.identify_bands import identify_bands
 from tpjb_ident.identification.point import SOLVED, PointTask, finished_point, point_share

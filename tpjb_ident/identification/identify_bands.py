@@ -20,7 +20,7 @@ from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.band_blocks import STRONG, band_blocks
 from tpjb_ident.identification.band_point import BandPoint, band_groups, read_point
 from tpjb_ident.identification.band_solution import ONE_LINE, BandSolution, solve_bands
-from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated
+from tpjb_ident.identification.campaign_solution import run_temperatures, unstated
 from tpjb_ident.identification.clocks import solved_with_clocks
 from tpjb_ident.identification.estimates import estimate_of, shared_changes
 from tpjb_ident.identification.settings import IdentifySettings
