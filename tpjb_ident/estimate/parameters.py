@@ -45,10 +45,6 @@ class Table:
         """A term's part of values (rows, columns), in the order of its parameters."""
         return np.asarray(values[self._place[term.name]].ravel())
 
-    def put(self, term: Term, values: FloatArray) -> None:
-        """Set a term's parameters, in their order."""
-        self.value[self._place[term.name]] = values.reshape(-1, term.width)
-
     def chosen(self, term: Term) -> BoolArray:
         """Places of a term's parameters, (rows, columns)."""
         mask = np.zeros(self.mean.shape, dtype=bool)

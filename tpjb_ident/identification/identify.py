@@ -100,8 +100,6 @@ def _without_instruments(name: str) -> str:
 def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -> Identification:
     """Positions of the shaft are as uncertain as the probes' stated zeros."""
     zero = zero_uncertainty(campaign.channels.values(), "displacement")
-    if not zero.any():
-        return identification
     points = tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in identification.points)
     return replace(identification, points=points)
 

@@ -91,7 +91,7 @@ def identify_bands(
         numbers += parts
     changes, names = _shared(solved, numbers)
     places = [point.point for point in points]
-    named = excluded_runs(excluded, len(runs), places, any_excitation=True, kind="run over a band")
+    named = excluded_runs(excluded, len(runs), places, any_excitation=True)
     identified = tuple(point for band in results for point in band.points)
     about = (*named, *unstated(campaign)), tuple(results), names, cell_stiffness(solved.part)
     return Identification(campaign.id, settings.method, identified, changes, *about)

@@ -85,22 +85,18 @@ def without_runs(point: OperatingPoint, excluded: Sequence[ExcludedRun], any_exc
 
 
 def excluded_runs(
-    excluded: Sequence[ExcludedRun], of: int, points: Sequence[OperatingPoint], any_excitation: bool, kind: str = "run"
+    excluded: Sequence[ExcludedRun], of: int, points: Sequence[OperatingPoint], any_excitation: bool
 ) -> tuple[Condition, ...]:
-    """Which of the campaign's `of` dynamic runs take no part, and why; which operating points have no run left.
-
-    A `kind` of run other than usual is one over a band.
-    """
+    """Which of the campaign's `of` dynamic runs take no part, and why; which operating points have no run left."""
     reasons = listed([f"{run.run} ({run.reason})" for run in excluded], _LISTED, "; ")
     lost = [run for run in excluded if not any(run.belongs(point, any_excitation) for point in points)]
-    if kind == "run":
-        places = [place_of(run.point.static_load, run.point.excitation_hz) for run in lost]
-    else:
+    places = [place_of(run.point.static_load, run.point.excitation_hz) for run in lost]
+    if any_excitation:
         places = [amount(run.point.static_load, "load") for run in lost]
     runs = listed([run.run for run in lost], _LISTED)
     return holding(
         (excluded, "runs-left-out", f"{len(excluded)} of {of} dynamic runs take no part: {reasons}"),
-        (lost, "point-lost", f"no usable {kind} at {'; '.join(dict.fromkeys(places))}: {runs}"),
+        (lost, "point-lost", f"no usable run at {'; '.join(dict.fromkeys(places))}: {runs}"),
     )
 
 
