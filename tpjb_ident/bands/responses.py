@@ -28,7 +28,7 @@ _SETS, _ALIKE = 3, 0.6
 
 @dataclass(frozen=True)
 class LineResponse:
-    """One run at one group of bins."""
+    """One run at the bins of one line."""
 
     z: ComplexArray  #: (k, m), SI: k responses whose noise has one covariance
     count: float  #: that covariance is the noise of a row over this
@@ -40,7 +40,7 @@ class LineResponse:
 
 
 def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, ends: bool) -> LineResponse:
-    """Response over a group of bins; `instrument` is "periods", "command" or "displacement".
+    """Response over the bins of a line; `instrument` is "periods", "command" or "displacement".
 
     Runs are taken together where there is no instrument of their own: each moves the shaft along one line, and what it
     shows across that is noise.
@@ -139,7 +139,7 @@ def _outer(rows: ComplexArray) -> ComplexArray:
 
 
 def pooled_noise(responses: list[LineResponse]) -> tuple[list[ComplexArray], FloatArray]:
-    """Noise of a row at every group of one run with its neighbours (m, m), and its degrees of freedom (n,)."""
+    """Noise of a row at every line of one run with its neighbours (m, m), and its degrees of freedom (n,)."""
     residual = np.array([r.residual for r in responses])
     freedom = np.array([r.freedom for r in responses])
     reach = int(np.ceil(0.5 * _FREEDOM / max(float(freedom.mean()), 1e-9)))

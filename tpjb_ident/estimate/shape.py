@@ -1,7 +1,7 @@
 """How H of the points hangs on numbers that groups of points share: each its own H, or a model over frequency.
 
 K-C, h = K + i omega C, and K-C-M, h = K - omega^2 M + i omega C, hold for all lines of a load together; a part of a
-band shares one departure from such a model. Sines, lines of a multi-sine and groups of bins take part alike.
+band shares one departure from such a model. Sines, lines of a multi-sine and of a transform take part alike.
 """
 
 from collections.abc import Mapping
