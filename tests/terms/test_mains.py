@@ -170,7 +170,7 @@ def test_without_noise_the_pickup_is_found_exactly():
     # 24 real equations, 8 entries and 6 angles; eight degrees of freedom come from the other points
     assert fit.dof == 8.0 + 10
     assert fit.chi_square < 1e-3
-    found = fit.condition(Pickup(SINGLE, np.array([1.23e-7, 4.5e-8]), 9))
+    found = replace(fit, known=Pickup(SINGLE, np.array([1.23e-7, 4.5e-8]), 9)).condition()
     assert found == MAINS_CORRECTED
     assert "0.123 um, 0.045 um known from 9 other runs" in found.detail
 

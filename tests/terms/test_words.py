@@ -35,7 +35,6 @@ def test_what_is_as_stated_is_not_named():
         assert term.conditions(fitted) == ()
     springs = term_of(solution, "housing")[0].words(solution.fitted["housing"])
     assert [sentence.split()[0] for sentence in springs] == ["c_xx", "c_yy", "c_xy", "loss"]
-    assert solution.words()
 
 
 def test_points_run_at_several_amplitudes_say_so():

@@ -67,7 +67,6 @@ class Solution:
     factor: ComplexArray = field(repr=False)  #: (n, m): what multiplies the readings of every block
     shift: ComplexArray = field(repr=False)  #: (n, m), SI: what is in the readings beside the motion's part
     run_change: ComplexArray = field(repr=False)  #: (n, 2, 2), N/m: H of a run beside that of its point
-    housing_noise: float  #: scatter of the housing's equations over its acceleration
     ran_away: bool = False  #: no point has an answer
 
     def blocks_of(self, group: int) -> BoolArray:
@@ -92,10 +91,6 @@ class Solution:
         """Compliance of what the housing stands on (2, 2) [m/N]; None where no accelerometer shows it."""
         compliances = (term.standing_on(self.fitted[term.name]) for term in self.terms)
         return next((compliance for compliance in compliances if compliance is not None), None)
-
-    def words(self) -> tuple[str, ...]:
-        """What the records tell of the terms' parameters."""
-        return tuple(sentence for term in self.terms for sentence in term.words(self.fitted[term.name]))
 
     def conditions(self) -> tuple[Condition, ...]:
         """What the terms' tests say of the rig: it touches every point."""
@@ -324,7 +319,6 @@ class Solver:
             spare,
             np.clip(self.scatter.variance[self.group] * fit.information, 0.0, 1.0),
             *self._apart(),
-            self.housing_noise,
         )
 
     def _apart(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -26,7 +26,6 @@ from tpjb_ident.runtime.executors import Workers
 from tpjb_ident.terms.mains import (
     MAINS_ON_LINE,
     MainsFit,
-    Pickup,
     fit_mains,
     force_pickup,
     force_pickup_spread,
@@ -145,7 +144,6 @@ class CampaignSolution:
     film: tuple[FilmChange, ...]
     solution: Solution = field(repr=False)
     mains_shift: ComplexArray = field(repr=False)  #: (n, m), SI: pick-up taken off the blocks' readings
-    pickup: Pickup | None = None
     mains: dict[int, MainsFit] = field(default_factory=dict, repr=False)  #: by point
     in_cells: dict[int, FloatArray] = field(default_factory=dict, repr=False)  #: by point, (8, 8): mains in the cells
 
@@ -195,11 +193,11 @@ def solve_campaign(
     solution, blocks = last.solution, last.solution.blocks
     force = force_pickup([digest.mains_force for digest in digests])
     on_line = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE) and p in blocks.point]
-    pickup, fits = _mains(on_line, digests, solution, force) if correct and on_line else (None, {})
+    fits = _mains(on_line, digests, solution, force) if correct and on_line else {}
     if fits:
         shift = _mains_readings(solution.rig, blocks, fits)
         again = solve(solution.rig, replace(blocks, z=blocks.z - shift), solution.h)
-        last = replace(last, solution=again, mains_shift=shift, pickup=pickup, mains=fits)
+        last = replace(last, solution=again, mains_shift=shift, mains=fits)
     D = vector(solution.rig, blocks, "displacement")
     in_cells = {p: force_pickup_spread(D[blocks.point == p], force) for p in on_line if force.any()}
     return replace(last, in_cells=in_cells)
@@ -212,13 +210,13 @@ def _film(data: PointData, point: PointMeans) -> FilmChange:
 
 def _mains(
     points: Sequence[int], digests: Sequence[RunDigest], solution: Solution, force: FloatArray
-) -> tuple[Pickup | None, dict[int, MainsFit]]:
+) -> dict[int, MainsFit]:
     """Angles of the mains at the points on whose line it is; `force` (2,): mains in the cells [N]."""
     rig, blocks = solution.rig, solution.blocks
     across = blocks.along[0, rig.of("displacement")]
     pickup = mains_pickup([digest.mains for digest in digests], np.arctan2(across[:, 1], across[:, 0]))
     if pickup is None:
-        return None, {}
+        return {}
     D, F = at_set_point(solution)
     free = ~np.isin(blocks.point, points) & np.isfinite(F).all(axis=1)
     typical = float(np.sqrt(np.nanmedian(misfits(solution)[free] ** 2 / 2 / np.log(2)))) if free.any() else 0.0
@@ -231,7 +229,7 @@ def _mains(
         fit = fit_mains(D[mine], F[mine], pickup, scatter) if np.isfinite(solution.h[p]).all() else None
         if fit is not None:
             fits[p] = fit
-    return pickup, fits
+    return fits
 
 
 def at_set_point(solution: Solution) -> tuple[ComplexArray, ComplexArray]:

@@ -85,8 +85,8 @@ def _conditions(solved: CampaignSolution, p: int) -> tuple[Condition, ...]:
     # two runs fix H: what is left over is shared by all of them
     share = np.sqrt(np.sum(counted**2) / (len(counted) - 2)) if len(counted) > 2 else 0.0
     conditions = [*differing_runs(float(share)), *solved.loads.conditions(p), *solved.solution.conditions()]
-    if p in solved.mains and solved.pickup is not None:
-        conditions.append(solved.mains[p].condition(solved.pickup))
+    if p in solved.mains:
+        conditions.append(solved.mains[p].condition())
     conditions += solved.means[p].shaft_conditions
     for term in solved.solution.terms:
         conditions += term.point_conditions(p, solved.solution.fitted[term.name], solved.h[p])

@@ -180,18 +180,19 @@ def _distinct(h: ComplexArray, cost: FloatArray) -> list[int]:
 class MainsFit:
     """Pick-up of every run of a point, found together with H."""
 
+    known: Pickup  #: what the other runs tell of it
     pickup: ComplexArray  #: (n_runs, 2) complex, m: X and Y share of the measured displacement at the best minimum
     shift: FloatArray  #: (8,), N/m: from H at the best minimum to the mean over all
     covariance: FloatArray  #: (8, 8), N^2/m^2: what not knowing the angles leaves in H
     dof: float
     chi_square: float
 
-    def condition(self, pickup: Pickup) -> Condition:
+    def condition(self) -> Condition:
         """What was done about it."""
-        size = ", ".join(f"{1e6 * s:.3g} um" for s in pickup.size)
+        size = ", ".join(f"{1e6 * s:.3g} um" for s in self.known.size)
         return Condition(
             MAINS_CORRECTED,
-            f"pick-up of {size} known from {pickup.runs} other runs, its phase fitted per run "
+            f"pick-up of {size} known from {self.known.runs} other runs, its phase fitted per run "
             f"(reduced chi-square {self.chi_square:.2g}); intervals widened for it",
         )
 
@@ -221,7 +222,7 @@ def fit_mains(D: ComplexArray, F: ComplexArray, pickup: Pickup, scatter: float) 
     for weight, minimum in zip(share, minima):
         covariance = covariance + weight * inflation * minimum.covariance
     vectors = problem.vectors(minima[0].x)
-    return MainsFit(vectors, mean - entries[0], covariance, _PRIOR_DOF + spare, cost / spare)
+    return MainsFit(pickup, vectors, mean - entries[0], covariance, _PRIOR_DOF + spare, cost / spare)
 
 
 def force_pickup(lines: Iterable[ComplexArray | None]) -> FloatArray:
