@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 
 from rigdata.arrays import FloatArray, IntArray
-from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.bands.classic import ClassicLine, classic_line
@@ -19,7 +18,7 @@ from tpjb_ident.bands.run_spectra import OPEN_ENDS, RunSpectra, run_spectra
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs.finished_runs import ExcludedRun
-from tpjb_ident.runs.point_data import pad_means
+from tpjb_ident.runs.point_data import RunsOfPoint
 
 #: Lines over a band where a record resolves more, and bins that a line takes at least.
 _LINES, _BINS = 60, 12
@@ -30,10 +29,9 @@ _LEAST_LINES = 4
 
 
 @dataclass(frozen=True)
-class BandPoint:
+class BandPoint(RunsOfPoint):
     """Runs at one operating point, excited alike and transformed."""
 
-    point: OperatingPoint
     kind: str
     spectra: list[RunSpectra]
     bins: tuple[IntArray, ...]  #: of every line: one of a period, or some neighbouring ones of a whole record
@@ -47,31 +45,6 @@ class BandPoint:
     def resolution(self) -> float:
         """Width of a line [Hz]."""
         return max(map(len, self.bins), default=1) / self.spectra[0].phasors.length
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the runs."""
-        return tuple(s.phasors.run for s in self.spectra)
-
-    @property
-    def inertia(self) -> float:
-        """Housing mass whose inertia stays in the cells' force [kg]: none where accelerometers measure it."""
-        return self.spectra[0].phasors.housing_mass if self.spectra[0].phasors.acceleration is None else 0.0
-
-    @property
-    def temperatures(self) -> dict[int, float]:
-        """Mean film temperature per pad [K]."""
-        return pad_means([s.temperatures for s in self.spectra])
-
-    @property
-    def mean_loads(self) -> FloatArray:
-        """Mean cell force of every run, (n_runs, 2) [N]."""
-        return np.array([s.phasors.cell_force.mean[0] for s in self.spectra])
-
-    @property
-    def mean_positions(self) -> FloatArray:
-        """Mean displacement of every run, (n_runs, 2) [m]."""
-        return np.array([s.phasors.displacement.mean[0] for s in self.spectra])
 
     @property
     def method(self) -> str:
@@ -117,7 +90,8 @@ def read_point(
         return None, unusable
     _refuse_unlike(spectra)
     point = replace(first.point, excitation=0.0)
-    return BandPoint(point, first.excitation_kind, spectra, bins_of_lines(spectra)), unusable
+    phasors = tuple(s.phasors for s in spectra)
+    return BandPoint(point, phasors, first.excitation_kind, spectra, bins_of_lines(spectra)), unusable
 
 
 def _common_band(runs: Sequence[Run]) -> tuple[float, float]:

@@ -81,11 +81,11 @@ def identify_bands(
     results, numbers = [], []
     points = solved.data.points
     for b, point in enumerate(points):
-        of_runs = solved.data.loads.conditions(b), check_conditions(checked, point.names)
+        of_loads = solved.data.loads.conditions(b), check_conditions(checked, point.names)
         without = without_runs(point.point, excluded, any_excitation=True)
         of_records = (spectra.phasors.conditions for spectra in point.spectra)
         of_lines = solved.solution.conditions(), band_conditions(point, solved, b)
-        quality = merged(*of_runs, without, *of_records, *of_lines)
+        quality = merged(*of_loads, without, *of_records, *of_lines)
         result, parts = _result(solved, b, quality, settings.clearance)
         results.append(result)
         numbers += parts
@@ -158,7 +158,7 @@ def _point(solved: BandSolution, q: int, quality: tuple[Condition, ...], clearan
     film = FilmChange(float(solved.data.blocks.bent[lines[0]]))
     bent = change_conditions(film, budget, est, amplitude, clearance)
     return PointResult(
-        **of_runs(point),
+        **of_runs(point, [s.temperatures for s in point.spectra]),
         point=replace(point.point, excitation=2 * np.pi * round(est.omega / (2 * np.pi), 3)),
         stiffness=est,
         by_method={est.method: est},

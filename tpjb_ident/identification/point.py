@@ -151,7 +151,7 @@ def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> P
         check_conditions(task.checked, recorded.names),
     )
     return PointResult(
-        **of_runs(recorded),
+        **of_runs(recorded, [digest.temperatures for digest in recorded.digests]),
         point=recorded.point,
         stiffness=best,
         by_method=by_method,

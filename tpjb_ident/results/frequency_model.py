@@ -4,7 +4,7 @@ Chi-square says which of them the data support. A tilting-pad bearing owes neith
 K-C-M is refused too the raw H is the answer.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -86,11 +86,6 @@ class FrequencyModel:
         numbers[:, -1] = np.inf
         numbers[: len(value)] = np.stack([value, value - half, value + half, self.standard_error, self.dof], axis=1)
         return dict(zip(MODEL_COLUMNS, (*figures, *numbers.ravel())))
-
-
-def supported(models: Mapping[str, FrequencyModel]) -> str:
-    """The simplest model that the data do not refuse; ``"raw H"`` when they refuse all."""
-    return next((name for name, model in models.items() if not model.refused), "raw H")
 
 
 def chance_of(chi_square: float, dof: int, noise_dof: Sequence[float]) -> float:
@@ -194,7 +189,7 @@ class StaticFits:
     @property
     def supported(self) -> str:
         """The simplest model that the data do not refuse, or ``"raw H"``."""
-        return supported(self.fits)
+        return next((name for name, model in self.fits.items() if not model.refused), "raw H")
 
 
 def fits_over_frequency(points: Sequence[PointResult], changes: FloatArray | None = None) -> list[StaticFits]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from tpjb_ident.columns import place_of
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.linearity import AmplitudeSlope
+from tpjb_ident.runs.point_data import RunsOfPoint, pad_means
 
 
 @dataclass(frozen=True)
@@ -112,39 +113,15 @@ def quality_cell(conditions: Sequence[str]) -> str:
     return "; ".join(conditions) or "ok"
 
 
-class Recorded(Protocol):
-    """The runs of a point, with sines or over a band."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the runs."""
-
-    @property
-    def mean_loads(self) -> FloatArray:
-        """Mean cell force of every run, (n_runs, 2) [N]."""
-
-    @property
-    def mean_positions(self) -> FloatArray:
-        """Mean displacement of every run, (n_runs, 2) [m]."""
-
-    @property
-    def temperatures(self) -> dict[int, float]:
-        """Mean film temperature per pad [K]."""
-
-    @property
-    def inertia(self) -> float:
-        """Housing mass whose inertia stays in the cells' force [kg]."""
-
-
-def of_runs(recorded: Recorded) -> dict[str, Any]:
-    """What a point's result has of its runs, by name."""
+def of_runs(recorded: RunsOfPoint, temperatures: Sequence[dict[int, float]]) -> dict[str, Any]:
+    """What a point's result has of its runs, by name; `temperatures` of every run by pad [K]."""
     positions, runs = recorded.mean_positions, len(recorded.names)
     error = positions.std(axis=0, ddof=1) / np.sqrt(runs) if runs > 1 else np.full(2, np.nan)
     return {
         "static_load_measured": float(np.linalg.norm(recorded.mean_loads.mean(axis=0))),
         "position": positions.mean(axis=0),
         "position_se": error,
-        "temperatures": recorded.temperatures,
+        "temperatures": pad_means(temperatures),
         "n_records": runs,
         "runs": recorded.names,
         "inertia_corrected": not recorded.inertia,

@@ -16,11 +16,37 @@ _TEMPERATURE_SAMPLES = 2**17
 
 
 @dataclass(frozen=True)
-class PointData:
-    """Windows of all runs at one operating point and one excitation line."""
+class RunsOfPoint:
+    """Runs at one operating point, with sines or over a band."""
 
     point: OperatingPoint
     runs: tuple[RunPhasors, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(run.run for run in self.runs)
+
+    @property
+    def inertia(self) -> float:
+        """Housing mass whose inertia stays in the cells' force [kg]: none where accelerometers measure it."""
+        return self.runs[0].housing_mass if self.runs[0].acceleration is None else 0.0
+
+    @property
+    def mean_loads(self) -> FloatArray:
+        """Mean cell force of every run, shape (n_runs, 2) [N]."""
+        return np.array([finite_mean(run.cell_force.mean) for run in self.runs])
+
+    @property
+    def mean_positions(self) -> FloatArray:
+        """Mean displacement of every run, shape (n_runs, 2) [m]."""
+        return np.array([finite_mean(run.displacement.mean) for run in self.runs])
+
+
+@dataclass(frozen=True)
+class PointData(RunsOfPoint):
+    """Windows of all runs at one operating point and one excitation line."""
+
     lines: tuple[int, ...]
     D: ComplexArray  #: (n, 2) complex, m
     F: ComplexArray  #: (n, 2) complex, N
@@ -42,31 +68,6 @@ class PointData:
     def mass(self) -> float:
         """Housing mass whose inertia is in F [kg]: zero where no accelerometer measures it."""
         return self.runs[0].housing_mass - self.inertia
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the runs."""
-        return tuple(run.run for run in self.runs)
-
-    @property
-    def inertia(self) -> float:
-        """Housing mass whose inertia stays in the cells' force [kg]: none where accelerometers measure it."""
-        return self.runs[0].housing_mass if self.runs[0].acceleration is None else 0.0
-
-    @property
-    def temperatures(self) -> dict[int, float]:
-        """Mean film temperature per pad [K]."""
-        return pad_means([digest.temperatures for digest in self.digests])
-
-    @property
-    def mean_loads(self) -> FloatArray:
-        """Mean cell force of every run, shape (n_runs, 2) [N]."""
-        return np.array([finite_mean(run.cell_force.mean) for run in self.runs])
-
-    @property
-    def mean_positions(self) -> FloatArray:
-        """Mean displacement of every run, shape (n_runs, 2) [m]."""
-        return np.array([finite_mean(run.displacement.mean) for run in self.runs])
 
     def counted(self, weights: FloatArray) -> list[tuple[RunPhasors, IntArray]]:
         """Runs with the places of their whole windows of some weight (n,), those that have any."""

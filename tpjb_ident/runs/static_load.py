@@ -15,18 +15,17 @@ that is off looks like a load that misses its set point by more the smaller it i
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
-from rigdata.operating_point import OperatingPoint
 from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.blocks import Sensor
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
+from tpjb_ident.runs.point_data import RunsOfPoint
 
 #: Misses beyond this share are no scatter: the set point or the cells are wrong.
 MAX_MISS = 0.05
@@ -53,18 +52,6 @@ _CLEAR = 5.0
 #: and share of the smallest load that it must have.
 _NOTABLE = 0.004
 _MIN_RUNS = 4
-
-
-class LoadCase(Protocol):
-    """Where a point was run, and the mean cell force of its runs (n_runs, 2) [N]: of sines, or over a band."""
-
-    @property
-    def point(self) -> OperatingPoint:
-        """Set point."""
-
-    @property
-    def mean_loads(self) -> FloatArray:
-        """Mean cell force of every run, (n_runs, 2) [N]."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +84,7 @@ def missed_load(misses: ComplexArray, members: Sequence[int]) -> complex:
     return miss if abs(miss.real) < _LARGEST_MISS and abs(miss.imag) < MAX_SIDEWAYS else 0j
 
 
-def static_loads(campaign: Campaign, points: Sequence[LoadCase]) -> StaticLoads:
+def static_loads(campaign: Campaign, points: Sequence[RunsOfPoint]) -> StaticLoads:
     """Zero of the cells, and the misses of all runs of a campaign's points."""
     stated = max((c.zero_uncertainty for c in campaign.channels.values() if c.quantity == "force"), default=0.0)
     set_points = np.concatenate([np.full(len(data.mean_loads), _set_point(data)) for data in points])
@@ -105,21 +92,21 @@ def static_loads(campaign: Campaign, points: Sequence[LoadCase]) -> StaticLoads:
     return StaticLoads(*load_misses(points, zero), zero, error)
 
 
-def _measured(data: LoadCase) -> ComplexArray:
+def _measured(data: RunsOfPoint) -> ComplexArray:
     return np.asarray(data.mean_loads @ [1.0, 1j])
 
 
-def _set_point(data: LoadCase) -> complex:
+def _set_point(data: RunsOfPoint) -> complex:
     return complex(data.point.static_load * np.exp(1j * data.point.static_load_direction))
 
 
-def _ratio(data: LoadCase, zero: complex) -> ComplexArray:
+def _ratio(data: RunsOfPoint, zero: complex) -> ComplexArray:
     """Cells over set point of every run (n_runs,): size and direction; NaN without a load."""
     set_point = _set_point(data)
     return np.asarray((_measured(data) - zero) / set_point if set_point else _measured(data) * np.nan)
 
 
-def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[ComplexArray], complex]:
+def load_misses(points: Sequence[RunsOfPoint], zero: complex = 0.0) -> tuple[list[ComplexArray], complex]:
     """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation).
 
     The ratio is the mean of the runs about the half that agrees best; of two such halves the one nearer to the set
