@@ -15,6 +15,7 @@ from rigdata.problem import RigDataError
 from rigdata.vector import directions
 from rigdata.virtual_rig import ClearanceSweep, DryTest, Fault, Noise, RigPlan
 from tests.clearance.cases import ANGLES, CLEARANCE, OtherRun, bearing_centre, rig, sphere
+from tpjb_ident.clearance import measure
 from tpjb_ident.clearance.measure import _inseparable, coldest_first, measure_clearance, measure_run, pairs_frame
 from tpjb_ident.clearance.polygon import corners, find_centre
 from tpjb_ident.clearance.sweep import _settled
@@ -175,7 +176,7 @@ def test_a_polygon_says_how_far_the_probes_gains_are_known(whole):
     assert np.all((found >= found[0] - 1e-12) & (found < 0.01))
 
 
-def test_unequal_probes_are_made_alike_and_their_difference_is_in_the_interval(opened):
+def test_unequal_probes_are_made_alike_and_their_difference_is_in_the_interval(opened, monkeypatch):
     source = opened(rig(clearance=(80e-6,) * 5, faults=(Fault("scaled", channel="X1A", value=1.03),)))
     found = measure_clearance(source, ANGLES)
     (words,) = [s.detail for s in found.status if s == "probe-gains-differ"]
@@ -191,6 +192,12 @@ def test_unequal_probes_are_made_alike_and_their_difference_is_in_the_interval(o
     pushed, turned = found.as_read
     assert np.ptp(pushed) > 1e-6
     assert np.max(np.abs(turned - ANGLES)) == pytest.approx(0.015, rel=0.2)
+    # its sides stand where they were read, from the centre that a locus counts from as well
+    monkeypatch.setattr(measure, "_gains_differ", lambda *_: (0.0, ()))
+    plain = measure_clearance(source, ANGLES)
+    apart = directions(ANGLES) @ (found.centre - plain.centre)
+    assert np.ptp(apart) > 1e-7
+    assert pushed + apart == pytest.approx(plain.clearance_pushed, abs=1e-12)
 
 
 def test_a_sweep_of_three_or_four_pads_says_what_it_leaves_open(whole):

@@ -78,7 +78,7 @@ class ClearancePolygon(Presented):
         Standard uncertainty along the pads from the probes' certificates, relative; not in the standard errors, as in
         `PivotCurve`.
     as_read : tuple of (n,) ndarray, optional
-        Pushed clearances and fitted angles as the probes read them, where unlike gains were shared.
+        Pushed clearances from `centre` and fitted angles as the probes read them, where unlike gains were shared.
     """
 
     run: str
@@ -211,8 +211,9 @@ def measure_run(
     if differ:
         axes = float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)
         fit = alike(fit, angles, axes, ratio)
-        as_read = polygon.clearance_pushed, polygon.fitted_angle
-        polygon = replace(_polygon(run, contact, angles, fit), as_read=as_read)
+        shared = _polygon(run, contact, angles, fit)
+        pushed = polygon.clearance_pushed + directions(angles) @ (polygon.centre - shared.centre)
+        polygon = replace(shared, as_read=(pushed, polygon.fitted_angle))
     # which of two unequal probes is right is as unknown as how far they are apart
     calibration = [np.hypot(relative_calibration(probes, float(angle)), 0.5 * ratio) for angle in angles]
     polygon = replace(polygon, relative_calibration=np.array(calibration))
