@@ -10,7 +10,7 @@ from model.setup import Mesh
 from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
 from tpjb_ident.diagnosis.comparison.fit import Start, fitted
-from tpjb_ident.diagnosis.comparison.paths import path_through
+from tpjb_ident.diagnosis.comparison.paths import lengthened, path_through
 from tpjb_ident.diagnosis.comparison.search import compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import prediction
@@ -25,6 +25,30 @@ NODES = (0.8, -0.8, 1.6, -1.6, 3.0, -3.0)
 
 def path(function):
     return path_through(None, [(x, np.atleast_1d(function(x) - function(0.0))) for x in NODES])
+
+
+@pytest.mark.parametrize(
+    ("bounds", "size", "wanted"),
+    [
+        ((-9e-9, 9e-9), 1e-12, [5e-10, -5e-10]),  # small in its unit: no node is another for that
+        ((-4e-10, 9e-9), -3e-10, [5e-10, -4e-10]),  # up to the bound that lies before a typical size
+        ((0.0, 9e-9), 1.2e-9, [5e-10, 1.5e-9]),
+        ((-4e-10, 9e-9), -1.2e-9, [5e-10, -4e-10]),
+    ],
+)
+def test_a_course_is_asked_on_both_sides_as_far_as_bounds_allow(bounds, size, wanted):
+    prior = np.array([[0.0], [1.5e-9], *([end] for end in bounds)])
+    fault, asked = SimpleNamespace(width=prior[1], prior=prior), []
+
+    def run(task, jobs):
+        asked.extend(jobs)
+        return [[(node, np.array([node])) for node in nodes] for _, nodes in jobs]
+
+    near = 1.5e-9 * (1.0 / 3.0)
+    start = path_through(fault, [(near, np.array([near]))])
+    (longer,) = lengthened(run, None, (start,), [size])
+    assert longer.nodes == pytest.approx(sorted([0.0, *wanted]), rel=1e-9)
+    assert [nodes for _, nodes in asked] == [pytest.approx(wanted[1:])]
 
 
 def values(known, at):

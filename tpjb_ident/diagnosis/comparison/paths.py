@@ -1,6 +1,7 @@
 """Paths: what every fault does to the prediction over all sizes that a rig may have, laid once per campaign."""
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -82,7 +83,7 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
     columns = problem.scaled(problem.columns)
     paths = [path_through(f, [(1.0, columns[:, f.own])]) for f in curved if f.own >= 0]
     asked = [f for f in curved if f.own < 0]
-    changes = run(path_changes, [(f, [sign * _NEAR * float(f.width[0]) for sign in (1.0, -1.0)], 1) for f in asked])
+    changes = run(path_changes, [(f, _wanted(f, 0.0), 1) for f in asked])
     paths += [path_through(fault, row) for fault, row in zip(asked, changes, strict=True) if row]
     count = len(problem.nuisances)
     jobs = [((f,), np.zeros(len(f.width) + count), tuple(range(len(f.width)))) for f in straight]
@@ -93,15 +94,21 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
     return tuple(paths)
 
 
+def _wanted(fault: Fault, size: float) -> list[float]:
+    """Typical amplitudes on both sides as far as bounds allow, and the end towards which a size goes beyond them."""
+    _, width, low, high = fault.prior[:, 0].tolist()
+    shares = [_NEAR, -_NEAR, *([math.copysign(1.0, size)] if abs(size) > _NEAR * width else [])]
+    inside = [min(max(share * width, low), high) for share in shares]
+    return [node for node in dict.fromkeys(inside) if node != 0.0]
+
+
 def lengthened(run: Map, problem: Problem, paths: Sequence[Path], sizes: Sequence[float]) -> tuple[Path, ...]:
     """Paths with what a size asks for: typical sizes on both sides, and the end towards which it goes beyond them."""
     jobs, asked = [], []
     for i, (path, size) in enumerate(zip(paths, sizes, strict=True)):
-        near = _NEAR * float(path.fault.width[0])
-        wanted = [near, -near, *([float(np.copysign(near / _NEAR, size))] if abs(size) > near else [])]
         if size and path.nodes is not None:
             asked.append((i, path.nodes))
-            jobs.append((path.fault, [node for node in wanted if not np.isclose(path.nodes, node).any()]))
+            jobs.append((path.fault, [node for node in _wanted(path.fault, size) if node not in path.nodes]))
     out = list(paths)
     for (i, nodes), row in zip(asked, run(path_changes, jobs), strict=True):
         known = [(node, paths[i].columns[:, k]) for k, node in enumerate(nodes) if node != 0.0]
