@@ -101,6 +101,12 @@ class Fit:
         return any(out[at].any() for at in unknowns.slices)
 
     @property
+    def shows(self) -> bool:
+        """Whether every fault's size is told from none: its 95 % interval does not hold where nothing happens."""
+        rows = zip(self.amplitudes, self.unknowns.slices, self.errors, strict=True)
+        return all(np.any(np.abs(size - self.unknowns.origin[at]) > 1.96 * error) for size, at, error in rows)
+
+    @property
     def needs_more(self) -> bool:
         """Whether the data speak for a larger model error than right models leave: more than its prior does."""
         errors = self.problem.errors
