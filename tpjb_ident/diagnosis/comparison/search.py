@@ -338,8 +338,10 @@ class _Search:
     def _propose_without(self, fit: Fit, fault: Fault) -> None:
         """Take a fault from a model."""
         faults, linear = self._without(fit, fault)
-        estimate = posterior(self.problem.errors, linear).promised - fit.posterior.refused + self._log_prior(faults)
-        self._offer(Start(faults, linear.theta, linear.jacobian, estimate=estimate))
+        state = posterior(self.problem.errors, linear)
+        estimate = state.promised - fit.posterior.refused + self._log_prior(faults)
+        # begun where all others have taken over what it did: before they have, pads may lose or take up load
+        self._offer(Start(faults, state.mean, linear.jacobian, estimate=estimate))
 
     def _without(self, fit: Fit, fault: Fault) -> tuple[tuple[Fault, ...], Linear]:
         """A model without one of its faults, whose tolerance has its stated prior again and stays where it is."""
