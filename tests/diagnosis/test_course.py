@@ -128,7 +128,7 @@ def test_a_start_without_an_equilibrium_is_taken_nearer_to_what_is_stated():
     jacobian = np.column_stack([np.zeros(len(planned)), problem.scaled(problem.columns)])
     with workers(forward, problem, 1) as run:
         assert next(iter(run(prediction, [((fault,), theta)]))) is None
-        fit = fitted(run, problem, Start((fault,), theta, jacobian))
+        fit = fitted(run, problem, Start((fault,), (theta,), jacobian))
     assert abs(fit.linear.theta[0]) <= np.radians(1.0)
 
 
@@ -144,6 +144,6 @@ def test_a_fit_goes_on_while_its_steps_pay():
         return straight @ theta + bent @ theta**2
 
     problem = SimpleNamespace(measured=shown(truth), errors=errors, nuisances=nuisances)
-    fit = fitted(lambda task, jobs: [shown(theta) for _, theta in jobs], problem, Start((), np.zeros(6), straight))
+    fit = fitted(lambda task, jobs: [shown(theta) for _, theta in jobs], problem, Start((), (np.zeros(6),), straight))
     assert fit.linear.theta == pytest.approx(truth, abs=0.05)
     assert fit.posterior.refused < 1.0

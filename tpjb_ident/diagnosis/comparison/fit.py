@@ -167,7 +167,7 @@ class Start:
     """An explanation to be fitted, and where its fit begins, on derivatives known from nearby."""
 
     faults: tuple[Fault, ...]
-    theta: FloatArray = field(repr=False)
+    places: tuple[FloatArray, ...] = field(repr=False)  #: the best counts: jumps of K and C may lie between them
     jacobian: FloatArray = field(repr=False)
     coarse: bool = False  #: past jumps of K and C first: every element off by itself, tolerances held
     solved: Linear | None = None  #: the model that it was proposed beside, where that was solved
@@ -182,16 +182,12 @@ class Start:
 def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
     """Fit from a start; None where there is no equilibrium."""
     unknowns = Unknowns(problem, start.faults)
-    linear = start.solved
-    for share in _SHARES:  # nearer to what is stated, where there is no equilibrium
-        theta = share * np.clip(start.theta, unknowns.low, unknowns.high)
-        (predicted,) = tuple(run(prediction, [(start.faults, theta)]))
-        if predicted is not None:
-            reached = Linear(problem.measured - predicted, theta, start.jacobian, unknowns.width)
-            linear = _better(reached, start, problem.errors)
-            break
-    if linear is None:
+    begun = [at for place in start.places if (at := _begun(run, unknowns, place, start.jacobian)) is not None]
+    if start.solved is not None and not (start.coarse and begun):
+        begun.append(start.solved)
+    if not begun:
         return None
+    linear = max(begun, key=lambda at: posterior(problem.errors, at).total)
     if start.coarse:
         held = unknowns.width.copy()
         held[unknowns.tolerances] = Deciding.held
@@ -203,12 +199,14 @@ def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
     return _settled(run, unknowns, linear)
 
 
-def _better(reached: Linear, start: Start, errors: ErrorModel) -> Linear:
-    """What a step promised, or where it began: a jump of K and C may lie between them."""
-    if start.solved is None or start.coarse:
-        return reached
-    totals = [posterior(errors, linear).total for linear in (reached, start.solved)]
-    return reached if totals[0] >= totals[1] else start.solved
+def _begun(run: Map, unknowns: Unknowns, place: FloatArray, jacobian: FloatArray) -> Linear | None:
+    """The model at a place, or nearer to what is stated, where there is no equilibrium; None where there is none."""
+    for share in _SHARES:
+        theta = share * np.clip(place, unknowns.low, unknowns.high)
+        (predicted,) = tuple(run(prediction, [(unknowns.faults, theta)]))
+        if predicted is not None:
+            return Linear(unknowns.problem.measured - predicted, theta, jacobian, unknowns.width)
+    return None
 
 
 def refined(run: Map, fit: Fit, whole: bool = True) -> Fit:

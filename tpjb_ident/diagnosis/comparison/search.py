@@ -80,7 +80,7 @@ class _Search:
 
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
-        self._fit(Start((), self._stated.theta, self._stated.jacobian))
+        self._fit(Start((), (self._stated.theta,), self._stated.jacobian))
         self.report("every effect of the library", 0.1)
         self._propose_singles()
         self._propose_neighbours(self.fits[frozenset()])  # from where its tolerances have gone
@@ -95,13 +95,17 @@ class _Search:
             return None
         if not (self.whole or self._passed or any(map(self._comes_first, self.proposals.values()))):
             self._ask_whole_paths()
-        leader = self._leader()
-        promising = [p for p in self.proposals.values() if leader is None or self._promising(p, leader)]
+        leader, promising = self._leader(), self._waiting()
         if promising:
             return self.proposals.pop(max(promising, key=lambda p: (self._comes_first(p), p.estimate)).labels)
         if leader is None or leader.posterior.scale > Deciding.right:
             return None
         return self._look_alike(leader) or self._passed_over(leader)
+
+    def _waiting(self) -> list[Start]:
+        """Proposals that may change the answer."""
+        leader = self._leader()
+        return [p for p in self.proposals.values() if leader is None or self._promising(p, leader)]
 
     def _look_alike(self, leader: Fit) -> Start | None:
         """The leader with a fault exchanged for what the campaign hardly tells from it; None where all were fitted."""
@@ -216,7 +220,7 @@ class _Search:
         promised = max(fit.posterior.promised, proposal.estimate - self._log_prior(fit.faults))
         if wrong and not passed and self._near(fit, promised, 0.0):
             self.begun[proposal.labels] = -math.inf
-            coarse = self._reached(Start(fit.faults, fit.linear.theta, fit.linear.jacobian, coarse=True))
+            coarse = self._reached(Start(fit.faults, (fit.linear.theta,), fit.linear.jacobian, coarse=True))
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
         known = self.fits.get(proposal.labels)
         if known is not None and known.posterior.total >= fit.posterior.total:
@@ -333,15 +337,15 @@ class _Search:
         solved = Linear(linear.residual, theta, jacobian, unknowns.width)
         theta = theta.copy()
         theta[at] = score.amplitudes  # counted from where nothing happens: what its tolerance had found is in it
-        return Start(faults, theta, jacobian, coarse, solved, estimate)
+        return Start(faults, (theta,), jacobian, coarse, solved, estimate)
 
     def _propose_without(self, fit: Fit, fault: Fault) -> None:
         """Take a fault from a model."""
         faults, linear = self._without(fit, fault)
         state = posterior(self.problem.errors, linear)
         estimate = state.promised - fit.posterior.refused + self._log_prior(faults)
-        # begun where all others have taken over what it did: before they have, pads may lose or take up load
-        self._offer(Start(faults, state.mean, linear.jacobian, estimate=estimate))
+        # pads may lose or take up load before all others have taken over what it did, or after
+        self._offer(Start(faults, (state.mean, linear.theta), linear.jacobian, estimate=estimate))
 
     def _without(self, fit: Fit, fault: Fault) -> tuple[tuple[Fault, ...], Linear]:
         """A model without one of its faults, whose tolerance has its stated prior again and stays where it is."""
@@ -369,12 +373,16 @@ class _Search:
             self.proposals[proposal.labels] = proposal
 
     def _weighed(self) -> Comparison:
-        """Probabilities among the tenable fits; among all where none is."""
+        """Probabilities among the tenable fits; among all where none is.
+
+        What still waits for a fit counts as it promises: a search that was cut short is not sure of what it found.
+        """
         rows = list(self.fits.values())
         tenable = frozenset(fit for fit in rows if _tenable(fit))
         logs = np.array([self._log_probability(fit) for fit in rows])
         counted = np.where([fit in tenable for fit in rows], logs, -np.inf) if tenable else logs
-        probabilities = np.exp(counted - logsumexp(counted))
+        waiting = [p.estimate for p in self._waiting() if p.labels not in self.fits]
+        probabilities = np.exp(counted - logsumexp([*counted, *waiting]))
         order = np.lexsort((-logs, -probabilities))
         return Comparison({rows[i]: float(probabilities[i]) for i in order}, tenable, self.paths)
 

@@ -80,11 +80,12 @@ def _exactly(comparison: Comparison, sure: frozenset[str]) -> Fit | None:
 
 
 def _family(comparison: Comparison, sure: frozenset[str]) -> tuple[str, ...]:
-    """Names that only together have the probability that a name takes; none where these are too many."""
+    """Names of which one or another has the probability that a name takes; none where these are too many."""
     rest = {name: share for name, share in comparison.shares.items() if name not in sure}
     names = sorted(rest, key=lambda name: -rest[name])[: Deciding.family]
     for count in range(2, len(names) + 1):
-        if sum(rest[name] for name in names[:count]) >= Deciding.included:
+        holding = [p for fit, p in comparison.probabilities.items() if not fit.names.isdisjoint(names[:count])]
+        if sum(holding) >= Deciding.included:
             return tuple(names[:count])
     return ()
 
