@@ -74,23 +74,18 @@ class Search:
         self.state = self._state()
 
     def _pads(self) -> PadStack:
-        films, supply = self.films, self.case.supply
+        films = self.films
         each = np.zeros(len(films), PAD)
         laws, curves = encoded(self.setup.pivots)
-        numbers: dict[str, Any] = {
-            "frame": [(f.normal, f.tangent) for f in films],
-            "preload": [f.preload_distance for f in films],
-            "pivot_radius": [f.pivot_radius for f in films],
-            "clearance": [f.pad.pad_clearance for f in films],
-            "law": laws,
-            "flattest": [-math.inf if f.pad.leading_edge_pressure else 0.0 for f in films],
-            "supplied": math.inf,
-            "inlet": supply,
-            "resting": math.nan,
-            "heating": math.inf,
-        }
-        for name, values in numbers.items():
-            each[name] = values
+        each["frame"] = [(f.normal, f.tangent) for f in films]
+        each["preload"] = [f.preload_distance for f in films]
+        each["pivot_radius"] = [f.pivot_radius for f in films]
+        each["clearance"] = [f.pad.pad_clearance for f in films]
+        each["law"] = laws
+        each["flattest"] = [-math.inf if f.pad.leading_edge_pressure else 0.0 for f in films]
+        each["supplied"] = each["heating"] = math.inf
+        each["inlet"] = self.case.supply
+        each["resting"] = math.nan
         angles = [f.pad.pivot_angle % math.tau for f in films]
         return PadStack(each, np.argsort(angles, kind="stable"), curves)
 

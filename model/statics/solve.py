@@ -44,7 +44,6 @@ def solve_equilibrium(
             # where pads are left idle that could carry, another start may leave others
             if warm.converged and not any(warm.loose) and warm.idle.sum() <= np.isnan(search.begun.tilt).sum():
                 return warm
-    warm = warm if warm is not None and warm.converged else None
     search = Search(setup, load, speed).stand()
     above, loaded = search.margins(), ~search.pads["idle"]
     near = np.abs(above) < _NEAR
@@ -58,7 +57,7 @@ def solve_equilibrium(
     for attempt in _ATTEMPTS:
         if patient and not result.converged:
             result = attempt(setup, load, speed, result)
-    return result if result.converged or warm is None else warm
+    return result if result.converged or warm is None or not warm.converged else warm
 
 
 def _with_pads(setup: Setup, load: FloatArray, speed: float, loaded: BoolArray) -> Equilibrium:
@@ -132,17 +131,19 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
     refused = set(held)
     near = _NEAR_SOFT if search.setup.flexible_pads or couples_heat(search.setup) else _NEAR
     while True:
-        above = search.margins()
-        doubtful = [m for m, f in enumerate(result.films) if f.idle and above[m] > -near and m not in refused]
+        above, idle = search.margins(), result.idle
+        if not held and np.where(idle, -above, np.abs(above)).min() > near:
+            return result
+        doubtful = [m for m in np.flatnonzero(idle & (above > -near)).tolist() if m not in refused]
         if not doubtful:
             return _named(search, result, near, held)
-        pad = max(doubtful, key=lambda m: float(above[m]))
+        pad = max(doubtful, key=lambda m: above[m])
         trial = Search(search.setup, search.load, search.speed, search.heat)
         trial.start_from(result)
-        trial.load_pads(np.arange(len(trial.films)) == pad)
+        trial.load_pads(np.arange(len(idle)) == pad)
         other = trial.run()
         refused.add(pad)
-        if other.converged and not other.idle[pad] and other.idle.sum() < result.idle.sum():
+        if other.converged and not other.idle[pad] and other.idle.sum() < idle.sum():
             search, result = trial, other
 
 
