@@ -147,3 +147,24 @@ def test_a_fit_goes_on_while_its_steps_pay():
     fit = fitted(lambda task, jobs: [shown(theta) for _, theta in jobs], problem, Start((), (np.zeros(6),), straight))
     assert fit.linear.theta == pytest.approx(truth, abs=0.05)
     assert fit.posterior.refused < 1.0
+
+
+def test_a_fit_begins_at_the_better_of_its_places_whichever_comes_first():
+    """A jump lies between where nothing is off and the truth; no derivative foretells it."""
+    rng = np.random.default_rng(5)
+    straight = rng.normal(size=(40, 3))
+    jump = 2.0 * straight[:, 0] + 0.5 * rng.normal(size=40)  # from before it another size does nearly the same
+    errors = ErrorModel(0.02**2 * np.eye(40), 1e-4 * np.eye(40), np.ones(1))
+    truth = np.array([1.5, -1.0, 0.5])
+
+    def shown(theta):
+        return straight @ theta + jump * (theta[0] < 1.0)
+
+    problem = SimpleNamespace(measured=shown(truth), errors=errors, nuisances=(SimpleNamespace(column=None),) * 3)
+    near, far = truth - 0.1, np.zeros(3)
+    reached = {}
+    for name, places in {"far": (far,), "near": (near,), "both": (near, far), "turned": (far, near)}.items():
+        fit = fitted(lambda task, jobs: [shown(theta) for _, theta in jobs], problem, Start((), places, straight))
+        reached[name] = fit.posterior.total
+    assert reached["far"] < reached["near"] - 1000.0
+    assert reached["both"] == reached["turned"] == reached["near"]

@@ -132,10 +132,10 @@ def test_forward_says_where_there_is_no_equilibrium(setup):
 
 @pytest.mark.slow
 def test_plan_tells_what_direct_coefficients_alone_cannot(setup, layout):
-    pool = [c for c in candidates(setup) if c.name in {"probe_gain", "loadcell_gain"}]
+    pair = ("probe_gain", "loadcell_gain")
     bare = Layout(tuple(replace(t, pads=()) for t in layout.dynamic))
-    assert plan(setup, bare, pool=pool).confusable
-    assert not plan(setup, layout, pool=pool).confusable
+    assert {pair, pair[::-1]} & {*plan(setup, bare).confusable}
+    assert not {pair, pair[::-1]} & {*plan(setup, layout).confusable}
 
 
 def test_next_test_ranks_the_test_that_separates(setup):

@@ -125,6 +125,17 @@ def test_what_is_left_out_would_not_have_changed_the_answer(campaign, usual):
     assert sum(whole.probabilities[fit] for fit in left_out) < spare
 
 
+@pytest.mark.slow
+def test_a_search_that_was_cut_short_counts_what_waits_as_it_promises(campaign, usual):
+    _, whole = usual
+    assert whole.waiting == ()
+    _, short = fits_of(campaign, most_fits=1)
+    assert [fit.faults for fit in short.fits] == [()]
+    assert short.probabilities[short.nothing] < 0.01
+    assert short.holding("oil_viscosity") > 0.95
+    assert short.probabilities[short.nothing] + sum(p for _, p in short.waiting) == pytest.approx(1.0)
+
+
 def test_what_a_refused_step_promised_counts_for_no_explanation_beside(monkeypatch):
     errors, linear, columns = linear_case([1.0])
     state = posterior(errors, linear)
@@ -160,8 +171,8 @@ def test_no_fault_at_all_is_proposed_from_where_a_single_one_leads(monkeypatch):
     )  # fmt: skip
     (nothing,) = proposals
     assert nothing.faults == ()
-    # where all that is left has taken over what it did, by the model that the single one has reached
-    np.testing.assert_allclose(nothing.theta, posterior(errors, linear).mean)
+    # where all that is left has taken over what it did, by the model that the single one has reached, or before it has
+    np.testing.assert_allclose(nothing.places, [posterior(errors, linear).mean, linear.theta])
 
 
 @pytest.mark.slow

@@ -23,8 +23,8 @@ from tpjb_ident.diagnosis.forward.nuisance import nuisances
 from tpjb_ident.diagnosis.forward.workers import Map, workers
 from tpjb_ident.diagnosis.next_test import Separation, options_for, ranked, say, separated, suggested
 from tpjb_ident.diagnosis.observations.constants import Deciding
-from tpjb_ident.diagnosis.observations.observe import Layout, Observations, Where
-from tpjb_ident.diagnosis.verdict.decide import decide
+from tpjb_ident.diagnosis.observations.observe import Observations, Where
+from tpjb_ident.diagnosis.verdict.decide import Decision, decide
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, coefficient_column
 
@@ -65,8 +65,7 @@ def diagnose(
     with workers(forward, problem, settings.workers) as run:
         comparison = compare(run, problem, progress)
         decision = decide(run, problem, comparison, settings.tolerances)
-        campaign = quick, observations.layout
-        words = _next_test(run, decision.verdict, comparison, decision.model, campaign, settings)
+        words = _next_test(run, decision, comparison, quick, settings)
     return Diagnosis(replace(decision.verdict, next_test=words), problem, comparison, decision.after)
 
 
@@ -87,22 +86,19 @@ def pose(observations: Observations, forward: Forward, settings: DiagnoseSetting
     return problem
 
 
-def _next_test(
-    run: Map, verdict: Verdict, comparison: Comparison, model: Fit, campaign: tuple[Setup, Layout],
-    settings: DiagnoseSettings,
-) -> str:  # fmt: skip
+def _next_test(run: Map, decision: Decision, comparison: Comparison, setup: Setup, settings: DiagnoseSettings) -> str:
     """What one more test would tell, in words: which explanation it is, or that it is the one named."""
+    verdict, model = decision.verdict, decision.model
     if verdict.verdict == "consistent":
         return "none needed"
     if not verdict.effects:
         worst = verdict.disagreement[0]
         return f"repeat {worst.observable} at {worst.where}, where the unknown shows most, with another sensor set"
-    setup, layout = campaign
     rivals = _rivals(comparison, model)
     if not rivals:
         return ""
     others = [fit.effects for fit in rivals]
-    options = options_for(setup, layout)
+    options = options_for(setup, model.problem.observations.layout)
     tried = run(_separated, [(setup, option, model.effects, others, settings.tolerances) for option in options])
     tests = ranked([separation for separation in tried if separation is not None])
     if not tests:

@@ -12,7 +12,6 @@ Chem. Eng. Sci. 38 (1983) 225). The nearest rival counts. Beside tests on the ri
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from collections.abc import Sequence
@@ -144,14 +143,14 @@ def _other_rigs(setup: Setup, at: _OperatingRange) -> list[Design]:
     drowned = at.sweep("with so much oil that more changes nothing")
     out = [
         replace(at.run(outside, [at.low, at.top], at.lines), blind=frozenset({"housing_flexibility"})),
-        replace(hotter, change=functools.partial(_hotter, by=_HOTTER)),
+        replace(hotter, change=_hotter),
         replace(drowned, blind=frozenset({"starvation"}), unsure=frozenset({"hot_oil_carryover"})),
     ]
     return [*out, *([at.sweep("with the shaft turning the other way", -1.0)] if reversible(setup) else [])]
 
 
-def _hotter(setup: Setup, by: float) -> Setup:
-    return setup.change(supply_change=setup.supply_change + by)
+def _hotter(setup: Setup) -> Setup:
+    return setup.change(supply_change=setup.supply_change + _HOTTER)
 
 
 def _static(at: _OperatingRange) -> list[Design]:

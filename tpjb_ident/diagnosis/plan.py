@@ -103,9 +103,9 @@ class CampaignPlan:
         return pd.DataFrame(rows)
 
 
-def plan(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None) -> CampaignPlan:
+def plan(setup: Setup, layout: Layout) -> CampaignPlan:
     """Work out what a layout of tests could tell."""
-    return _shown(setup, layout, pool).by()
+    return _shown(setup, layout).by()
 
 
 @dataclass(frozen=True)
@@ -117,22 +117,20 @@ class _Signatures:
     nuisances: FloatArray = field(repr=False)  #: (n, m): columns per standard deviation
     columns: FloatArray = field(repr=False)  #: (n, k): change by a typical size of every candidate
 
-    def by(self, rows: BoolArray | None = None, free: bool = True) -> CampaignPlan:
+    def by(self, rows: BoolArray | slice = slice(None), free: bool = True) -> CampaignPlan:
         """Sizes and separations by some elements, all by default, with or without nuisances."""
-        mine = slice(None) if rows is None else rows
         factor = usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
         # rows of a Cholesky factor have the covariance of those elements
-        lower = np.asarray(np.linalg.qr(factor[mine].T, mode="r")).T
-        white = np.asarray(np.linalg.solve(lower, self.columns[mine]))
+        lower = np.asarray(np.linalg.qr(factor[rows].T, mode="r")).T
+        white = np.asarray(np.linalg.solve(lower, self.columns[rows]))
         apart = separations(white)
         np.fill_diagonal(apart, np.nan)
         return CampaignPlan(self.candidates, np.linalg.norm(white, axis=0), apart)
 
 
-def _shown(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None) -> _Signatures:
+def _shown(setup: Setup, layout: Layout) -> _Signatures:
     """Work out the signature of every candidate on a layout."""
-    everything = [c for c in candidates(setup) if len(c.steps) == 1 and c.name not in TERMS]
-    chosen = tuple(everything if pool is None else pool)
+    chosen = tuple(c for c in candidates(setup) if len(c.steps) == 1 and c.name not in TERMS)
     observations = planned_observations(setup, layout)
     forward = Forward(setup, layout, observations.elements)
     base = forward()

@@ -170,7 +170,6 @@ class Start:
     places: tuple[FloatArray, ...] = field(repr=False)  #: the best counts: jumps of K and C may lie between them
     jacobian: FloatArray = field(repr=False)
     coarse: bool = False  #: past jumps of K and C first: every element off by itself, tolerances held
-    solved: Linear | None = None  #: the model that it was proposed beside, where that was solved
     estimate: float = 0.0  #: log p(y, model) to first order [nats]
 
     @property
@@ -183,8 +182,6 @@ def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
     """Fit from a start; None where there is no equilibrium."""
     unknowns = Unknowns(problem, start.faults)
     begun = [at for place in start.places if (at := _begun(run, unknowns, place, start.jacobian)) is not None]
-    if start.solved is not None and not (start.coarse and begun):
-        begun.append(start.solved)
     if not begun:
         return None
     linear = max(begun, key=lambda at: posterior(problem.errors, at).total)

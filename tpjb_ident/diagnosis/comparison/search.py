@@ -9,7 +9,7 @@ others that already do a look-alike's work a score says little.
 import functools
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -29,9 +29,10 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Comparison:
-    """All explanations that were fitted, with their probabilities."""
+    """All explanations, with their probabilities: a search that was cut short is not sure of what it found."""
 
     probabilities: Mapping[Fit, float]  #: the most probable first; those that are not tenable last
+    waiting: tuple[tuple[Set[str], float], ...]  #: names of what was not fitted: as it promises
     tenable: frozenset[Fit]  #: those that no tolerance, no bound and no size that is none speaks against
     paths: tuple[Path, ...] = field(repr=False)
 
@@ -53,8 +54,12 @@ class Comparison:
     @property
     def shares(self) -> dict[str, float]:
         """Inclusion probability of every name, on whichever pad or direction."""
-        names = {name for fit in self.fits for name in fit.names}
-        return {name: sum(p for fit, p in self.probabilities.items() if name in fit.names) for name in names}
+        return {name: self.holding(name) for fit in self.fits for name in fit.names}
+
+    def holding(self, *names: str) -> float:
+        """Probability that one or another of some names takes part."""
+        fitted = [(fit.names, p) for fit, p in self.probabilities.items()]
+        return sum(p for listed, p in (*fitted, *self.waiting) if not listed.isdisjoint(names))
 
 
 def compare(run: Map, problem: Problem, progress: Progress | None = None) -> Comparison:
@@ -145,7 +150,7 @@ class _Search:
         faults, linear = self._without(fit, fault)
         nothing = Strain(np.zeros((0, len(linear.theta))), np.zeros(0))
         score = scores(self.problem.errors, linear, [path], nothing)[0]
-        return replace(self._with(score, faults, linear), solved=None)
+        return self._with(score, faults, linear)
 
     @property
     def _passed(self) -> bool:
@@ -238,8 +243,7 @@ class _Search:
 
     def _leader(self) -> Fit | None:
         """The most probable tenable fit so far."""
-        rows = [fit for fit in self.fits.values() if _tenable(fit)]
-        return max(rows, key=self._log_probability, default=None)
+        return max(filter(_tenable, self.fits.values()), key=self._log_probability, default=None)
 
     def _log_probability(self, fit: Fit) -> float:
         return fit.posterior.total + self._log_prior(fit.faults)
@@ -325,19 +329,18 @@ class _Search:
         estimate = score.total + self._log_prior(faults)
         if score.p < Deciding.untenable:  # it would have to be a step on the way
             estimate -= Deciding.near
-        theta, jacobian, unknowns = linear.theta, linear.jacobian, Unknowns(self.problem, faults)
+        theta, jacobian = linear.theta, linear.jacobian
         if fault.own < 0:
             first = len(theta) - len(self.problem.nuisances)
             theta = np.insert(theta, [first] * len(fault.width), 0.0)
             jacobian = np.insert(jacobian, [first] * len(fault.width), 0.0, axis=1)
-        start = unknowns.slices[-1].start
+        start = Unknowns(self.problem, faults).slices[-1].start
         at = slice(start, start + len(score.amplitudes))
         jacobian = jacobian.copy()
         jacobian[:, at] = score.path.columns @ score.path.slopes(score.amplitudes[None, :])[0]
-        solved = Linear(linear.residual, theta, jacobian, unknowns.width)
-        theta = theta.copy()
-        theta[at] = score.amplitudes  # counted from where nothing happens: what its tolerance had found is in it
-        return Start(faults, (theta,), jacobian, coarse, solved, estimate)
+        wanted = theta.copy()
+        wanted[at] = score.amplitudes  # counted from where nothing happens: what its tolerance had found is in it
+        return Start(faults, (wanted,) if coarse else (wanted, theta), jacobian, coarse, estimate)
 
     def _propose_without(self, fit: Fit, fault: Fault) -> None:
         """Take a fault from a model."""
@@ -373,18 +376,17 @@ class _Search:
             self.proposals[proposal.labels] = proposal
 
     def _weighed(self) -> Comparison:
-        """Probabilities among the tenable fits; among all where none is.
-
-        What still waits for a fit counts as it promises: a search that was cut short is not sure of what it found.
-        """
+        """Probabilities among the tenable fits; among all where none is."""
         rows = list(self.fits.values())
         tenable = frozenset(fit for fit in rows if _tenable(fit))
         logs = np.array([self._log_probability(fit) for fit in rows])
         counted = np.where([fit in tenable for fit in rows], logs, -np.inf) if tenable else logs
-        waiting = [p.estimate for p in self._waiting() if p.labels not in self.fits]
-        probabilities = np.exp(counted - logsumexp([*counted, *waiting]))
+        waiting = self._waiting()
+        total = logsumexp([*counted, *(start.estimate for start in waiting)])
+        probabilities = np.exp(counted - total)
         order = np.lexsort((-logs, -probabilities))
-        return Comparison({rows[i]: float(probabilities[i]) for i in order}, tenable, self.paths)
+        rest = tuple(({fault.name for fault in s.faults}, math.exp(s.estimate - total)) for s in waiting)
+        return Comparison({rows[i]: float(probabilities[i]) for i in order}, rest, tenable, self.paths)
 
 
 def _tenable(fit: Fit) -> bool:

@@ -52,8 +52,8 @@ class Unknowns:
     def effects(self, theta: FloatArray) -> tuple[Effect, ...]:
         """The faults as effects."""
         amplitudes = theta + self.origin
-        values = [fault.values(amplitudes[at]) for fault, at in zip(self.faults, self.slices, strict=True)]
-        return tuple(Effect(fault.name, **table) for fault, table in zip(self.faults, values, strict=True))
+        pairs = zip(self.faults, self.slices, strict=True)
+        return tuple(Effect(fault.name, **fault.values(amplitudes[at])) for fault, at in pairs)
 
     def predict(self, forward: Forward, theta: FloatArray) -> FloatArray | None:
         """Prediction in units of sigma, (n,); None where the model has no equilibrium."""

@@ -74,7 +74,7 @@ def gap(observations: Observations, prediction: FloatArray, chosen: BoolArray | 
     """Root mean square of `residuals`; NaN where nothing is chosen; `prediction` (n,), `chosen` (n,)."""
     z = residuals(observations, prediction)
     z = z if chosen is None else z[chosen]
-    return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")
+    return float(np.sqrt(np.mean(z**2))) if len(z) else math.nan
 
 
 def noise_floor(observations: Observations, chosen: BoolArray) -> float:
@@ -88,9 +88,9 @@ def gap_by_observable(
     """Held-out gap before and after, per observable; observables without held-out points use all of theirs."""
     names, out = named(observations.elements, "observable"), {}
     for name in dict.fromkeys(names.tolist()):
-        selected = names == name
-        seen = bool((selected & chosen).any())
-        part, key = (selected & chosen, "heldout") if seen else (selected, "fitted")
+        part, key = (names == name) & chosen, "heldout"
+        if not part.any():
+            part, key = names == name, "fitted"
         ends = {"before": before, "after": after}
         out[name] = {f"{key}_{end}": gap(observations, prediction, part) for end, prediction in ends.items()}
     return out

@@ -81,11 +81,10 @@ def _exactly(comparison: Comparison, sure: frozenset[str]) -> Fit | None:
 
 def _family(comparison: Comparison, sure: frozenset[str]) -> tuple[str, ...]:
     """Names of which one or another has the probability that a name takes; none where these are too many."""
-    rest = {name: share for name, share in comparison.shares.items() if name not in sure}
-    names = sorted(rest, key=lambda name: -rest[name])[: Deciding.family]
+    shares = comparison.shares
+    names = sorted(shares.keys() - sure, key=lambda name: (-shares[name], name))[: Deciding.family]
     for count in range(2, len(names) + 1):
-        holding = [p for fit, p in comparison.probabilities.items() if not fit.names.isdisjoint(names[:count])]
-        if sum(holding) >= Deciding.included:
+        if comparison.holding(*names[:count]) >= Deciding.included:
             return tuple(names[:count])
     return ()
 
