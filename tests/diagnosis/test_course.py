@@ -32,7 +32,7 @@ def path(function):
     [
         ((-9e-9, 9e-9), 1e-12, [5e-10, -5e-10]),  # small in its unit: no node is another for that
         ((-4e-10, 9e-9), -3e-10, [5e-10, -4e-10]),  # up to the bound that lies before a typical size
-        ((0.0, 9e-9), 1.2e-9, [5e-10, 1.5e-9]),
+        ((0.0, 9e-9), 1.2e-9, [5e-10, 1e-9, 1.5e-9]),  # and the middle before an end
         ((-4e-10, 9e-9), -1.2e-9, [5e-10, -4e-10]),
     ],
 )

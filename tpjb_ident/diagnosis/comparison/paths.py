@@ -95,11 +95,15 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
 
 
 def _wanted(fault: Fault, size: float) -> list[float]:
-    """Typical amplitudes on both sides as far as bounds allow, and the end towards which a size goes beyond them."""
+    """Typical amplitudes on both sides as far as bounds allow, and the end towards which a size goes beyond them.
+
+    With the middle: at its end, a bound perhaps, an effect is extreme, and the piece before it would follow that.
+    """
     _, width, low, high = fault.prior[:, 0].tolist()
-    shares = [_NEAR, -_NEAR, *([math.copysign(1.0, size)] if abs(size) > _NEAR * width else [])]
-    inside = [min(max(share * width, low), high) for share in shares]
-    return [node for node in dict.fromkeys(inside) if node != 0.0]
+    side = math.copysign(width, size)
+    near, back, end = np.clip([_NEAR * side, -_NEAR * side, side], low, high).tolist()
+    beyond = [0.5 * (near + end), end] if abs(size) > _NEAR * width else []
+    return [node for node in dict.fromkeys([near, back, *beyond]) if node]
 
 
 def lengthened(run: Map, problem: Problem, paths: Sequence[Path], sizes: Sequence[float]) -> tuple[Path, ...]:

@@ -30,7 +30,7 @@ class Candidate:
     def label(self) -> str:
         """Name with its fixed parameters: ``soft_pivot pad 5``."""
         spoken = (f"{k} {v:g}" for k, v in self.fixed.items())
-        return " ".join([self.name, *([self.form] if self.form else []), *spoken])
+        return " ".join([self.name, *filter(None, [self.form]), *spoken])
 
     @property
     def parameter(self) -> Parameter:

@@ -125,11 +125,8 @@ def at_baseline(
     forward: Forward, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
 ) -> FloatArray:
     """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
-    columns = []
-    for one in nuisances(forward.elements, setup, known, by_pad=False):
-        moved = predict(forward, effects, (one,), np.array([_STEP]))
-        columns.append((moved - base) / _STEP)
-    return np.column_stack(columns)
+    listed, step = nuisances(forward.elements, setup, known, by_pad=False), np.array([_STEP])
+    return np.column_stack([(predict(forward, effects, (nuisance,), step) - base) / _STEP for nuisance in listed])
 
 
 def predict(forward: Forward, effects: Sequence[Effect], known: Sequence[Nuisance], size: FloatArray) -> FloatArray:

@@ -53,8 +53,6 @@ def residuals(observations: Observations, prediction: FloatArray) -> FloatArray:
     """
     z = (observations.value - prediction) / observations.total_sigma
     shifts = centre_shifts(observations.elements) / observations.total_sigma[:, None]
-    if not np.any(shifts):
-        return z
     return np.asarray(z - shifts @ np.linalg.lstsq(shifts, z, rcond=None)[0])
 
 
