@@ -107,7 +107,7 @@ class ChannelResponse:
         total = np.exp(-2j * math.pi * f * self.delay)
         for each in self.filters:
             total = total * each.at(f)
-        return np.asarray(total)
+        return total
 
 
 #: Of a channel that records as it is.

@@ -44,8 +44,8 @@ class ChannelStatistics:
         breaks = np.flatnonzero(~repeated)
         starts = np.concatenate([[-self._flat], breaks]) if repeated[0] else breaks
         lengths = np.diff(starts, append=len(present))
-        best = int(np.argmax(lengths))
-        if len(values) and int(lengths[best]) > self.longest_flat:
+        best = np.argmax(lengths)
+        if len(values) and lengths[best] > self.longest_flat:
             self.longest_flat = int(lengths[best])
             self.flat_start = self.samples + int(starts[best])
         self._last, self._flat = float(present[-1]), int(lengths[-1])
@@ -87,11 +87,11 @@ class ChannelStatistics:
 
 def _flat_share(readings: FloatArray, top: float, width: float) -> float:
     at_top = readings == top
-    count = int(np.count_nonzero(at_top))
+    count = np.count_nonzero(at_top)
     starts = np.count_nonzero(np.diff(at_top.astype(int), prepend=0) > 0)
     if count < 20 or starts < 3 or 2 * count < 3 * starts or count < 0.005 * len(readings):
         return 0.0
     # At least the next level that occurs, however coarse the converter.
-    below = min(top - width, float(np.max(readings[~at_top])))
-    near = int(np.count_nonzero(readings >= below)) - count
+    below = min(top - width, np.max(readings[~at_top]))
+    near = np.count_nonzero(readings >= below) - count
     return count / len(readings) if count >= 4 * near else 0.0

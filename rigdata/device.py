@@ -67,7 +67,7 @@ def rate_of_time(time: FloatArray) -> float:
     span = min(1000, len(finite) // 4) or len(finite) - 1
     if span < 1:
         return np.nan
-    step = float(np.median(finite[span:] - finite[:-span])) / span
+    step = np.median(finite[span:] - finite[:-span]) / span
     # Ten digits: as much as a column of rounded times holds; keeps 1000 Hz from being 999.9999999999.
     return float(f"{1.0 / step:.10g}") if step > 0 else np.nan
 

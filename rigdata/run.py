@@ -268,7 +268,7 @@ class Run(RunDescription):
         for channel in self.temperatures():
             with suppress(RigDataError):  # `check` tells
                 values = self.record(channel.name).values
-                means += [float(np.nanmean(values))] if np.isfinite(values).any() else []
+                means += [np.nanmean(values)] if np.isfinite(values).any() else []
         return float(np.mean(means)) if means else None
 
     def temperatures(self) -> tuple[Channel, ...]:

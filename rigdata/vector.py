@@ -66,5 +66,5 @@ def zero_uncertainty(channels: Iterable[Channel], quantity: str) -> FloatArray:
     chosen = [c for c in channels if c.quantity == quantity and c.axis is not None]
     if len(chosen) < 2:
         return np.zeros(2)
-    inverse = inverse_directions(tuple(float(c.axis or 0.0) for c in chosen))
+    inverse = inverse_directions(tuple(c.axis or 0.0 for c in chosen))
     return np.sqrt(inverse**2 @ np.array([c.zero_uncertainty for c in chosen]) ** 2)

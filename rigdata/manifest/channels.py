@@ -117,7 +117,7 @@ def _calibration(table: Table, quantity: str, unit: str) -> dict[str, float]:
     """Gain and zero of a channel with a unit, and the uncertainty of the zero; what is wrong is noted."""
     data, values = table.data, dict[str, float]()
     field = replace(_FIELD["zero_uncertainty"], kind=DIMENSIONS[quantity])
-    values["zero_uncertainty"] = float(table.value(field))
+    values["zero_uncertainty"] = table.value(field)
     if not unit:
         return values
     stated = [data.get(key) for key in _SENSITIVITY]

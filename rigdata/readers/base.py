@@ -103,7 +103,7 @@ class ReadingCache:
     @property
     def nbytes(self) -> int:
         """Memory taken by all columns [bytes]."""
-        return sum(int(getattr(value, "nbytes", 0)) for value in self._entries.values())
+        return sum(getattr(value, "nbytes", 0) for value in self._entries.values())
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class RunReader(RecordFile):
 
     def rate(self) -> float:
         """Give the sample rate [Hz]: of the file's times, else what the file or the manifest states."""
-        rate = float(self._layout().grids[0].rate)
+        rate = self._layout().grids[0].rate
         if LEAST_RATE <= rate <= MOST_RATE:
             return rate
         if rate > 0:

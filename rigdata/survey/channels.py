@@ -201,8 +201,8 @@ def fitted_frame(pair: Pair, readings: FloatArray, directions: FloatArray, reaso
     for sense in (1, -1):
         offsets = np.exp(1j * (directions - sense * turned))
         mean = offsets.mean()
-        residual = math.degrees(float(np.sqrt(np.mean(np.angle(offsets * np.conj(mean)) ** 2))))
-        fits.append((residual, sense, float(np.angle(mean))))
+        residual = math.degrees(np.sqrt(np.mean(np.angle(offsets * np.conj(mean)) ** 2)))
+        fits.append((residual, sense, np.angle(mean)))
     (residual, sense, angle), (mirrored, _, _) = sorted(fits)
     if residual > _MOST_OFF or mirrored < _MIRROR * max(residual, 1.0):
         return None
@@ -240,7 +240,7 @@ def part_means(series: Sequence[Series], parts: int = 10) -> FloatArray:
     columns = []
     for channel in series:
         shares = [share[np.isfinite(share)] for share in np.array_split(channel.values, parts)]
-        columns.append([float(share.mean()) if len(share) else math.nan for share in shares])
+        columns.append([share.mean() if len(share) else math.nan for share in shares])
     return np.array(columns).T
 
 
@@ -252,7 +252,7 @@ def line_phasors(series: Sequence[Series], frequency: float) -> ComplexArray:
         values = np.nan_to_num(channel.values - np.nanmean(channel.values))
         window = np.hanning(len(values))
         wave = np.exp(-2j * np.pi * frequency * time) * window
-        phasors.append(2.0 * complex(values @ wave) / float(window.sum()))
+        phasors.append(2.0 * (values @ wave) / window.sum())
     return np.array(phasors)
 
 

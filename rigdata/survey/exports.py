@@ -106,7 +106,7 @@ def _scaled(export: Export, unit: str) -> Export:
 def _counts_evenly(series: Series) -> bool:
     """Whether a nameless column rises in equal steps, as times do and nothing that is measured."""
     steps = np.diff(series.values)
-    mean = float(steps.mean()) if len(steps) > 8 else 0.0
+    mean = steps.mean() if len(steps) > 8 else 0.0
     return mean > 0 and bool(np.all(np.abs(steps - mean) < 0.1 * mean))
 
 

@@ -108,7 +108,7 @@ def _speed(export: Export, channels: Guesses, stem: str) -> Entry:
     for series in of_quantity(export, channels, "speed"):
         factor = channels[series.name].gain / (2.0 * math.pi)
         good = series.values[np.isfinite(series.values)]
-        mean = float(np.median(good)) * factor if len(good) else 0.0
+        mean = np.median(good) * factor if len(good) else 0.0
         if mean > 0:
             return Entry(mean, "records", f"{mean:.4g} Hz by {series.name}")
     turns = _numbers_before(stem, r"rpm|u[-_]?min|1[-_]min")
@@ -119,12 +119,12 @@ def _by_movement(forces: list[Series], moves: list[Series], lines: Peaks) -> tup
     pair = [s for s in forces if s.rate > 0][:2] or [s for s in moves if s.rate > 0][:2]
     if not pair:
         return "", ""
-    total = sum(float(np.nanvar(s.values)) for s in pair)
+    total = sum(np.nanvar(s.values) for s in pair)
     if total <= 0:
         return "", ""
     slow = part_means(pair, max(1, int(len(pair[0]) / (_BLOCK * pair[0].rate))))
     slow = slow[np.isfinite(slow).all(axis=1)]
-    moved = float(slow.var(axis=0).sum()) if len(slow) else 0.0
+    moved = slow.var(axis=0).sum() if len(slow) else 0.0
     share = moved / total if moved > _ROUNDING * np.mean(slow**2) else 0.0
     if share > _SLOW:
         if len(pair) == 2 and len(slow) > 3:

@@ -39,8 +39,8 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> Spectrum:
     centred = filled - filled.mean()
     centred = centred - place * (centred @ place) / (place @ place)
     window = np.hanning(n)
-    amplitude = 2.0 * np.abs(np.fft.rfft(centred * window)) / float(window.sum())
-    return np.asarray(np.fft.rfftfreq(n, 1.0 / rate), dtype=np.float64), amplitude
+    amplitude = 2.0 * np.abs(np.fft.rfft(centred * window)) / window.sum()
+    return np.asarray(np.fft.rfftfreq(n, 1.0 / rate)), amplitude
 
 
 def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> Peaks:
@@ -51,7 +51,7 @@ def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> Peaks:
     remaining = amplitude.copy()
     remaining[:4] = 0.0
     for _ in range(4 * most):
-        i = int(np.argmax(remaining))
+        i = np.argmax(remaining)
         if remaining[i] <= 0.0 or len(peaks) == most:
             break
         around = amplitude[max(4, i - _NEIGHBOURS) : i + _NEIGHBOURS + 1]
@@ -59,7 +59,7 @@ def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> Peaks:
             # between the bins by a parabola through the logarithms
             a, b, c = np.log(np.maximum(amplitude[i - 1 : i + 2], 1e-300))
             curve = a - 2 * b + c
-            shift = float(np.clip(0.5 * (a - c) / curve, -0.5, 0.5)) if curve < 0 else 0.0
+            shift = np.clip(0.5 * (a - c) / curve, -0.5, 0.5) if curve < 0 else 0.0
             peaks.append(SpectralPeak(float(frequency[i] + frequency[1] * shift), float(amplitude[i])))
         remaining[max(0, i - 2) : i + 3] = 0.0  # the window's main lobe
     return tuple(peaks)

@@ -147,7 +147,7 @@ class _Folder:
         force = means[-1] - is_dry * means[0]
         if not force.any() or not np.isfinite(force).all():
             return run
-        angle = float(cells.direction(force))
+        angle = cells.direction(force)
         degrees, is_guess = folded(math.degrees(angle)), cells.source == "guess"
         reason = f"cells {degrees:g} deg" + ", if their axes hold" * is_guess
         concluded = Entry(float(round(degrees)), "guess" if is_guess else "records", reason)
@@ -164,7 +164,7 @@ class _Folder:
             if run.pad.value:
                 return replace(run, pad=replace(run.pad, source="guess", reason=f"the file's name; {reason}"))
         newtons = force * [self.channels[name].gain for name in cells.names]
-        return run if is_dry or not np.isfinite(newtons).all() else _with_load(run, float(np.hypot(*newtons)))
+        return run if is_dry or not np.isfinite(newtons).all() else _with_load(run, np.hypot(*newtons))
 
     def find_other_axes(self) -> None:
         """Axes of probes by dry steps, of accelerometers by the excitation; hints where that fails."""
@@ -201,7 +201,7 @@ class _Folder:
             if frequency > 0:
                 force, acceleration = along(line_phasors(forces, frequency), line_phasors(housing, frequency))
                 readings.append(acceleration)
-                directions.append(float(cells.direction(force)))
+                directions.append(cells.direction(force))
         return np.array(readings), np.array(directions), f"the excitation of {len(readings)} runs"
 
     def find_sensitivities(self, line: float) -> None:
@@ -210,7 +210,7 @@ class _Folder:
         for run, _ in self._with(_RUNNING):
             for series in of_quantity(run.export, self.channels, "speed"):
                 if not quantity_of_unit(self.channels[series.name].unit):
-                    ratios.setdefault(series.name, []).append(float(np.nanmedian(series.values)) / line)
+                    ratios.setdefault(series.name, []).append(np.nanmedian(series.values) / line)
         for name, values in ratios.items():
             guess, middle = self.channels[name], sorted(values)[len(values) // 2]
             if guess.unit and min(values) > 0 and max(values) - min(values) <= NEAR * max(values):
@@ -239,7 +239,7 @@ class _Folder:
             speeds = near(candidate)
             if len(speeds) < least:
                 continue
-            speed = float(speeds[len(speeds) // 2])
+            speed = speeds[len(speeds) // 2]
             once, twice = len(near(speed)), len(near(2 * speed))
             text = f"this line is in {once} of {len(running)} records"
             if is_mains(speed):

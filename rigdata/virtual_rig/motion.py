@@ -146,7 +146,7 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
     return MotionLine(
         frequency=frequency,
         oil_force=force,
-        displacement=np.asarray(np.linalg.solve(h, force.T).T, dtype=complex),
+        displacement=np.asarray(np.linalg.solve(h, force.T).T),
         force=force - instruments.true_mass * acceleration,
         acceleration=acceleration,
     )

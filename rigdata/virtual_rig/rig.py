@@ -243,7 +243,7 @@ def _spoilt(v: FloatArray, fault: Fault, sensor: Sensor, inside: BoolArray) -> F
         # a probe wired the wrong way round still has its gap voltage: only what moves changes sign
         return 2 * sensor.zero - v
     if fault.kind == "clipped":
-        low, high = float(v.min()), float(v.max())
+        low, high = v.min(), v.max()
         middle, reach = 0.5 * (low + high), 0.5 * (high - low) * fault.size(0.6)
         return np.clip(v, middle - reach, middle + reach)
     if fault.kind == "glitch":

@@ -161,7 +161,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
         raise RigDataError(problems)
     orders = np.array([runs.index(record.run) for record in records], dtype=float)
     noise = _noise(records)
-    centre = np.zeros(2) if polygon is None else np.asarray(polygon.centre)
+    centre = np.zeros(2) if polygon is None else polygon.centre
     repeats = _repeats(records, orders, noise, centre)
     moved = [_moved(record, noise) for record in records]
     # with the bearing's centre from the same probes their zero falls out
@@ -218,7 +218,7 @@ def _from_down(direction: float) -> float:
 def _read(run: Run) -> _Record:
     time, force, place, good, _ = slow_samples(live_run(run))
     if good.sum() < 50 or good.mean() < 0.5:
-        what = f"has only {int(good.sum())} usable samples of {len(good)}"
+        what = f"has only {good.sum()} usable samples of {len(good)}"
         raise refusal(run, "record", what, "Repeat this direction")
     time, place = time[good], place[good]
     # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
@@ -229,10 +229,10 @@ def _read(run: Run) -> _Record:
     load = mean[-1, 2:]
     return _Record(
         run=run,
-        position=np.asarray(mean[-1, :2], dtype=float),
+        position=np.asarray(mean[-1, :2]),
         load=float(np.hypot(*load)),
         direction=float(np.arctan2(load[1], load[0])),
-        span=float(time[-1] - time[0]),
+        span=time[-1] - time[0],
         blocks=_blocks(time, place - design[:, :-1] @ mean[:-1, :2]),
     )
 
@@ -252,7 +252,7 @@ def _noise(records: Sequence[_Record]) -> NoiseModel:
     series = list(itertools.chain.from_iterable(record.blocks for record in chosen))
     if max(len(s.time) for s in series) <= 3:
         # records of a few tenths of a second show no noise over seconds: take the scatter within each run
-        scatter = float(np.mean([np.var(s.values) for s in series])) + 1e-18
+        scatter = np.mean([np.var(s.values) for s in series]) + 1e-18
         return NoiseModel(scatter * _BLOCK, scatter, DRIFT_RATE)
     return estimate_noise(series)
 
@@ -265,8 +265,8 @@ def _moved(record: _Record, noise: NoiseModel) -> float:
         return 0.0
     contrast = late / late.sum() - ~late / (~late).sum()
     steady = replace(noise, drift=0.0).covariance(time, record.blocks[0].duration)
-    size = math.hypot(*(float(contrast @ series.values) for series in record.blocks))
-    ordinary = _STEADY * math.sqrt(2.0 * float(contrast @ steady @ contrast))
+    size = math.hypot(*(contrast @ series.values for series in record.blocks))
+    ordinary = _STEADY * math.sqrt(2.0 * (contrast @ steady @ contrast))
     return size if size > max(ordinary, _LEAST_MOVE) else 0.0
 
 
@@ -286,8 +286,8 @@ def _off_centre(points: Sequence[LocusPoint], polygon: ClearancePolygon) -> Floa
         return np.zeros(2)
     place = np.array([p.position for p in largest]) @ [1.0, 1j]
     middle = np.linalg.lstsq(np.column_stack([np.ones(len(turn)), turn]), place, rcond=None)[0][0]
-    error = math.sqrt(float(np.median([np.trace(p.covariance) for p in largest])))
-    limit = _OFF_CENTRE + float(np.ptp(polygon.clearance[np.isfinite(polygon.clearance)])) + _STEADY * error
+    error = math.sqrt(np.median([np.trace(p.covariance) for p in largest]))
+    limit = _OFF_CENTRE + np.ptp(polygon.clearance[np.isfinite(polygon.clearance)]) + _STEADY * error
     return np.array([middle.real, middle.imag]) if abs(middle) > limit else np.zeros(2)
 
 
@@ -319,9 +319,9 @@ def _repeats(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, 
     weight = since / (since @ since)
     remainder, scatter = within - np.outer(since, weight), 0.0
     if count > 1:
-        left = 0.5 * float(np.sum((remainder @ places) ** 2)) * student_widening(2 * (count - 1)) ** 2
-        scatter = max(left - float(np.diag(remainder) @ variance), 0.0) / (count - 1)
-    return _Repeats(count, weight @ places, float(weight**2 @ (variance + scatter)), scatter)
+        left = 0.5 * np.sum((remainder @ places) ** 2) * student_widening(2 * (count - 1)) ** 2
+        scatter = max(left - np.diag(remainder) @ variance, 0.0) / (count - 1)
+    return _Repeats(count, weight @ places, weight**2 @ (variance + scatter), scatter)
 
 
 def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:

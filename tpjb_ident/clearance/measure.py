@@ -200,7 +200,7 @@ def measure_run(
     angles, run = np.asarray(pivot_angles, dtype=float), live_run(run)
     contact, fit = _read_sides(run, angles, curves, LARGEST_DEFLECTION)
     if fit.deflection.max() > LARGEST_DEFLECTION:  # pads that seemed not to be touched were
-        contact, fit = _read_sides(run, angles, curves, float(fit.deflection.max()))
+        contact, fit = _read_sides(run, angles, curves, fit.deflection.max())
     walk = fit.noise.walk * np.sqrt(np.ptp(contact.time))
     if walk > _LARGEST_WALK:
         what = f"has a shaft that was turned, or probes that moved: their zero walks by {1e6 * walk:.1f} µm"
@@ -215,7 +215,7 @@ def measure_run(
         pushed = polygon.clearance_pushed + directions(angles) @ (polygon.centre - shared.centre)
         polygon = replace(shared, as_read=(pushed, polygon.fitted_angle))
     # which of two unequal probes is right is as unknown as how far they are apart
-    calibration = [np.hypot(relative_calibration(probes, float(angle)), 0.5 * ratio) for angle in angles]
+    calibration = [np.hypot(relative_calibration(probes, angle), 0.5 * ratio) for angle in angles]
     polygon = replace(polygon, relative_calibration=np.array(calibration))
     status = (*_status(fit, polygon), *differ, *_extrapolated(contact.push, curves))
     return replace(polygon, status=status)
@@ -248,7 +248,7 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
                                      angles[fit.pads] + fit.tilt, fit.tilt_se])  # fmt: skip
     clearance, clearance_se, deflection, deflection_se, fitted, fitted_se = columns
     # another run meets the probes' zero elsewhere: by about what it drifts within this one
-    span = float(np.ptp(contact.time))
+    span = np.ptp(contact.time)
     drift = ((fit.noise.drift * span) ** 2 + fit.noise.walk**2 * span) * np.eye(2)
     return ClearancePolygon(
         run=run.id,
@@ -288,7 +288,7 @@ def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple
 
 def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Condition, ...]:
     """The push lies outside what the dry tests measured: true of most sweeps, and to be said."""
-    outside = [c for c in curves or () if bool(c.is_extrapolated(push))]
+    outside = [c for c in curves or () if c.is_extrapolated(push)]
     lowest = min((c.valid_from for c in outside), default=0.0)
     pads = "all pads" if len(outside) == len(curves or ()) else "pads " + ", ".join(f"#{c.pad}" for c in outside)
     detail = f"pushed with {push:.0f} N, the dry tests of {pads} hold from {lowest:.0f} N on; the sweep corrects it"
@@ -315,7 +315,7 @@ def _status(fit: SideFit, polygon: ClearancePolygon) -> tuple[Condition, ...]:
     # below half a micrometre a difference between pads is of no consequence, however well it is measured
     deviating = np.flatnonzero(np.abs(offsets) > np.maximum(_IRREGULAR * errors, 0.5e-6))
     listed = _offsets(deviating, offsets[deviating])
-    turn = float(np.mean(fit.tilt))
+    turn = np.mean(fit.tilt)
     is_turned = abs(turn) > max(_IRREGULAR * np.sqrt(np.mean(fit.tilt_se**2) / len(fit.pads)), 5e-3)
     return holding(
         (missing, "pads-not-reached", missing),

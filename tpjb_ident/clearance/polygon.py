@@ -82,7 +82,7 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
 
 def _gain(design: FloatArray, weights: FloatArray) -> FloatArray:
     """Solution (3,) of weighted least squares per distance, (3, n)."""
-    return np.asarray(np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights), dtype=float)
+    return np.asarray(np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights))
 
 
 def _explanations(design: FloatArray, distances: FloatArray, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -128,8 +128,8 @@ def gain_ratio(
     target = tilt[usable] / tilt_se[usable]
     covariance = np.linalg.inv(design.T @ design)
     solution = covariance @ design.T @ target
-    chi_square = float(np.sum((target - design @ solution) ** 2)) / (len(target) - 2)
-    return float(solution[1]), float(np.sqrt(covariance[1, 1] * max(chi_square, 1.0)))
+    chi_square = np.sum((target - design @ solution) ** 2) / (len(target) - 2)
+    return solution[1], np.sqrt(covariance[1, 1] * max(chi_square, 1.0))
 
 
 def _stretch(angles: FloatArray, axes: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
@@ -249,7 +249,7 @@ def _place_along_side(contact: ContactIntervals, angles: FloatArray, pads: IntAr
     far = np.array([np.quantile(contact.along[contact.pad == k], 0.9) for k in pads])
     design = np.column_stack([directions(angles[pads]), np.ones(len(pads))])
     centre = np.linalg.lstsq(design, far, rcond=None)[0][:2]
-    return np.asarray(contact.across - (directions(angles + 0.5 * np.pi) @ centre)[contact.pad]), centre
+    return contact.across - (directions(angles + 0.5 * np.pi) @ centre)[contact.pad], centre
 
 
 def _smooth_side(contact: ContactIntervals, place: FloatArray) -> FloatArray:
@@ -306,15 +306,15 @@ def _least_squares(
     scaled = prior / unit**2
     covariance = np.linalg.inv(x.T @ x + np.diag(scaled))
     beta = covariance @ (x.T @ y + scaled * mean * unit)
-    square = float(np.sum((y - x @ beta) ** 2))
-    total = square + float(np.sum(scaled * (beta - mean * unit) ** 2))
+    square = np.sum((y - x @ beta) ** 2)
+    total = square + np.sum(scaled * (beta - mean * unit) ** 2)
     return beta / unit, covariance / np.outer(unit, unit), total, square / max(len(y) - design.shape[1], 1)
 
 
 def _mixed(fits: Sequence[tuple[FloatArray, FloatArray, float, float]]) -> tuple[FloatArray, FloatArray, float]:
     """Values, covariance and misfit of the fits of all lags together, each with its posterior share."""
     betas, covariances, totals, misfits = (np.array(column) for column in zip(*fits, strict=True))
-    misfit = float(np.min(misfits))
+    misfit = np.min(misfits)
     # what the noise model does not explain widens the intervals; a lucky sweep does not narrow them
     wider = max(misfit, 1.0)
     shares = special.softmax(-0.5 * (totals / wider + (_LAG_ERRORS / _LAG_ERRORS[-1] * 2.5) ** 2))

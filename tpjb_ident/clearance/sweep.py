@@ -68,7 +68,7 @@ class ContactIntervals:
         outside = np.where(first > 0.0, first, np.minimum(last, 0.0))
         corner = self.touched @ (1 << np.arange(len(angles))) * (self.touched.sum(axis=1) == 2)
         ends = [outside[corner == k][np.argmax(np.abs(outside[corner == k]))] for k in np.unique(corner[corner > 0])]
-        return float(np.median(ends)) if ends else 0.0
+        return np.median(ends) if ends else 0.0
 
     def lagging(self, angles: FloatArray, lag: float) -> ContactIntervals:
         """The averages of a shaft that follows its load by an angle `lag` [rad]: angles (n,) [rad] of the pads.
@@ -85,7 +85,7 @@ def sweep_samples(run: Run) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Good samples of a sweep, which goes around and takes the shaft along: time (n,), load, position (n, 2)."""
     time, load, position, good, _ = slow_samples(run)
     if good.sum() < 200:
-        raise refusal(run, "record", f"has only {int(good.sum())} usable samples", "Repeat the sweep")
+        raise refusal(run, "record", f"has only {good.sum()} usable samples", "Repeat the sweep")
     slopes = spare_slopes(run, np.eye(2))
     for what in contradictions(run.channels, [slopes], {"force": [0.0], "displacement": [0.0]}):
         raise refusal(run, "channels", f"cannot be used: {what}", REMEDY)
@@ -104,11 +104,11 @@ def read_sweep(run: Run, angles: FloatArray, deflection: float) -> ContactInterv
     turn = 2.0 * np.pi / run.point.shaft_speed if run.point.shaft_speed > 0.0 else _BLOCK
     length = turn * max(round(_BLOCK / turn), 1)
     # the shaft touches a pad within some micrometres of where it was farthest out
-    period = float(time[-1] - time[0]) / (len(time) - 1)
+    period = (time[-1] - time[0]) / (len(time) - 1)
     samples = max(round(length / period), 1)
     noisy = (max(map(white_noise, position.T)) / (0.5 * _CONTACT_DEPTH)) ** 2
     outward = uniform_filter1d(position, int(np.clip(noisy, 1, samples)), axis=0) @ directions(angles).T
-    touched = np.asarray(outward > np.quantile(outward, 0.995, axis=0) - _CONTACT_DEPTH - deflection)
+    touched = outward > np.quantile(outward, 0.995, axis=0) - _CONTACT_DEPTH - deflection
     state = touched @ (1 << np.arange(len(angles)))
     piece = np.floor((time - time[0]) / length).astype(int)
     cuts = np.flatnonzero((np.diff(state) != 0) | (np.diff(piece) != 0)) + 1
@@ -141,7 +141,7 @@ def _check_turn(run: Run, load: FloatArray, position: FloatArray) -> None:
     pushed, place = (part[:whole].reshape(-1, step, 2).mean(axis=1) @ [1.0, 1j] for part in (load, position))
     angle = np.angle(pushed)
     covered = np.sort(angle[np.abs(pushed) > _RELEASED * np.median(np.abs(pushed))])
-    gap = float(np.diff(covered, append=covered[0] + 2.0 * np.pi).max())
+    gap = np.diff(covered, append=covered[0] + 2.0 * np.pi).max()
     if gap > _LARGEST_GAP:
         what = f"turns its load through {360.0 - np.degrees(gap):.0f} deg only"
         raise refusal(run, "record", what, "Sweep the load once around, 360 deg")
@@ -182,9 +182,9 @@ def _settled(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArr
         return np.ones(len(time), dtype=bool)
     step = np.hypot(*np.diff(place, axis=0).T) / np.maximum(np.diff(time), 1e-9)
     speed = np.maximum(np.r_[step, 0.0], np.r_[0.0, step])
-    ordinary = float(np.median(speed[corner]))
+    ordinary = np.median(speed[corner])
     spread = robust_deviation(speed[corner] - ordinary)
     moving = corner & (speed > ordinary + _MOVING * spread)
     # the piece beside a moving one hides a remainder of the way below the noise, and would do so at every corner
     beside = np.r_[moving[1:], False] | np.r_[False, moving[:-1]]
-    return np.asarray(~corner | ~(moving | beside))
+    return ~corner | ~(moving | beside)

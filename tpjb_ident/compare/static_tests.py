@@ -76,8 +76,8 @@ def _of_sweep(run: Run, bearing: Bearing) -> list[Problem]:
     except RigDataError as error:
         return [Problem("warning", p.file, p.place, p.what, p.cure, run.id) for p in error.problems]
     names = " and ".join(channel.name for channel in run.of("displacement"))
-    drawn = float(np.mean([pad.assembled_clearance for pad in bearing.pads]))
-    measured = float(np.nanmean(polygon.clearance))
+    drawn = np.mean([pad.assembled_clearance for pad in bearing.pads])
+    measured = np.nanmean(polygon.clearance)
     problems = []
     for condition in polygon.status:
         if condition == "probe-gains-differ":

@@ -113,7 +113,7 @@ def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
     for effect in effects:
         sizes = {}
         for parameter in kind_of(effect.name).parameters_of(len(comparison.bearing.pads)):
-            value = float(effect.parameters[parameter.name])
+            value = effect.parameters[parameter.name]
             sizes[parameter.name] = Estimate(value, value, value, parameter.unit)
         listed.append(finding(effect.name, sizes))
     return (
@@ -144,7 +144,7 @@ def _pivot_sentence(comparison: Comparison) -> list[str]:
     ratios = []
     for curve in comparison.curves:
         load = 0.8 * curve.valid_to
-        ratios.append((float(curve.stiffness(load)) / formula(curve.pad, load)[1], curve.pad))
+        ratios.append((curve.stiffness(load) / formula(curve.pad, load)[1], curve.pad))
     (low, soft), (high, stiff) = min(ratios), max(ratios)
     load = 0.8 * comparison.curves[0].valid_to
     return [
@@ -159,7 +159,7 @@ def _extrapolation_sentence(comparison: Comparison) -> list[str]:
     if points is None or not points["pivot_extrapolated"].any():
         return []
     beyond = points[points["pivot_extrapolated"]]
-    largest = float(beyond.filter(regex=r"pad\d+_load_N").to_numpy().max())
+    largest = beyond.filter(regex=r"pad\d+_load_N").to_numpy().max()
     tested = min(curve.valid_to for curve in comparison.curves)
     return [
         f"At {len(beyond)} of {len(points)} points the measured pivots are extrapolated: pads press them with up to "
@@ -174,11 +174,9 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
     off = comparison.clearance.clearance - drawn
     if not np.isfinite(off).any():
         return []
-    pad = int(np.nanargmax(np.abs(off)))
+    pad = np.nanargmax(np.abs(off))
     digits, unit = 1 if size("length") < 1e-5 else 3, symbol("length")
-    mean, median, worst = (
-        signed(float(v) / size("length"), digits) for v in (np.nanmean(off), np.nanmedian(off), off[pad])
-    )
+    mean, median, worst = (signed(v / size("length"), digits) for v in (np.nanmean(off), np.nanmedian(off), off[pad]))
     status = comparison.clearance.status
     remarks = [f"The clearance sweep: {c.detail}." for c in status if c == "probe-gains-differ"]
     inseparable = [c.detail for c in status if c == "pads-not-separable"]

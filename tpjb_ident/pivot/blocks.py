@@ -112,7 +112,7 @@ def find_holds(time: FloatArray, load: FloatArray) -> tuple[Hold, ...]:
         start, stop = _settled(level, noise, *run)
         if stop - start >= _FEWEST:
             begin, end = moment[start] - 0.5 * width, moment[stop - 1] + 0.5 * width
-            holds.append(Hold(float(begin), float(end), float(np.median(level[start:stop]))))
+            holds.append(Hold(begin, end, np.median(level[start:stop])))
     return tuple(holds)
 
 
@@ -150,7 +150,7 @@ def cut_blocks(time: FloatArray, vectors: FloatArray, holds: tuple[Hold, ...], l
 
     `vectors` (n, 4): load along and across the pad [N], displacement along and across [m].
     """
-    span = float(time[-1] - time[0])
+    span = time[-1] - time[0]
     period = span / max(len(time) - 1, 1)
     length *= math.ceil(max(span / MOST_BLOCKS, _FEWEST_SAMPLES * period) / length - 1e-6)
     edges, number = _edges(time, holds, length)
@@ -186,8 +186,8 @@ def _directions(load: FloatArray) -> FloatArray:
     """Sense of the load's way (m,): it turns only when the load has come back by `_TURN` of its range."""
     if not len(load):  # a logger too slow for a single piece
         return load
-    turn, travel = _TURN * float(np.ptp(load)), load - load[0]
-    way = 1.0 if travel[int(np.argmax(np.abs(travel) > turn))] >= 0.0 else -1.0
+    turn, travel = _TURN * np.ptp(load), load - load[0]
+    way = 1.0 if travel[np.argmax(np.abs(travel) > turn)] >= 0.0 else -1.0
     farthest, sense = _play(load, way, 0.0, turn)
     for k in np.flatnonzero(farthest[:-1] != load[:-1])[::-1]:
         sense[k] = sense[k + 1]
@@ -200,7 +200,7 @@ def slid(blocks: Blocks, course: LoadCourse, friction: float) -> Blocks:
     Friction holds back a share of the load: until the load has come back by twice that, the pivot stays where it was.
     """
     noise = white_noise(course.load)
-    last, sense = _play(course.load, float(blocks.branch[0]), friction, _UNDECIDED * noise)
+    last, sense = _play(course.load, blocks.branch[0], friction, _UNDECIDED * noise)
     last = np.where(np.abs(course.load - last) < _UNDECIDED * _LEVEL * noise, course.load, last)
     first, stop = np.searchsorted(course.time, blocks.time + np.multiply.outer([-0.5, 0.5], blocks.duration))
     first = np.minimum(first, len(last) - 1)

@@ -49,7 +49,7 @@ def without_creep(
         share = pull.sum(axis=0) / total
         scatter = np.sum(information * (pull / information - share) ** 2, axis=0) / max(len(held) - 1, 1)
         error = np.sqrt(np.maximum(scatter, 1.0) / total)
-        best = int(np.argmax(share / error))
+        best = np.argmax(share / error)
         if share[best] < max(_LEAST * error[best], _ALIKE * math.sqrt(scatter[best] / total[best])):
             break
         weight = special.softmax(0.5 * np.where(share > 0.0, (share / error) ** 2, 0.0))
@@ -66,7 +66,7 @@ def _courses(record: DryRecord, times: FloatArray) -> FloatArray:
     blocks = record.blocks
     smooth = smooth_columns(blocks)  # the readings themselves would find their own noise in their courses
     moved = smooth @ np.linalg.lstsq(smooth, blocks.deflection, rcond=None)[0]
-    moved -= moved[int(np.argmin(blocks.load))]
+    moved -= moved[np.argmin(blocks.load)]
     starts = np.array([hold.start for hold in record.holds] + [0.0])
     since = np.where(blocks.hold >= 0, blocks.time - starts[blocks.hold], 0.0)[:, None]
     anew = moved[:, None] * -np.expm1(-np.maximum(since, 0.0) / times)
@@ -94,5 +94,5 @@ def _held_to_light(record: DryRecord, noise: NoiseModel, times: FloatArray) -> t
 
 def _less(record: DryRecord, creep: FloatArray) -> DryRecord:
     """A record less its creep (m,) [m], with the largest share of the deflection that it was."""
-    blocks, share = record.blocks, float(np.max(np.abs(creep))) / float(np.ptp(record.blocks.deflection))
+    blocks, share = record.blocks, np.max(np.abs(creep)) / np.ptp(record.blocks.deflection)
     return replace(record, blocks=replace(blocks, deflection=blocks.deflection - creep), creep=share)

@@ -59,12 +59,12 @@ def measure_loop(law: LawFit, low: float, high: float) -> Hysteresis | None:
     load = np.linspace(low, high, 200)
     up, up_gradient = law.reading_gradient(load, np.ones(len(load)))
     down, down_gradient = law.reading_gradient(load, -np.ones(len(load)))
-    stored = math.pi / 4.0 * (high - low) * abs(float(up[-1] - up[0]))
+    stored = math.pi / 4.0 * (high - low) * abs(up[-1] - up[0])
     if not high > low or stored == 0.0:
         return None
     energy = float(integrate.trapezoid(down - up, load))
     sensitivity = integrate.trapezoid(down_gradient - up_gradient, load, axis=0)
-    energy_se = math.sqrt(max(float(sensitivity @ law.covariance @ sensitivity), 0.0))
+    energy_se = math.sqrt(max(sensitivity @ law.covariance @ sensitivity, 0.0))
     return Hysteresis(energy, energy_se, energy / stored, energy_se / stored, (low, high))
 
 
@@ -269,7 +269,7 @@ class PivotCurve(Presented):
             log, gradient = fit.log_softness(loads, secant)
             difference = log - leading
             total += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))
-        outside = np.maximum(loads / self.valid_to, float(np.min(self.steps.load)) / loads)
+        outside = np.maximum(loads / self.valid_to, np.min(self.steps.load) / loads)
         return total + np.diag((EXTRAPOLATION_SPREAD * np.log(np.maximum(outside, 1.0))) ** 2)
 
     def reading_band(self, load: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -361,4 +361,4 @@ def _quantile(level: float) -> float:
     """Standard deviations on either side of a normal interval of this coverage."""
     if not 0.0 < level < 1.0:
         raise ArgumentError(f"level must lie between 0 and 1, got {level}")
-    return float(special.ndtri(0.5 + 0.5 * level))
+    return special.ndtri(0.5 + 0.5 * level)

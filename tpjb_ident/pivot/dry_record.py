@@ -106,7 +106,7 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
     push = _push(load)
     if angle is None:
         angle = math.atan2(push[1], push[0])
-    if math.hypot(*push) <= max(10.0 * float(np.median(np.abs(np.diff(np.hypot(*load.T))))), 1e-9):
+    if math.hypot(*push) <= max(10.0 * np.median(np.abs(np.diff(np.hypot(*load.T)))), 1e-9):
         raise refusal(run, "force", "has a load that does not rise", "Check the cells; repeat the run")
     axes = pad_axes(angle)
     vectors = np.hstack([load @ axes.T, place @ axes.T])
@@ -147,16 +147,16 @@ def before_contact(blocks: Blocks) -> BoolArray:
     A way that closes over some tenths of the load is left to the law's contact loss.
     """
     load, deflection = blocks.load - np.min(blocks.load, initial=np.inf), blocks.deflection
-    largest = float(np.max(load, initial=0.0))
+    largest = np.max(load, initial=0.0)
     upper = load >= 0.3 * largest
     if np.unique(load[upper]).size < 3 or not largest > 0.0:
         return np.zeros(len(blocks), dtype=bool)
-    compliance = abs(float(np.polyfit(load[upper], deflection[upper], 1)[0]))
+    compliance = abs(np.polyfit(load[upper], deflection[upper], 1)[0])
     more, way = load - load[:, None], deflection - deflection[:, None]
     near = (more >= 0.0) & (more < _NEAR * largest)
     loose = (near & (way > compliance * (_FREE * more + _NOTABLE_WAY * largest))).any(axis=1)
     beside = np.convolve(loose, np.ones(3), "same") > 0  # the average in which the way ends holds some of it
-    return np.asarray(beside & (load < _NEAR * largest))
+    return beside & (load < _NEAR * largest)
 
 
 def _just_unloaded(blocks: Blocks) -> BoolArray:
@@ -169,7 +169,7 @@ def _push(load: FloatArray) -> FloatArray:
     """From the least to the greatest of some loads (n, 2), (2,) [N]."""
     order = np.argsort(np.linalg.norm(load, axis=1))
     few = max(3, len(load) // 20)
-    return np.asarray(np.median(load[order[-few:]], axis=0) - np.median(load[order[:few]], axis=0))
+    return np.median(load[order[-few:]], axis=0) - np.median(load[order[:few]], axis=0)
 
 
 def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
@@ -194,12 +194,12 @@ def with_load_zero(records: Sequence[DryRecord]) -> list[DryRecord]:
     if freedom < 1 or np.linalg.matrix_rank(design, 0.1) < 2:
         return [_less_zero(record, np.zeros(2), np.diag(stated**2), "") for record in records]
     x, y = design / error[:, None], (across * np.cos(turn) - load * np.sin(turn)) / error
-    scatter = float(np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2)) / freedom
-    told = max(scatter, 1.0) * float(special.stdtrit(freedom, 0.975) / special.ndtri(0.975)) ** 2  # of few
+    scatter = np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2) / freedom
+    told = max(scatter, 1.0) * (special.stdtrit(freedom, 0.975) / special.ndtri(0.975)) ** 2  # of few
     covariance = np.linalg.inv(x.T @ x / told + np.diag(1.0 / stated**2 if stated.all() else np.zeros(2)))
     zero = covariance @ (x.T @ y) / told
-    size, spread = float(np.hypot(*zero)), math.sqrt(float(np.trace(covariance)))
-    is_clear = size > max(_CLEAR * spread, _NOTABLE * float(np.max(load)))
+    size, spread = np.hypot(*zero), math.sqrt(np.trace(covariance))
+    is_clear = size > max(_CLEAR * spread, _NOTABLE * np.max(load))
     if not (is_clear or stated.all()):
         return list(records)
     text = (
@@ -212,7 +212,7 @@ def _less_zero(record: DryRecord, zero: FloatArray, covariance: FloatArray, unta
     """A record whose loads count from a zero (2,) [N] that is known with a covariance (2, 2)."""
     axes, blocks, course = pad_axes(record.angle), record.blocks, record.course
     along, across = axes @ zero
-    error = math.sqrt(float(axes[0] @ covariance @ axes[0]))
+    error = math.sqrt(axes[0] @ covariance @ axes[0])
     blocks = replace(blocks, load=blocks.load - along, across_load=blocks.across_load - across)
     # whether the pad carries anything at all is not known there
     unsure = (blocks.load < _UNSURE * error) & (error > _NOTABLE * np.max(np.abs(blocks.load)))
@@ -270,7 +270,7 @@ def _growth(
 ) -> PadDirection:
     """Direction of the slope of a vector, along and across (m,), over the load's size, by generalised least squares."""
     size = np.hypot(blocks.load, blocks.across_load)
-    columns = np.column_stack([np.ones_like(size), (size - size.mean()) / max(float(np.ptp(size)), 1e-300), *vector])
+    columns = np.column_stack([np.ones_like(size), (size - size.mean()) / max(np.ptp(size), 1e-300), *vector])
     whitened = np.linalg.inv(np.linalg.cholesky(covariance)) @ columns
     x, y = whitened[:, :2], whitened[:, 2:]
     inverse = np.linalg.pinv(x.T @ x)
@@ -281,7 +281,7 @@ def _growth(
     # the slope is an average over a curved path; what counts is the scatter across the direction itself
     distance = y @ [-across / length, along / length]
     residual = distance - x @ (inverse @ (x.T @ distance))
-    spread = math.sqrt(inverse[1, 1] * float(residual @ residual) / max(len(size) - 2, 1) * dependence)
+    spread = math.sqrt(inverse[1, 1] * (residual @ residual) / max(len(size) - 2, 1) * dependence)
     return PadDirection(math.atan2(across, along), spread / length)
 
 

@@ -85,7 +85,7 @@ def fit_data(records: Sequence[DryRecord], noise: NoiseModel) -> FitData:
     load = np.concatenate([part.load for part in parts])
     deflection = np.concatenate([part.deflection for part in parts])
     branch = np.concatenate([part.branch for part in parts])
-    compliance = float(np.ptp(deflection)) / max(float(np.ptp(load)), 1e-300)
+    compliance = np.ptp(deflection) / max(np.ptp(load), 1e-300)
     covariances = []
     for record, part in zip(records, parts, strict=True):
         error = compliance * np.hypot(part.load_spread, LAG * part.rate)
@@ -96,10 +96,10 @@ def fit_data(records: Sequence[DryRecord], noise: NoiseModel) -> FitData:
     friction, spread = max((record.friction for record in records), key=operator.itemgetter(1))
     return FitData(
         load=load,
-        deflection=deflection - deflection[int(np.argmin(load))],
+        deflection=deflection - deflection[np.argmin(load)],
         branch=branch,
         whitener=np.linalg.inv(np.linalg.cholesky(linalg.block_diag(*covariances))),
-        reference_load=REFERENCE_SHARE * float(np.max(load)),
+        reference_load=REFERENCE_SHARE * np.max(load),
         # on one branch a share of the load and a share of the deflection that creeps are one error
         friction=(friction, max(spread, *(record.creep for record in records))),
     )
@@ -123,7 +123,7 @@ def with_friction(record: DryRecord, noise: NoiseModel) -> DryRecord:
         likely = fit.log_evidence - math.log1p((share / FRICTION_SHARE - 1.0) ** 2)
         if likely > evidence:
             likeliest, evidence = replace(record, blocks=blocks, friction=friction), likely
-            fitted = abs(float(fit.theta[FRICTION]))
+            fitted = abs(fit.theta[FRICTION])
     return likeliest
 
 
@@ -145,8 +145,8 @@ def _groups(record: DryRecord) -> IntArray:
     """Number (m,) of the stretch that each block belongs to: odd for holds, even for ramps, in order of time."""
     hold = record.blocks.hold
     if not record.holds:
-        return np.asarray(2 * (np.arange(len(hold)) * GROUPS_ON_RAMP // len(hold)))
-    return np.asarray(np.where(hold >= 0, 2 * hold + 1, 2 * np.maximum.accumulate(hold) + 2))
+        return 2 * (np.arange(len(hold)) * GROUPS_ON_RAMP // len(hold))
+    return np.where(hold >= 0, 2 * hold + 1, 2 * np.maximum.accumulate(hold) + 2)
 
 
 def _worst(fit: LawFit, data: FitData, groups: IntArray) -> tuple[int, float]:
@@ -156,8 +156,8 @@ def _worst(fit: LawFit, data: FitData, groups: IntArray) -> tuple[int, float]:
     information, whole = np.sum(shift * remainder, axis=0), np.sum(shift**2, axis=0)
     size = np.abs(score) / np.sqrt(np.maximum(information, 1e-6 * whole))
     size[information <= 1e-6 * whole] = 0.0
-    worst = int(np.argmax(size))
-    return int(numbers[worst]), float(size[worst])
+    worst = np.argmax(size)
+    return int(numbers[worst]), size[worst]
 
 
 def _score_of(fit: LawFit, data: FitData, columns: FloatArray | BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -210,10 +210,10 @@ def _scatter(
 
     def deviance(logarithm: float) -> float:
         variance = 1.0 + math.exp(2.0 * logarithm) * size
-        return float(np.sum(np.log(variance) + square / variance))
+        return np.sum(np.log(variance) + square / variance)
 
     best = optimize.minimize_scalar(deviance, bounds=(math.log(1e-4), 0.0), method="bounded").x
-    return math.exp(best) if float(np.sum(square)) - deviance(best) > _CLEAR_SCATTER else 0.0
+    return math.exp(best) if np.sum(square) - deviance(best) > _CLEAR_SCATTER else 0.0
 
 
 def fit_pivots(
@@ -342,8 +342,8 @@ def _widened(fit: LawFit) -> LawFit:
 def _steps(records: Sequence[DryRecord], law: LawFit, noise: NoiseModel) -> PivotSteps:
     """Points of every run of the pad, counted from the reading at the lowest load of any run."""
     used = [record.used for record in records]
-    lowest = min(used, key=lambda blocks: float(blocks.load.min()))
-    zero = float(lowest.deflection[int(np.argmin(lowest.load))])
+    lowest = min(used, key=lambda blocks: blocks.load.min())
+    zero = lowest.deflection[np.argmin(lowest.load)]
     parts = []
     for record in records:
         blocks = record.blocks
@@ -354,7 +354,7 @@ def _steps(records: Sequence[DryRecord], law: LawFit, noise: NoiseModel) -> Pivo
         branch = np.sign(share @ blocks.branch).astype(int)
         load = share @ blocks.load * (1.0 - law.theta[FRICTION] * branch)
         deflection = share @ blocks.deflection - zero - law.theta[OFFSET]
-        error = np.sqrt([noise.mean_variance(float(length)) for length in duration])
+        error = np.sqrt([noise.mean_variance(length) for length in duration])
         aside = share @ blocks.across - blocks.across[0]
         weight = 1.0 - (members & ~record.good).any(axis=1)
         parts.append((load, deflection, error, share @ blocks.across_load, aside, branch, weight))
@@ -373,11 +373,11 @@ def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
 
 def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> tuple[Condition, ...]:
     """Named conditions of a curve."""
-    law, onset, bad = curve.law, curve.onset_load, int(np.sum(curve.steps.weight == 0.0))
+    law, onset, bad = curve.law, curve.onset_load, np.sum(curve.steps.weight == 0.0)
     aside = abs(curve.displacement_direction.angle) > 0.5 * DISPLACEMENT_LIMIT
     shares: dict[str, float] = {}
     for fit, weight in zip(curve.fits, curve.weights, strict=True):
-        shares[fit.name] = shares.get(fit.name, 0.0) + float(weight)
+        shares[fit.name] = shares.get(fit.name, 0.0) + weight
     listed = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
     return holding(
         (bad > 0, "bad-steps", f"{bad} left out"),
@@ -405,14 +405,14 @@ def contact_onset(fit: LawFit) -> tuple[float, float]:
     """
     if not fit.contact:
         return 0.0, 0.0
-    gap, decay = float(fit.theta[-2]), math.exp(fit.theta[-1])
+    gap, decay = fit.theta[-2], math.exp(fit.theta[-1])
     onset = decay
     for _ in range(_ROUNDS):
         # fixed point of (gap / F0) exp(-F / F0) = tolerance c(F): c changes slowly, so this contracts
-        allowed = CONTACT_TOLERANCE * float(fit.compliance(np.array(max(onset, 0.05 * decay))))
+        allowed = CONTACT_TOLERANCE * fit.compliance(np.array(max(onset, 0.05 * decay)))
         onset = decay * math.log(max(gap / decay / allowed, 1e-300))
     if onset <= 0.0:
         return 0.0, 0.0
     gradient = np.zeros(len(fit.theta))  # the compliance changes slowly: it is taken as that at the onset
     gradient[[SCALE, -2, -1]] = -decay, decay / gap, onset - decay
-    return onset, math.sqrt(float(gradient @ fit.covariance @ gradient))
+    return onset, math.sqrt(gradient @ fit.covariance @ gradient)

@@ -121,7 +121,7 @@ class LawFit:
             value = value - theta[-2] * decay
             jacobian[:, -2] = -decay
             jacobian[:, -1] = -theta[-2] * decay * load / np.exp(theta[-1])
-        return np.asarray(value), jacobian
+        return value, jacobian
 
 
 def _shape(law: Law) -> slice:
@@ -140,7 +140,7 @@ class _Prior:
 
 
 def _prior(law: Law, contact: bool, data: FitData) -> _Prior:
-    largest, flat = float(np.max(data.load)), (0.0, np.inf, -np.inf, np.inf)
+    largest, flat = np.max(data.load), (0.0, np.inf, -np.inf, np.inf)
     # mean, standard deviation, lowest and highest of each parameter
     rows: list[tuple[float, ...]] = [flat, (*data.friction, -0.2, 0.2), flat]
     rows += zip(law.prior_mean, np.ones(len(law.parameters)), *law.bounds, strict=True)
@@ -166,15 +166,15 @@ def fit_law(law: Law, contact: bool, data: FitData, start: FloatArray | None = N
     theta, residual, jacobian = _minimise(initial, data, prior, unit)
     hessian = jacobian.T @ jacobian
     diagonal = np.diag(prior.root)  # the part of the prior that is not flat
-    log_prior = 2.0 * float(np.sum(np.log(diagonal[diagonal > 0.0])))
+    log_prior = 2.0 * np.sum(np.log(diagonal[diagonal > 0.0]))
     # the offset's unit enters every law alike; the others' units cancel against the prior's determinant
-    log_hessian = float(np.linalg.slogdet(hessian)[1]) - 2.0 * float(np.sum(np.log(unit[1:])))
+    log_hessian = np.linalg.slogdet(hessian)[1] - 2.0 * np.sum(np.log(unit[1:]))
     return replace(
         initial,
         theta=theta,
         covariance=np.linalg.inv(hessian) * np.outer(unit, unit),
-        log_evidence=0.5 * (log_prior - log_hessian - float(residual @ residual)),
-        chi_square=float(np.sum(residual[: len(data.load)] ** 2)),
+        log_evidence=0.5 * (log_prior - log_hessian - residual @ residual),
+        chi_square=np.sum(residual[: len(data.load)] ** 2),
     )
 
 
@@ -213,10 +213,10 @@ def _minimise(
         step = np.zeros(len(theta))
         step[free] = np.linalg.solve(damped, gradient[free])
         # shapes and logarithms: a contact gap near zero leaves its decay load free to run away
-        step *= min(1.0, _LONGEST_STEP / max(float(np.max(np.abs(step[SCALE:]))), 1e-300))
+        step *= min(1.0, _LONGEST_STEP / max(np.max(np.abs(step[SCALE:])), 1e-300))
         trial = np.clip(theta + step * unit, prior.low, prior.high)
         trial_residual, trial_jacobian = evaluate(trial)
-        gain = float(residual @ residual - trial_residual @ trial_residual)
+        gain = residual @ residual - trial_residual @ trial_residual
         if gain >= 0.0:
             theta, residual, jacobian = trial, trial_residual, trial_jacobian
             damping = max(damping * 0.2, 1e-9)
@@ -241,18 +241,18 @@ def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> FloatArray:
         # the other pads only: a pad's own evidence must not count twice
         shares = law_prior + votes.sum(axis=0) - votes
         updated = special.softmax(np.log(shares @ of_law.T * contact_prior) + evidence, axis=1)
-        change = float(np.max(np.abs(updated - weights)))
+        change = np.max(np.abs(updated - weights))
         weights = updated
         if change < 1e-4:
             break
         votes = (weights * np.where(contact, _CONTACT_VOTE, 1.0)) @ of_law
-    return np.asarray(weights)
+    return weights
 
 
 def keep_likely(fits: Sequence[LawFit], weights: FloatArray) -> tuple[tuple[LawFit, ...], FloatArray]:
     """The fits that count, most likely first, with shares (n,) that sum to one."""
     order = np.argsort(-weights, kind="stable")[: np.sum(weights >= _SMALLEST_WEIGHT)]
-    return tuple(fits[k] for k in order), np.asarray(weights[order] / weights[order].sum())
+    return tuple(fits[k] for k in order), weights[order] / weights[order].sum()
 
 
 def informed_law(law: Law, others: Sequence[tuple[LawFit, float]]) -> Law | None:
@@ -299,7 +299,7 @@ def with_shared_shape(
             law = informed.get(fit.name)
             if law is not None and fit.log_evidence > best - HOPELESS:
                 again = fit_law(law, fit.contact, data[pad], start=fit.theta)
-                mean = float(np.logaddexp(fit.log_evidence, again.log_evidence) - np.log(2.0))
+                mean = np.logaddexp(fit.log_evidence, again.log_evidence) - np.log(2.0)
                 fit = replace(again if again.log_evidence > fit.log_evidence else fit, log_evidence=mean)
             improved.append(fit)
         shared.append(improved)

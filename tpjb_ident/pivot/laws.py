@@ -149,7 +149,7 @@ def _spline_precision() -> FloatArray:
     slopes = np.diff(np.eye(len(NODES)), axis=0) / np.diff(NODES)[:, None]
     bends = np.diff(slopes, axis=0) / BEND_SPREAD
     rows = np.vstack([bends, slopes[FIXED] / SLOPE_SPREAD])[:, _FREE]
-    return np.asarray(rows.T @ rows)
+    return rows.T @ rows
 
 
 def _spline_psi(u: FloatArray, q: FloatArray) -> WithDerivative:

@@ -51,7 +51,7 @@ def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: floa
         beside = (distance > _NOISE_FROM) & (distance < _NOISE_TO)
         noise = np.sqrt(np.mean(np.abs(spectra[:, beside]) ** 2, axis=1))
         power = np.sum(np.abs(spectra / np.maximum(noise, 1e-300)[:, None]) ** 2, axis=0)
-        peak = int(np.argmax(np.where(distance < _AROUND, power, 0.0)))
+        peak = np.argmax(np.where(distance < _AROUND, power, 0.0))
         if power[peak] > strength:
             strength, signature = power[peak], PickupSignature(tuple(values), spectra[:, peak], noise)
     return signature
@@ -92,4 +92,4 @@ def _mismatch(a: PickupSignature, b: PickupSignature) -> float:
     for _ in range(3):
         factor = complex(np.vdot(b.size / variance, a.size) / np.vdot(b.size / variance, b.size))
         variance = a.noise**2 + abs(factor) ** 2 * b.noise**2
-    return 2.0 * float(np.sum(np.abs(a.size - factor * b.size) ** 2 / variance))
+    return 2.0 * np.sum(np.abs(a.size - factor * b.size) ** 2 / variance)

@@ -168,7 +168,7 @@ def _misplaced(records: Sequence[DryRecord]) -> list[Problem]:
     outward = np.exp(1j * np.array([record.angle for record in records]))
     starts = []
     for record in records:
-        lowest = int(np.argmin(record.blocks.load))
+        lowest = np.argmin(record.blocks.load)
         starts.append(complex(record.blocks.deflection[lowest], record.blocks.across[lowest]))
     centre, distance = _centre(np.array(starts) * outward, outward)
     if distance <= np.median([np.ptp(record.blocks.deflection) for record in records]):
@@ -199,8 +199,8 @@ def _centre(starts: ComplexArray, outward: ComplexArray) -> tuple[complex, float
         solution = np.linalg.lstsq(np.vstack([x.real, x.imag]), np.r_[y.real, y.imag], rcond=None)[0]
         miss = np.abs(starts - design @ solution)
         # least absolute distance: one run in a wrong place does not move the centre
-        weights = 1.0 / np.maximum(miss, 0.02 * max(float(np.median(miss)), 1e-9))
-    return complex(*solution[:2]), abs(float(solution[2]))
+        weights = 1.0 / np.maximum(miss, 0.02 * max(np.median(miss), 1e-9))
+    return complex(*solution[:2]), abs(solution[2])
 
 
 def check_spares(records: Sequence[DryRecord], noise: NoiseModel) -> list[Problem]:
@@ -223,9 +223,8 @@ def _slope_error(record: DryRecord, noise: NoiseModel) -> float:
     moved = record.blocks.deflection - record.blocks.deflection.mean()
     variance = moved @ record.blocks.covariance(noise) @ moved
     # a component of more than two probes has less noise than each
-    return math.sqrt(variance * max(len(names_of(record.run, "displacement")) / 2.0, 1.0)) / max(
-        float(moved @ moved), 1e-300
-    )
+    probes = len(names_of(record.run, "displacement"))
+    return math.sqrt(variance * max(probes / 2.0, 1.0)) / max(moved @ moved, 1e-300)
 
 
 def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:

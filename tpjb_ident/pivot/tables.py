@@ -34,7 +34,7 @@ def load_grid(curves: Sequence[PivotCurve]) -> FloatArray:
     raw = largest / _ROWS
     decade = 10.0 ** np.floor(np.log10(raw))
     step = decade * next(m for m in (1.0, 2.0, 2.5, 5.0, 10.0) if m * decade >= 0.99 * raw)
-    return np.asarray(step * np.arange(1, int(_BEYOND * largest / step + 1e-9) + 1))
+    return step * np.arange(1, int(_BEYOND * largest / step + 1e-9) + 1)
 
 
 def pivot_table(

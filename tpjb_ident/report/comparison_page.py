@@ -217,7 +217,7 @@ def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None,
         columns += [] if formula is None else ["of Kirk's tangent"]
         for curve, row in zip(curves, rows, strict=True):
             low, high = (float(end) for end in curve.stiffness_band(load))
-            remark = " (extrapolated)" if bool(curve.is_extrapolated(load)) else ""
+            remark = " (extrapolated)" if curve.is_extrapolated(load) else ""
             row.append(with_interval(float(curve.stiffness(load)), low, high, size("stiffness")) + remark)
             if formula is not None:
                 row.append(f"{100 * curve.stiffness(load) / formula(curve.pad, load)[1]:.0f} %")

@@ -143,7 +143,7 @@ def _drawn(points: pd.DataFrame) -> Figure:
         for k, (entry, look) in enumerate(ENTRY_STYLES.items()):
             style = look | {"linestyle": "none"}
             value, errors = with_errors(points, f"{kind.column(entry)}_difference", kind.display_scale)
-            half = max(half, float(np.max(errors, where=np.isfinite(errors), initial=0.0)))
+            half = max(half, np.max(errors, where=np.isfinite(errors), initial=0.0))
             x = place + 0.16 * (k - 1.5)
             axes.errorbar(x, value, yerr=errors, **style, markerfacecolor=PAPER, capsize=2.5, label=entry)
             changed = (points[f"{kind.symbol}{entry}_changed"] == "yes").to_numpy()

@@ -125,7 +125,7 @@ def _hover_points(figure: Figure) -> tuple[np.ndarray, list[str]]:
         axes.apply_aspect()
         bars = {bar[0]: bar for bar in axes.containers if isinstance(bar, ErrorbarContainer)}
         for line in axes.lines:
-            points = np.column_stack([np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float)])
+            points = np.asarray(line.get_xydata())
             if line.get_marker() in ("", "None", " ", None) or len(points) > _MOST_POINTS:
                 continue
             shown = axes.transData.transform(points) * _POINTS_PER_INCH / figure.dpi

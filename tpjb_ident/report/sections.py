@@ -258,7 +258,7 @@ def budget_table(result: Identification) -> Table:
             kind, factor = (STIFFNESS, 1.0) if i < 4 else (DAMPING, p.stiffness.omega)
             scale = kind.display_scale * factor
             digits = 2 - math.floor(math.log10(half / scale)) if 0.0 < half < math.inf else 3
-            parts = [fixed(float(deviations[n][i]) / scale, digits) if n in deviations else "–" for n in sources]
+            parts = [fixed(deviations[n][i] / scale, digits) if n in deviations else "–" for n in sources]
             name = f"{kind.symbol}{ENTRIES[i % 4]}, {kind.display_unit}"
             rows.append([place, name, value, *parts])
     caption = "Uncertainty budget: value ± half of its 95 % interval, then the standard uncertainty by source"

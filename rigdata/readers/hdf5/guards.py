@@ -138,7 +138,7 @@ def claimed_bytes(member: Any) -> int:
 
 def chunk_bytes(dataset: Any) -> int:
     """Bytes of a stored chunk; zero of what is stored in one piece."""
-    return 0 if dataset.chunks is None else math.prod(dataset.chunks) * int(dataset.dtype.itemsize)
+    return 0 if dataset.chunks is None else math.prod(dataset.chunks) * dataset.dtype.itemsize
 
 
 def refuse_claims(handle: Any, path: Path, runs: Sequence[str], names: Sequence[str]) -> None:

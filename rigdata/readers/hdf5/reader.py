@@ -183,7 +183,7 @@ class Hdf5Reader(RunReader):
         for name in members:
             try:
                 dataset = self._dataset(group, name)
-                lengths[name] = int(dataset.shape[0])
+                lengths[name] = dataset.shape[0]
                 largest = max(largest, chunk_bytes(dataset))
             except RigDataError as error:  # raised again when that channel is asked for
                 problems.extend(error.problems)

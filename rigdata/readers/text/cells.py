@@ -188,7 +188,7 @@ def _spread(time: FloatArray) -> FloatArray:
     steps = np.diff(time)
     if len(time) < 8 or not (steps == 0).any() or not (steps > 0).any():
         return time
-    resolution = float(steps[steps > 0].min())
+    resolution = steps[steps > 0].min()
     index = np.arange(len(time))
     slope, start = np.polyfit(index, time, 1)
     even = start + slope * index

@@ -61,7 +61,7 @@ def predict(
     with c.results():
         frame = _predicted(c, drawing, points, settings)
         c.table("prediction", frame)
-    bad = int((~frame["converged"]).sum())
+    bad = (~frame["converged"]).sum()
     state = f"{bad} did NOT converge" if bad else "all converged"
     c.print(f"{drawing.name}: {counted(len(frame), 'operating point')}, {state}.")
     c.next("export", c.target, "--to", "ross")
@@ -71,7 +71,7 @@ def predict(
         raise NotTrustedError(
             f"{bad} of {len(frame)} points did not converge; their status says why, their values are NaN."
         )
-    mesh_error = float(frame["mesh_error"].max())
+    mesh_error = frame["mesh_error"].max()
     if mesh_error > _COARSE:
         raise NotTrustedError(f"the mesh error reaches {100 * mesh_error:.0f} % of a direct coefficient.")
 

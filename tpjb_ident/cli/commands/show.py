@@ -150,10 +150,10 @@ def channel_row(series: Series, spectrum: Spectrum) -> dict[str, Any]:
         "samples": len(series),
         "missing": len(series) - len(good),
         "sample_rate_Hz": series.rate,
-        "mean": float(mean),
-        "standard_deviation": float(deviation),
-        "minimum": float(low),
-        "maximum": float(high),
+        "mean": mean,
+        "standard_deviation": deviation,
+        "minimum": low,
+        "maximum": high,
         **{f"line{i + 1}_Hz": frequencies[i] for i in range(3)},
     }
 

@@ -156,7 +156,7 @@ def new_pictures(
 ) -> tuple[Picture, Any]:
     """Make a picture with (rows, columns) empty panels, each with its own margins; a height for all or each."""
     inner, gap = np.broadcast_to(height, rows) - _BOTTOM - _TOP, _BOTTOM + _TOP
-    across, down = columns * width, float(inner.sum()) + rows * gap
+    across, down = columns * width, inner.sum() + rows * gap
     figure = Picture(figsize=(across, down))
     FigureCanvasAgg(figure)
     places = {
@@ -165,7 +165,7 @@ def new_pictures(
         "bottom": _BOTTOM / down,
         "top": 1.0 - _TOP / down,
         "wspace": (LEFT + _RIGHT) / (width - LEFT - _RIGHT),
-        "hspace": gap / float(inner.mean()),
+        "hspace": gap / inner.mean(),
     }
     grid = figure.subplots(rows, columns, squeeze=False, height_ratios=inner.tolist(), gridspec_kw=places)
     for axes in grid.flat:
@@ -239,7 +239,7 @@ def add_legend(axes: Axes, handles: Sequence[Any] | None = None, across: bool = 
 def _size(axes: Axes) -> FloatArray:
     """Width and height of the picture that holds a panel [inches]."""
     figure: Any = axes.get_figure(root=True)
-    return np.asarray(figure.get_size_inches())
+    return figure.get_size_inches()
 
 
 def _columns(names: Sequence[str], room: float) -> int:

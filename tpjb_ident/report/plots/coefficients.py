@@ -84,7 +84,7 @@ def coefficient(comparison: Comparison | pd.DataFrame, name: str, over: str = "l
     measured = series.drop_duplicates("at").dropna(subset=[key])
     value, errors = with_errors(measured, key, scale)
     shares = 100.0 * errors / np.maximum(np.abs(value), np.finfo(float).tiny)
-    apart = len(value) > 0 and float(np.median(shares)) < _SMALL
+    apart = len(value) > 0 and np.median(shares) < _SMALL
     figure, grid = new_pictures(2 if apart else 1, 1, height=(2.3, 1.5) if apart else 3.1)
     axes = grid[0, 0]
     label(axes, axis_label(over), f"{name}, {kind.display_unit}")
@@ -106,7 +106,7 @@ def _draw_deviations(axes: Axes, series: pd.DataFrame, at: pd.Series, shares: Fl
     axes.errorbar(at, np.zeros(len(at)), yerr=shares, **_BARS)
     axes.margins(x=0.06)
     reach = series["off"].abs().groupby(series["pivots"]).max()
-    limit = 1.4 * max(float(np.max(shares)), reach[reach > _EXACT].min() if (reach > _EXACT).any() else 1.0)
+    limit = 1.4 * max(np.max(shares), reach[reach > _EXACT].min() if (reach > _EXACT).any() else 1.0)
     axes.set_ylim(-limit, limit)
 
 
@@ -227,7 +227,7 @@ def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
     for number, axis in enumerate("xy"):
         style = style_of(number) | {"marker": ""}
         axes.plot(table["excitation_Hz"], table[f"coherence_{axis}"], **style, label=f"force along {axis}")
-    axes.set_ylim(min(0.9, 0.98 * float(table[["coherence_x", "coherence_y"]].min().min())), 1.01)
+    axes.set_ylim(min(0.9, 0.98 * table[["coherence_x", "coherence_y"]].min().min()), 1.01)
     axes.margins(x=0.05)
     add_legend(axes)
 

@@ -59,7 +59,7 @@ def orbit(run: Run) -> Figure:
         When the run has no finite displacements.
     """
     record = run.vector("displacement")
-    path = np.asarray(record.values, float)
+    path = record.values
     good = np.isfinite(path).all(axis=1)
     if good.sum() < 2:
         raise ValueError(f"run {run.id} has no displacements to draw")
@@ -69,7 +69,7 @@ def orbit(run: Run) -> Figure:
     axes.plot(*shown.T, color=GREY, linewidth=0.5, label="as measured")
     drive = run.point.excitation
     if drive:
-        turns = drive * np.asarray(record.time, float)[good]
+        turns = drive * record.time[good]
         waves = np.column_stack([np.ones_like(turns), np.cos(turns), np.sin(turns)])
         _, cosine, sine = np.linalg.lstsq(waves, path[good], rcond=None)[0]
         turn = np.linspace(0.0, 2.0 * np.pi, 181)
@@ -129,7 +129,7 @@ def spectra(run: Run) -> Figure:
                 raise ValueError(f"run {run.id} has no spectrum of {quantity} up to {top:g} Hz")
             style = style_of(number) | {"marker": "", "linewidth": 1.0}
             axes.plot(frequency[shown], amplitude[shown], **style, label=axis)
-            largest = max(largest, float(amplitude[shown].max()))
+            largest = max(largest, amplitude[shown].max())
         logarithmic(axes)
         axes.set_ylim(top=3.0 * largest)
         _end_axis(axes, run, top)
@@ -173,7 +173,7 @@ def coherence_spectrum(run: Run, *, segment: float | None = None) -> Figure:
     # under no coherence at all, two inputs and m averages: Beta(2, m - 2)
     from scipy.special import betaincinv
 
-    chance = float(betaincinv(2, max(averages - 2, 1), _LEVEL))
+    chance = betaincinv(2, max(averages - 2, 1), _LEVEL)
     axes.axhline(chance, color=INK, linestyle=":", linewidth=0.9, label="by chance, 95 %")
     axes.set_ylim(0.0, 1.02)
     _end_axis(axes, run, _TIMES * run.point.excitation_hz or 0.5 * rate)
@@ -197,7 +197,7 @@ def _multiple_coherence(
     value = np.clip(explained / np.maximum(power, 1e-300), 0.0, 1.0)
     # half-overlapping Hann windows: about 11/9 of the pieces that fit side by side count as independent
     pieces = (len(signals) - piece) // (piece - piece // 2) + 1
-    return np.asarray(frequency, float), np.asarray(value.T, float), max(math.floor(11.0 / 18.0 * pieces), 3)
+    return frequency, value.T, max(math.floor(11.0 / 18.0 * pieces), 3)
 
 
 _FLAGGED = 0.9
@@ -233,7 +233,7 @@ def coherence(identification: Identification | pd.DataFrame) -> Figure:
             axes.plot(at[mask], unexplained[mask], marker, markersize=6, color=colour, label=name)
     axes.axhline(1.0 - _FLAGGED, color=INK, linestyle="--", linewidth=1.0, label="flagged above")
     logarithmic(axes)
-    axes.set_ylim(0.5 * float(unexplained.min()), 1.0)
+    axes.set_ylim(0.5 * unexplained.min(), 1.0)
     set_point_ticks(axes, rows)
     axes.grid(axis="x", visible=False)
     add_legend(axes)
@@ -254,7 +254,7 @@ def window_weights(result: PointResult | DynamicStiffness) -> Figure:
         From a `PointResult` the rejected windows carry run, time and reason.
     """
     estimate = result.stiffness if hasattr(result, "stiffness") else result
-    weights = np.asarray(estimate.weights, dtype=float)
+    weights = estimate.weights
     if not weights.size:
         raise ValueError("the estimate has no windows")
     figure, axes = new_picture("window, in the order of the runs", "robust weight", width=6.4)

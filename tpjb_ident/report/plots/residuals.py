@@ -85,7 +85,7 @@ def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
                 direction = round(math.degrees(element.place("direction")), 6)
                 speed, excitation = (round(element.place(name) / (2 * np.pi), 6) for name in ("speed", "excitation"))
                 point = (element.place("load"), direction, abs(speed), excitation, ROTATIONS[speed < 0.0])
-                rows.append((model, element.observable, *point, float(value)))
+                rows.append((model, element.observable, *point, value))
     return pd.DataFrame(rows, columns=list(_COLUMNS))
 
 
@@ -126,7 +126,7 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame) -> Figure:
     points = frame[place].drop_duplicates().sort_values(place)
     width = max(_SHORTEST, _CELL * len(points) + 1.9)
     figure, grid = new_pictures(len(models), 1, width=width, height=_HEIGHT)
-    limit = max(float(np.nanmax(np.abs(frame["z"].to_numpy(float)))), 3.0 * _LINEAR)
+    limit = max(frame["z"].abs().max(), 3.0 * _LINEAR)
     norm = SymLogNorm(linthresh=_LINEAR, linscale=0.6, vmin=-limit, vmax=limit, base=10)
     for (axes,), model in zip(grid, models, strict=True):
         _draw_map(axes, frame[frame["model"] == model], points, norm, MODEL_LABELS.get(model, str(model)))
@@ -136,7 +136,7 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame) -> Figure:
 def _draw_map(axes: Axes, frame: pd.DataFrame, points: pd.DataFrame, norm: Any, name: str) -> None:
     cells = frame.pivot_table(index="entry", columns=list(points), values="z", dropna=False)
     table = cells.reindex(index=COEFFICIENTS, columns=pd.MultiIndex.from_frame(points)).to_numpy()
-    size = float(np.sqrt(np.nanmean(table**2)))
+    size = np.sqrt(np.nanmean(table**2))
     label(axes, f"static load, {symbol('load')}, and excitation, Hz", "", f"{name}: root mean square {size:.3g} sigma")
     image = axes.imshow(table, cmap=DIVERGING, norm=norm)
     axes.grid(False)

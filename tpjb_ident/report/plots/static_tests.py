@@ -145,7 +145,7 @@ def pad_projection(curves: Sequence[PivotCurve]) -> Figure:
         Line2D([], [], **marks, label="on the pad's direction"),
     ]
     for axes in (forces, places):
-        reach = 1.3 * max(float(np.max(np.abs(line.get_xydata()))) for line in axes.get_lines())
+        reach = 1.3 * max(np.max(np.abs(line.get_xydata())) for line in axes.get_lines())
         axes.set(xlim=(-reach, reach), ylim=(-reach, reach))
         axes.set_aspect("equal", adjustable="box")
         add_legend(axes, handles)
@@ -157,7 +157,7 @@ def _draw_vectors(axes: Axes, curve: PivotCurve, vectors: FloatArray, off: float
     axis = np.array([math.cos(curve.angle), math.sin(curve.angle)])
     projected = np.outer(vectors[:, 0], axis)
     measured = projected + np.outer(vectors[:, 1], [-axis[1], axis[0]])
-    end = 1.12 * float(np.max(vectors[:, 0])) * axis
+    end = 1.12 * np.max(vectors[:, 0]) * axis
     axes.plot([0.0, end[0]], [0.0, end[1]], "--", color=GREY, linewidth=0.9, zorder=1)
     style = style_of(curve.pad - 1) | {"linestyle": "none"}
     axes.plot(*measured.T, **style, markersize=5.5, markerfacecolor="none")
@@ -305,7 +305,7 @@ def _draw_locus(axes: Axes, locus: Locus) -> None:
         sides = 2.0 * _TWO_SIGMA * np.sqrt(np.maximum(variances, 0.0))
         turn = np.degrees(np.arctan2(directions[1, 0], directions[0, 0]))
         place = tuple(point.position / size("length"))
-        axes.add_patch(Ellipse(place, *sides, angle=float(turn), color=INK, alpha=0.25, linewidth=0))
+        axes.add_patch(Ellipse(place, *sides, angle=turn, color=INK, alpha=0.25, linewidth=0))
     if locus.points:
         places = np.array([point.position for point in locus.points]) / size("length")
         axes.plot(*places.T, "o", markersize=4.0, color=INK, label="locus, measured")
