@@ -50,7 +50,7 @@ class AnalogFilter:
         family = "bessel_mag" if self.family == "bessel" else self.family
         corner = 2 * math.pi * self.corner
         zpk = iirfilter(self.order, corner, btype=self.side, analog=True, ftype=family, output="zpk")
-        return np.asarray(freqs_zpk(*zpk, worN=2 * math.pi * np.asarray(frequency, dtype=float))[1])
+        return freqs_zpk(*zpk, worN=2 * math.pi * frequency)[1]
 
 
 def parse_filter(text: str) -> AnalogFilter:

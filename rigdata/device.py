@@ -1,7 +1,7 @@
 """Devices of a run: channels that are sampled together, each device at its own times."""
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -162,10 +162,10 @@ def _own_first(grids: Iterable[Grid], channels: Channels) -> list[Grid]:
 def by_clock(grids: Iterable[Grid], channels: Channels) -> tuple[Device, ...]:
     """Devices of a run: grids split by clock, that of the first probe first."""
     grid_of = {name: grid for grid in grids for name in grid.channels}
-    groups: dict[tuple[int, str], list[str]] = {}
+    groups = defaultdict(list)
     for name in first_probe_first(channels):
         if name in grid_of:
-            groups.setdefault((id(grid_of[name]), channels[name].clock), []).append(name)
+            groups[id(grid_of[name]), channels[name].clock].append(name)
     devices: dict[str, Device] = {}
     for (_, letter), names in groups.items():
         grid = grid_of[names[0]]

@@ -2,7 +2,7 @@
 
 import fnmatch
 import itertools
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -139,11 +139,11 @@ def channels_by_run(table: Table, channels: Channels, runs: Sequence[str]) -> di
     """Channels of the runs that describe one otherwise; what is wrong is noted."""
     findings = table.findings
     _check_together(channels, findings)
-    entries: dict[str, list[tuple[str, Table]]] = {}  # of a run: channel and entry, in the manifest's order
+    entries = defaultdict(list)  # of a run: channel and entry, in the manifest's order
     budget = itertools.count(1)
     for name in channels:
         for run, entry in _entries(table.subtable(name), runs, budget):
-            entries.setdefault(run, []).append((name, entry))
+            entries[run].append((name, entry))
     described = {}
     known = {}
     for run, changes in entries.items():

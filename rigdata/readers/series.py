@@ -6,7 +6,7 @@ Nothing is interpolated: a slow channel's samples are its cells that are not emp
 import functools
 import re
 import tempfile
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -212,12 +212,12 @@ def table(contents: Contents, record: RecordFile) -> Contents:
 def _slow_columns(series: Sequence[Series], record: RecordFile) -> list[Series]:
     """Columns of a stated rate other than that of the rows: their cells, at the times of their rows if these agree."""
     rows_rate = record.stated_rate
-    slow: dict[tuple[str, float, int], list[int]] = {}
+    slow = defaultdict(list)
     for i, column in enumerate(series):
         known = record.channels.get(column.name)
         rate = column.rate if column.time is not None else (rows_rate or np.nan)
         if known is not None and known.sample_rate and not abs(known.sample_rate / rate - 1.0) <= RATE_MISS:
-            slow.setdefault((known.clock, known.sample_rate, len(column)), []).append(i)
+            slow[known.clock, known.sample_rate, len(column)].append(i)
     placed = list(series)
     for (_, rate, length), members in slow.items():
         rows = _filled_rows([series[i].values for i in members])

@@ -8,6 +8,7 @@ and signs with them.
 import contextlib
 import math
 import re
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -171,10 +172,10 @@ class Frame:
 
 def pairs(channels: Guesses, quantity: str) -> list[Pair]:
     """Channels of a quantity and unit, two by two as they follow each other."""
-    names: dict[str, list[str]] = {}
+    names = defaultdict(list)
     for name, guess in channels.items():
         if guess.quantity.value == quantity:
-            names.setdefault(guess.unit, []).append(name)
+            names[guess.unit].append(name)
     return [pair for alike in names.values() for pair in zip(alike[::2], alike[1::2], strict=False)]
 
 

@@ -1,6 +1,7 @@
 """A folder of exports as a whole: what its records tell of each other and of the sensors' axes."""
 
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -206,11 +207,11 @@ class _Folder:
 
     def find_sensitivities(self, line: float) -> None:
         """Reading per hertz of speed channels in volts, where it is one in all running records."""
-        ratios: dict[str, list[float]] = {}
+        ratios = defaultdict(list)
         for run, _ in self._with(_RUNNING):
             for series in of_quantity(run.export, self.channels, "speed"):
                 if not quantity_of_unit(self.channels[series.name].unit):
-                    ratios.setdefault(series.name, []).append(np.nanmedian(series.values) / line)
+                    ratios[series.name].append(np.nanmedian(series.values) / line)
         for name, values in ratios.items():
             guess, middle = self.channels[name], sorted(values)[len(values) // 2]
             if guess.unit and min(values) > 0 and max(values) - min(values) <= NEAR * max(values):

@@ -10,6 +10,7 @@ import matplotlib
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import tpjb_ident as ti
 from tests.report.plot_cases import (
@@ -187,7 +188,7 @@ def test_every_function_that_gives_a_figure_is_handed_on_by_its_name():
     for file in files:
         module = importlib.import_module(f"{plots.__name__}.{file}")
         for name, value in vars(module).items():
-            is_plot = inspect.isfunction(value) and value.__annotations__.get("return") == "Figure"
+            is_plot = inspect.isfunction(value) and value.__annotations__.get("return") in ("Figure", Figure)
             if is_plot and value.__module__ == module.__name__ and not name.startswith("_"):
                 drawing.add(name)
                 assert (getattr(plots, name), value.__name__) == (value, name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,7 @@ from tpjb_ident.pivot.dry_record import refusal
 from tpjb_ident.pivot.refusals import usable_runs
 from tpjb_ident.presentation import Presented
 from tpjb_ident.rounding import listed
+from tpjb_ident.schema import STATIC_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,6 +35,10 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign, Run
 
 
+#: Columns of `locus.csv` behind the set point.
+_MEASURED = (
+    "static_load_measured_N", "static_load_direction_measured_deg", "x_m", "y_m", "x_m_se", "y_m_se", "run",
+)  # fmt: skip
 _BLOCK = 0.1  # [s], for learning the noise
 _NOISE_RUNS = 8  # that noise is learnt from, spread over the test
 _SAME_DIRECTION = math.radians(1.0)
@@ -96,23 +102,11 @@ class Locus(Presented):
         """Table of `locus.csv` (outputs.md)."""
         import pandas as pd
 
-        se = np.sqrt(np.array([np.diag(p.covariance) for p in self.points]))
-        place = np.array([p.position for p in self.points])
-        return pd.DataFrame(
-            {
-                "static_load_N": [p.point.static_load for p in self.points],
-                "static_load_direction_deg": [p.point.static_load_direction_deg for p in self.points],
-                "shaft_speed_Hz": [p.point.shaft_speed_hz for p in self.points],
-                "rotation": [p.point.rotation for p in self.points],
-                "static_load_measured_N": [p.load for p in self.points],
-                "static_load_direction_measured_deg": [math.degrees(p.load_direction) for p in self.points],
-                "x_m": place[:, 0],
-                "y_m": place[:, 1],
-                "x_m_se": se[:, 0],
-                "y_m_se": se[:, 1],
-                "run": [p.run for p in self.points],
-            }
-        )
+        rows = []
+        for p in self.points:
+            measured = p.load, math.degrees(p.load_direction)
+            rows.append((*p.point.static_key, *measured, *p.position, *np.sqrt(np.diag(p.covariance)), p.run))
+        return pd.DataFrame(rows, columns=[*STATIC_KEY, *_MEASURED])
 
     def plot(self, **options: Any) -> Any:
         """Draw the positions; `tpjb_ident.report.plots.clearance_and_locus` takes the same options."""
@@ -276,9 +270,9 @@ def _off_centre(points: Sequence[LocusPoint], polygon: ClearancePolygon) -> Floa
     Equal pads all around leave it at the centre, whatever film and pivots do; unequal ones move it by less than they
     differ.
     """
-    groups: dict[object, list[LocusPoint]] = {}
+    groups = defaultdict(list)
     for point in points:
-        groups.setdefault((point.point.static_load, point.point.spin), []).append(point)
+        groups[point.point.static_load, point.point.spin].append(point)
     largest = max(groups.values(), key=len)
     turn = np.exp(1j * np.array([p.load_direction for p in largest]))
     angles = np.sort(np.angle(turn))

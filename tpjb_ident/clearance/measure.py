@@ -209,8 +209,7 @@ def measure_run(
     probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
     ratio, differ = _gains_differ(probes, polygon)
     if differ:
-        axes = float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)
-        fit = alike(fit, angles, axes, ratio)
+        fit = alike(fit, angles, [probe.axis or 0.0 for probe in probes], ratio)
         shared = _polygon(run, contact, angles, fit)
         pushed = polygon.clearance_pushed + directions(angles) @ (polygon.centre - shared.centre)
         polygon = replace(shared, as_read=(pushed, polygon.fitted_angle))
@@ -276,7 +275,7 @@ def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple
     if len(probes) != 2:
         return 0.0, ()
     first, second = probes
-    axes = (float(first.axis or 0.0), float(second.axis or 0.0))
+    axes = [probe.axis or 0.0 for probe in probes]
     ratio, se = gain_ratio(polygon.angles, polygon.fitted_angle - polygon.angles, polygon.fitted_angle_se, axes)
     if not abs(ratio) > max(_UNEQUAL, _GAIN_ERRORS * se):
         return 0.0, ()

@@ -106,9 +106,7 @@ def corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(systems, sides[..., None])[..., 0])
 
 
-def gain_ratio(
-    angles: FloatArray, tilt: FloatArray, tilt_se: FloatArray, axes: tuple[float, float]
-) -> tuple[float, float]:
+def gain_ratio(angles: FloatArray, tilt: FloatArray, tilt_se: FloatArray, axes: Sequence[float]) -> tuple[float, float]:
     """How much more the first probe reads than the second, and its standard error, as the turns (n,) of the sides tell.
 
     A probe that reads (1 + g) times the truth stretches the measured plane along its axis. What it does to sizes cannot
@@ -132,14 +130,14 @@ def gain_ratio(
     return solution[1], np.sqrt(covariance[1, 1] * max(chi_square, 1.0))
 
 
-def _stretch(angles: FloatArray, axes: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+def _stretch(angles: FloatArray, axes: Sequence[float]) -> tuple[FloatArray, FloatArray]:
     """Part (n,) of a gain of the first probe that sides show along their normals, and by which they turn [rad]."""
     n, rows = directions(angles), directions(axes)
     probe, dual = rows[0], np.linalg.inv(rows)[:, 0]
     return (n @ dual) * (n @ probe), -(n @ dual) * (n[:, 0] * probe[1] - n[:, 1] * probe[0])
 
 
-def alike(fit: SideFit, angles: FloatArray, axes: tuple[float, float], ratio: float) -> SideFit:
+def alike(fit: SideFit, angles: FloatArray, axes: Sequence[float], ratio: float) -> SideFit:
     """The sides as two probes would show them that read alike; nothing tells which is wrong: each has half of it."""
     along, turn = _stretch(angles[fit.pads], axes)
     # what one probe reads less the other reads more: along a side the parts of both are one together

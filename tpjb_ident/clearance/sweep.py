@@ -8,12 +8,12 @@ So the force vector says how much each pad carries, and the position says which 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.campaign import Run
 from rigdata.vector import directions
 from tpjb_ident.phasors.bad_samples import robust_deviation, white_noise
 from tpjb_ident.phasors.slow_samples import (
@@ -25,10 +25,6 @@ from tpjb_ident.phasors.slow_samples import (
     spare_slopes,
 )
 from tpjb_ident.pivot.dry_record import refusal
-
-if TYPE_CHECKING:
-    from rigdata.campaign import Run
-
 
 _BLOCK = 0.1  # [s]; five mains periods
 _CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its deflection

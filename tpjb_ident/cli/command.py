@@ -20,6 +20,7 @@ import tempfile
 import traceback
 import typing
 import warnings
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -173,10 +174,10 @@ class Command(Terminal):
 
     def judge(self, parts: Mapping[str, Sequence[Condition]], missing: Sequence[str] = ()) -> None:
         """Note the conditions of named parts, each once; end with exit code 3 if one forbids trust, or parts miss."""
-        places: dict[str, list[str]] = {}
+        places = defaultdict(list)
         for name, conditions in parts.items():
             for text in sentences(conditions):
-                places.setdefault(text, []).append(name)
+                places[text].append(name)
         serious = sentences(untrusted(condition for conditions in parts.values() for condition in conditions))
         notes = {text: f"{', '.join(names)}: {text}" for text, names in places.items()}
         for note in notes.values():

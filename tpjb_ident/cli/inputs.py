@@ -128,7 +128,7 @@ def rotation_choice(c: Command, bearing: Bearing) -> str:
 
 def pivot_choice(c: Command) -> str | float | Path:
     """What --pivots means: a name, a stiffness [N/m], or the path of a file."""
-    text: str = c.typed["pivots"]
+    text = c.typed["pivots"]
     if text in _PIVOTS:
         return text
     path = Path(text)
@@ -171,7 +171,7 @@ def open_source(c: Command, predicted: bool = False) -> tuple[Any, Any, list[obj
     name the same.
     """
     campaign, table, bearing = (c.typed[name] for name in ("campaign", "coefficients", "bearing"))
-    words: list[object] = [] if bearing is None else ["--bearing", bearing]
+    words = [] if bearing is None else ["--bearing", bearing]
     if table is None and campaign is not None:
         source = c.open(campaign)
         return source, c.bearing_of(source), [campaign, *words]

@@ -1,19 +1,20 @@
 """Prediction beside measurement, with rigid, Kirk and measured pivots: the paper's Sec. 6 on any campaign."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from model.bearing import Bearing
 from model.effects import Effect
 from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
+from tpjb_ident.clearance.locus import Locus
+from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.predictions import (
     ModelSettings,
@@ -22,23 +23,16 @@ from tpjb_ident.compare.predictions import (
     measured_laws,
     predict_points,
 )
+from tpjb_ident.compare.static_tests import StaticTests, measure_static
 from tpjb_ident.errors import TpjbError
+from tpjb_ident.identification.settings import IdentifySettings
+from tpjb_ident.pivot import PivotCurve
 from tpjb_ident.presentation import Presented, changed
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from tpjb_ident.clearance.locus import Locus
-    from tpjb_ident.clearance.measure import ClearancePolygon
-    from tpjb_ident.compare.static_tests import StaticTests
-    from tpjb_ident.identification.settings import IdentifySettings
-    from tpjb_ident.pivot import PivotCurve
-
-
 #: Rows of `predict_points` of every pivot model; operating points are their index.
-Predictions = dict[str, "pd.DataFrame"]
+Predictions = dict[str, pd.DataFrame]
 #: Pivot models that are compared, in the order of the tables.
 VARIANTS = ("rigid", "kirk", "kirk-secant", "measured")
 
@@ -154,8 +148,6 @@ class Comparison(Presented):
 
 def joined(measured: pd.DataFrame, predictions: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Rows of ``comparison.csv``: every prediction beside what was measured, both with a row for every point."""
-    import pandas as pd
-
     sizes = [len(frame) for frame in predictions.values()]
     predicted = pd.concat(list(predictions.values()), ignore_index=True)
     measured = pd.concat([measured] * len(sizes), ignore_index=True)
@@ -206,7 +198,6 @@ def compare_campaign(
     (7, ['rigid'])
     """
     from tpjb_ident.identification.identify import identify
-    from tpjb_ident.identification.settings import IdentifySettings
 
     settings = settings or CompareSettings()
     unknown = [name for name in settings.variants if name not in VARIANTS]
@@ -241,10 +232,6 @@ def model_side(
 
     Points are by default all that the manifest names.
     """
-    import pandas as pd
-
-    from tpjb_ident.compare.static_tests import measure_static
-
     report = progress or (lambda text, done, total: None)
     points = sorted({run.point for run in campaign.of_kind("dynamic")}) if points is None else points
     report("fitting pivot curves, clearance and locus", 0, 1)
@@ -307,8 +294,6 @@ def _loci(static: StaticTests, predictions: Predictions) -> pd.DataFrame | None:
     Without a clearance run the probes' zero stands anywhere: then the prediction is shifted by the mean difference,
     and only the shape of the two can be compared.
     """
-    import pandas as pd
-
     if static.locus is None:
         return None
     frames = []

@@ -3,31 +3,26 @@
 What is common to both cancels: a sensor with the same calibration in both manifests is wrong by the same in both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy.special import stdtrit
 
 from rigdata.arrays import FloatArray, IntArray
+from rigdata.campaign import Campaign
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, symbol
 from tpjb_ident.compare.coefficient_table import HALF, described, partners
+from tpjb_ident.compare.static_tests import StaticTests
 from tpjb_ident.conditions import errors_in
+from tpjb_ident.results.identification import Identification
 from tpjb_ident.rounding import counted, percent, with_interval
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, TANGENT
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rigdata.campaign import Campaign
-    from tpjb_ident.compare.static_tests import StaticTests
-    from tpjb_ident.results.identification import Identification
 
 #: Set points of both that are the same: share of the load, deg of its direction, share of the frequencies.
 _SAME_POINT = (0.002, 0.5, 0.002)

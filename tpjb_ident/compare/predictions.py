@@ -25,6 +25,7 @@ from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
+    from tpjb_ident.pivot.tables import Formula
 
 
 def measured_laws(curves: Sequence[PivotCurve], n_pads: int, source: str) -> tuple[PivotLaw, ...]:
@@ -166,10 +167,6 @@ def _pad_columns(p: Prediction, number: int) -> dict[str, float]:
         f"{pad}_inlet_temperature_degC": flow.inlet,
         f"{pad}_outlet_temperature_degC": flow.outlet,
     }
-
-
-#: (pad, load [N]) -> (secant, tangent) stiffness [N/m].
-Formula = Callable[[int, float], tuple[float, float]]
 
 
 def printed_formula(bearing: Bearing | None) -> Formula | None:

@@ -3,25 +3,19 @@
 Single bad records are left out and named; clearance sweeps are held against the drawing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from model.bearing import Bearing
+from rigdata.campaign import Campaign
 from rigdata.problem import Problem, RigDataError
-from tpjb_ident.clearance.measure import measure_run, measure_sweeps
+from rigdata.run import Run
+from tpjb_ident.clearance.locus import Locus, measure_locus
+from tpjb_ident.clearance.measure import ClearancePolygon, measure_run, measure_sweeps
 from tpjb_ident.conditions import Condition
-
-if TYPE_CHECKING:
-    from model.bearing import Bearing
-    from rigdata.campaign import Campaign
-    from rigdata.run import Run
-    from tpjb_ident.clearance.locus import Locus
-    from tpjb_ident.clearance.measure import ClearancePolygon
-    from tpjb_ident.pivot import PivotCurve
+from tpjb_ident.pivot import PivotCurve, fit_pivots
 
 #: Measured over drawn clearance beyond which the probes' scale is wrong, or the bearing file is another bearing's.
 _SCALE = (0.5, 2.0)
@@ -42,9 +36,6 @@ def measure_static(
     campaign: Campaign, bearing: Bearing, with_pivots: bool = True, every_sweep: bool = False
 ) -> StaticTests:
     """Measure what the campaign holds of pivot curves, clearance polygon (of the coldest sweep) and locus."""
-    from tpjb_ident.clearance.locus import measure_locus
-    from tpjb_ident.pivot import fit_pivots
-
     angles = [pad.pivot_angle for pad in bearing.pads]
     curves: tuple[PivotCurve, ...] = ()
     if with_pivots and campaign.of_kind("dry_pivot"):

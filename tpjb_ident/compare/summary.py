@@ -1,23 +1,18 @@
 """The comparison in words and in one small table: what is how far off, with which pivots."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from model.effects import kind_of
 from tpjb_ident.columns import amount, size, symbol
-from tpjb_ident.compare.comparison import locus_distances
+from tpjb_ident.compare.comparison import Comparison, locus_distances
 from tpjb_ident.compare.effect_words import Estimate, finding
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.rounding import percent, signed
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
-
-if TYPE_CHECKING:
-    from tpjb_ident.compare.comparison import Comparison
 
 #: Direct coefficients, and their columns.
 DIRECT = {name[:3]: name for name in COEFFICIENT_COLUMNS if name[1:3] in ("xx", "yy")}

@@ -170,7 +170,7 @@ def cut_blocks(time: FloatArray, vectors: FloatArray, holds: tuple[Hold, ...], l
 def _edges(time: FloatArray, holds: tuple[Hold, ...], length: float) -> tuple[FloatArray, IntArray]:
     """Start and stop of every piece (m, 2) [s] and its hold number (m,)."""
     bounds = np.r_[time[0], np.ravel([hold[:2] for hold in holds]), time[-1]]
-    pieces: list[tuple[float, float, int]] = []
+    pieces = []
     for k, (start, stop) in enumerate(itertools.pairwise(bounds)):
         if stop - start >= 0.4 * length:
             count, piece = int((stop - start) / length + 1e-6), length

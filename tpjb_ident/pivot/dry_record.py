@@ -4,27 +4,22 @@ The rig never pushes exactly at a pad, and the shaft does not move exactly where
 is the component of both along the pad's direction; the component across tells whether the record is what it claims.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import special
 
 from rigdata.arrays import BoolArray, FloatArray
+from rigdata.calibration import Channel
+from rigdata.campaign import Run
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import good_samples, level_error, live_run, slow_samples, spare_slopes
 from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, LoadCourse, cut_blocks, find_holds, load_course
 from tpjb_ident.pivot.pickup import PickupSignature, measure_pickup
-
-if TYPE_CHECKING:
-    from rigdata.calibration import Channel
-    from rigdata.campaign import Run
 
 #: Share of the load that friction holds back, where the load never comes back to show it.
 FRICTION_SHARE, FRICTION_SE = 0.003, 0.003

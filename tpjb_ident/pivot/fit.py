@@ -5,19 +5,19 @@ the noise as it is correlated. Would a shift of this hold alone explain the reco
 errors? The worst goes first, then the remainder is tested again without it.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import operator
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from scipy import linalg, optimize, special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.campaign import Campaign, Run
 from rigdata.problem import Problem, RigDataError, refuse
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.slow_noise import NoiseModel
@@ -53,9 +53,6 @@ from tpjb_ident.pivot.refusals import (
     structure_behind,
     usable_runs,
 )
-
-if TYPE_CHECKING:
-    from rigdata.campaign import Campaign, Run
 
 REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest load
 MODEL_ERROR = 3e-4  # of the deflection: what averaging over a curved law leaves; matters in computed records only
@@ -260,9 +257,9 @@ def fit_pivots(
         raise RigDataError(problems)
     used, noise, creeps = without_creep(used, noise)
     used = [with_friction(record, noise) for record in used]
-    pads: dict[int, list[DryRecord]] = {}
+    pads = defaultdict(list)
     for record in sorted(used, key=lambda record: record.pad):
-        pads.setdefault(record.pad, []).append(replace(record, good=~bad_blocks(record, noise)))
+        pads[record.pad].append(replace(record, good=~bad_blocks(record, noise)))
     curves = _fit_pads(list(pads.values()), structure_behind(records))
     return tuple(replace(curve, status=(*curve.status, *creeps, *refused_runs(problems))) for curve in curves)
 

@@ -142,7 +142,7 @@ class _Prior:
 def _prior(law: Law, contact: bool, data: FitData) -> _Prior:
     largest, flat = np.max(data.load), (0.0, np.inf, -np.inf, np.inf)
     # mean, standard deviation, lowest and highest of each parameter
-    rows: list[tuple[float, ...]] = [flat, (*data.friction, -0.2, 0.2), flat]
+    rows = [flat, (*data.friction, -0.2, 0.2), flat]
     rows += zip(law.prior_mean, np.ones(len(law.parameters)), *law.bounds, strict=True)
     if contact:
         ends = np.log(0.01 * largest), np.log(largest)

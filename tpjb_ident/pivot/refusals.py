@@ -1,15 +1,15 @@
 """Records that are not what they claim to be: wrong pad, swapped or reversed channels, wrong angle."""
 
-from __future__ import annotations
-
 import math
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.campaign import Run
 from rigdata.problem import Problem, RigDataError, Severity
 from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel
@@ -23,9 +23,6 @@ from tpjb_ident.pivot.dry_record import (
     with_load_zero,
 )
 from tpjb_ident.pivot.pickup import mistake
-
-if TYPE_CHECKING:
-    from rigdata.campaign import Run
 
 T = TypeVar("T")
 DISPLACEMENT_LIMIT = math.radians(30.0)  # off the pad
@@ -46,7 +43,7 @@ def usable_runs(
 ) -> tuple[list[T], list[Problem]]:
     """What is read of each run, of the first few where `most` is given, and why others cannot be used."""
     records: list[T] = []
-    problems: list[Problem] = []
+    problems = []
     for run in runs:
         if len(records) == most:
             break
@@ -153,9 +150,9 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     runs must lie around one centre, each toward its own pad, and none further to the side than a pad's flat
     is wide. Readings set to zero before each run tell no place: they lie no further apart than the pads give.
     """
-    alike: dict[frozenset[str], list[DryRecord]] = {}
+    alike = defaultdict(list)
     for record in records:  # other probes have another zero
-        alike.setdefault(names_of(record.run, "displacement"), []).append(record)
+        alike[names_of(record.run, "displacement")].append(record)
     problems = []
     for group in alike.values():
         if len({record.pad for record in group}) >= 3:

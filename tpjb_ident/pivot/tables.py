@@ -24,6 +24,7 @@ from tpjb_ident.schema import SECANT, TANGENT
 if TYPE_CHECKING:
     import pandas as pd
 
+#: (pad, load [N]) -> (secant, tangent) stiffness [N/m].
 Formula = Callable[[int, float], tuple[float, float]]
 _ROWS, _BEYOND = 20, 1.6  # rows up to the largest measured load, and how far beyond it they go
 
@@ -75,7 +76,7 @@ def pivot_table(
         raise ArgumentError("loads must be positive: at zero load there is no stiffness to speak of")
     frames = []
     for curve in curves:
-        columns: dict[str, object] = {"pad": curve.pad, "force_N": grid, "deflection_m": curve.deflection(grid)}
+        columns = {"pad": curve.pad, "force_N": grid, "deflection_m": curve.deflection(grid)}
         for name, value, band in (
             (TANGENT, curve.stiffness, curve.stiffness_band),
             (SECANT, curve.secant, curve.secant_band),

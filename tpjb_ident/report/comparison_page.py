@@ -1,19 +1,21 @@
 """The report of a comparison: answer, figures, tables, flags, and how it was made."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from rigdata.arrays import FloatArray
+from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.columns import amount, size, symbol
-from tpjb_ident.compare.comparison import predicted_loci
+from tpjb_ident.compare.comparison import Comparison, predicted_loci
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
+from tpjb_ident.conditions import Condition
+from tpjb_ident.pivot import PivotCurve
+from tpjb_ident.pivot.tables import Formula
 from tpjb_ident.report.drawing.picture import DIRECT, MODEL_LABELS, point_labels, points_table
 from tpjb_ident.report.page import Page, Section, Table, table_of, write_page
 from tpjb_ident.report.sections import (
@@ -28,16 +30,9 @@ from tpjb_ident.report.sections import (
     tested_facts,
     values_table,
 )
+from tpjb_ident.results.identification import Identification
 from tpjb_ident.rounding import fixed, percent, signed, with_interval
 from tpjb_ident.schema import DAMPING, KINDS, STIFFNESS, coefficient_column
-
-if TYPE_CHECKING:
-    from tpjb_ident.clearance.measure import ClearancePolygon
-    from tpjb_ident.compare.comparison import Comparison
-    from tpjb_ident.compare.predictions import Formula
-    from tpjb_ident.conditions import Condition
-    from tpjb_ident.pivot import PivotCurve
-    from tpjb_ident.results.identification import Identification
 
 
 def write_report(

@@ -1,35 +1,30 @@
 """A diagnosis in words, and its report: verdict, residuals before and after, candidates, how it was made."""
 
-from __future__ import annotations
-
 import functools
 import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jinja2
 
+from rigdata.campaign import Campaign
 from tpjb_ident.columns import size, symbol
+from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.effect_words import Estimate, amount, finding, label_in_words, shown_unit, words_of
-from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
+from tpjb_ident.diagnosis.campaign import CampaignDiagnosis
+from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, median_deviations
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap_at
+from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, Verdict
 from tpjb_ident.report.drawing.picture import DIRECT
 from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.page import Page, Section, Table, plain_templates, write_page
 from tpjb_ident.report.plots.residuals import gap, residual_frame, residual_map, residual_series
 from tpjb_ident.report.sections import coefficient_sections, flags_line, tested_facts, values_table
 from tpjb_ident.rounding import MINUS, fixed, percent, signed, significant
-
-if TYPE_CHECKING:
-    from rigdata.campaign import Campaign
-    from tpjb_ident.compare.coefficient_table import TableSource
-    from tpjb_ident.diagnosis.campaign import CampaignDiagnosis
-    from tpjb_ident.diagnosis.diagnose import Diagnosis
-    from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, Verdict
 
 #: Parameters that number what there are several of.
 _PLACES = ("pad", "probe", "cell")

@@ -53,10 +53,10 @@ if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.comparison import Comparison
-    from tpjb_ident.compare.predictions import Formula
     from tpjb_ident.conditions import Condition
     from tpjb_ident.diagnosis.plan import CampaignPlan
     from tpjb_ident.pivot import PivotCurve
+    from tpjb_ident.pivot.tables import Formula
     from tpjb_ident.results.identification import Identification
     from tpjb_ident.results.point_result import PointResult
 

@@ -1,10 +1,9 @@
 """The page of a campaign while it is measured: what to do now, what there is, what is still to run."""
 
-from __future__ import annotations
-
+from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,14 +14,11 @@ from tpjb_ident.report.figure import Panel, svg_text
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.plots.coefficients import direct_coefficients
 from tpjb_ident.report.sections import KINDS_IN_WORDS, flags_line, tested_facts, values_table
+from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.runtime.tables import write_text
 from tpjb_ident.schema import STIFFNESS
 from tpjb_ident.watch.next_steps import described, lacking, located
-
-if TYPE_CHECKING:
-    from tpjb_ident.results.point_result import PointResult
-    from tpjb_ident.watch.next_steps import RunStatus
-    from tpjb_ident.watch.watcher import Snapshot
+from tpjb_ident.watch.watcher import Snapshot
 
 #: Words of the page for the states of a run, where they are not the state's name.
 _WORDS = {"look": "good, with a remark", "replaced": "replaced by a repeat"}
@@ -56,11 +52,11 @@ def write_watch_page(
 
 def coverage_table(snapshot: Snapshot) -> Table:
     """How many runs of every kind and set-up have landed."""
-    groups: dict[str, list[RunStatus]] = {}
+    groups = defaultdict(list)
     for status in snapshot.states:
         kind = status.run.kind
         name = set_point(status.run.point) if kind == "dynamic" else KINDS_IN_WORDS.get(kind, kind)
-        groups.setdefault(name, []).append(status)
+        groups[name].append(status)
     rows = []
     for name, group in groups.items():
         good = sum(s.counts for s in group)

@@ -143,7 +143,7 @@ def former_runs(folder: Path) -> dict[str, dict]:
         commands = read_document(folder / RECORD, "tpjb-run").get("commands")
     except BadInputError:
         return {}
-    return {k: v for k, v in commands.items() if isinstance(v, dict)} if isinstance(commands, dict) else {}
+    return _of_kind(commands, dict)
 
 
 def contradiction(path: Path) -> str:
@@ -176,8 +176,12 @@ def outputs_of(entry: Mapping[str, Any]) -> list[str]:
 
 def texts_of(entry: Mapping[str, Any], name: str) -> dict[str, str]:
     """Texts by name in a table of an entry of run.json, whoever wrote it."""
-    table = entry.get(name)
-    return {k: v for k, v in table.items() if isinstance(v, str)} if isinstance(table, dict) else {}
+    return _of_kind(entry.get(name), str)
+
+
+def _of_kind(table: Any, kind: type) -> dict[str, Any]:
+    """Entries of a table that are of a kind; none of what is no table."""
+    return {k: v for k, v in table.items() if isinstance(v, kind)} if isinstance(table, dict) else {}
 
 
 def files_in(folder: Path) -> list[str]:

@@ -2,6 +2,7 @@
 
 import io
 import itertools
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -20,9 +21,9 @@ _LINES = 5000
 
 def read_lvm(path: Path) -> list[Series]:
     """Read every channel over time; segments of the same channels follow each other."""
-    parts: dict[str, list[Series]] = {}
+    parts = defaultdict(list)
     for channel in _LvmFile(path).channels():
-        parts.setdefault(channel.name, []).append(channel)
+        parts[channel.name].append(channel)
     if not parts:
         raise refuse(path.name, "", "holds no channel over time", "Export the run again, with its samples")
     return [_joined(segments) for segments in parts.values()]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -97,10 +98,10 @@ def check_summary(c: Command, name: str, problems: Sequence[Problem], campaign: 
 
 def problem_lines(problems: Sequence[Problem]) -> list[str]:
     """One line per problem; what is the same but for its numbers in many runs is printed once, with their count."""
-    groups: dict[tuple[str, ...], list[Problem]] = {}
+    groups = defaultdict(list)
     for p in problems:
         pattern = re.sub(r"[-+]?\d[\d.e+-]*", "#", p.what)
-        groups.setdefault((p.severity, pattern, p.place if p.severity == "error" else ""), []).append(p)
+        groups[p.severity, pattern, p.place if p.severity == "error" else ""].append(p)
     lines = []
     for (severity, *_), group in groups.items():
         if severity == "error" or len(group) < ALIKE:
@@ -149,4 +150,4 @@ def _figures(run: Run) -> tuple[float, ...]:
         rate = run.sample_rate
     except RigDataError:
         rate = math.nan
-    return rate, p.static_load, p.static_load_direction_deg, p.shaft_speed_hz, p.excitation_hz or math.nan
+    return rate, *p.static_key[:3], p.excitation_hz or math.nan

@@ -1,17 +1,17 @@
 """Pictures of records, over time and frequency, and of their windows: how far displacements explain the force."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rigdata.arrays import FloatArray
+from rigdata.run import Run
 from rigdata.survey.spectrum import amplitude_spectrum
 from tpjb_ident.columns import size, symbol
+from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.report.drawing.picture import (
     BLUE,
     GREY,
@@ -30,15 +30,9 @@ from tpjb_ident.report.drawing.picture import (
     set_point_ticks,
     style_of,
 )
+from tpjb_ident.results.identification import Identification
+from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.rounding import listed
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from rigdata.run import Run
-    from tpjb_ident.estimators.stiffness import DynamicStiffness
-    from tpjb_ident.results.identification import Identification
-    from tpjb_ident.results.point_result import PointResult
 
 #: More samples could not be told apart.
 _MOST_SAMPLES = 4000

@@ -1,10 +1,8 @@
 """Pictures of the static tests: dry pivot tests (the paper's Fig. 10 to 12), clearance and locus (Fig. 14)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,8 +12,12 @@ from matplotlib.patches import Ellipse
 from numpy.typing import ArrayLike
 
 from rigdata.arrays import FloatArray
+from tpjb_ident.clearance.locus import Locus
+from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.clearance.polygon import corners
 from tpjb_ident.columns import size, symbol
+from tpjb_ident.pivot import PivotCurve
+from tpjb_ident.pivot.tables import Formula
 from tpjb_ident.report.drawing.picture import (
     GREY,
     INK,
@@ -33,12 +35,6 @@ from tpjb_ident.report.drawing.picture import (
     plot,
     style_of,
 )
-
-if TYPE_CHECKING:
-    from tpjb_ident.clearance.locus import Locus
-    from tpjb_ident.clearance.measure import ClearancePolygon
-    from tpjb_ident.compare.predictions import Formula
-    from tpjb_ident.pivot import PivotCurve
 
 _LAW_POINTS = 200
 
