@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Iterable
@@ -128,7 +129,12 @@ def shown(value: object) -> str:
 
 def tables_beside(module: str, name: str) -> dict[str, Any]:
     """Tables of a TOML file of ours, next to the module whose file is given."""
-    return tomllib.loads(Path(module).with_name(name).read_text(encoding="utf-8"))
+    return tomllib.loads(Path(module).with_name(name).read_text("utf-8"))
+
+
+def toml_value(value: Any) -> str:
+    """A value as TOML writes it: texts quoted, controls escaped."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def parse_toml(text: str) -> dict[str, Any]:

@@ -154,21 +154,19 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
     example = example_of(dimension)
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise UnitError(f'expected a number with a unit in quotes, like "1 {example}", got {shown(value)}')
-    if not isinstance(value, str):
-        if dimension != "ratio":
-            raise UnitError(f"{shown(value)} has no unit, such as {example}")
-        return _finite(value), ""
-    if len(value) > LONGEST:
-        raise UnitError(f"a text of {len(value)} characters is not a quantity")
-    text = value.strip().translate(_DASHES)
-    match = _NUMBER.match(text)
-    if match is None:
-        hint = "; write a decimal point, not a comma" if re.match(r"[+-]?[0-9]*,[0-9]", text) else ""
-        raise UnitError(f"{shown(value)} is not a number with a unit{hint}")
-    unit = text[match.end() :].strip()
+    number, unit = value, ""
+    if isinstance(value, str):
+        if len(value) > LONGEST:
+            raise UnitError(f"a text of {len(value)} characters is not a quantity")
+        text = value.strip().translate(_DASHES)
+        match = _NUMBER.match(text)
+        if match is None:
+            hint = "; write a decimal point, not a comma" if re.match(r"[+-]?[0-9]*,[0-9]", text) else ""
+            raise UnitError(f"{shown(value)} is not a number with a unit{hint}")
+        number, unit = match[0], text[match.end() :].strip()
     if not unit and dimension != "ratio":
         raise UnitError(f"{shown(value)} has no unit, such as {example}")
-    return _finite(match[0]), unit
+    return _finite(number), unit
 
 
 def _finite(value: str | float) -> float:

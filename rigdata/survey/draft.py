@@ -14,7 +14,7 @@ from pathlib import Path
 from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
 from rigdata.manifest.manifest import parse_manifest
-from rigdata.problem import RigDataError, parse_toml, refuse
+from rigdata.problem import RigDataError, parse_toml, refuse, toml_value
 from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, quantity_of_unit, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
@@ -32,14 +32,14 @@ _Tables = dict[tuple[str, str], list[str]]
 
 def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     """Write the text of a draft."""
-    file = _toml_string(bearing) if bearing else f'"{MARK}"   # file in this folder'
+    file = toml_value(bearing) if bearing else f'"{MARK}"   # file in this folder'
     mass = _line("mass", OPEN, HOUSING)
-    lines = WORDS["draft"]["head"].format(name=_toml_string(name), bearing=file, mass=mass).split("\n")
+    lines = WORDS["draft"]["head"].format(name=toml_value(name), bearing=file, mass=mass).split("\n")
     exports = [run.export for run in surveyed.runs]
     if not all(export.rate > 0 for export in exports):
         lines += ["[acquisition]", _line("sample_rate", OPEN, ACQUISITION), ""]
     if nameless := max((export.nameless for export in exports), default=0):
-        names = ", ".join(_toml_string(f"column{i + 1}") for i in range(nameless))
+        names = ", ".join(toml_value(f"column{i + 1}") for i in range(nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
     for clock, unit in surveyed.clocks.items():
         spelt = replace(unit, value=usable_unit(unit.value) or "s")
@@ -79,7 +79,7 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
     if quantity in VECTOR_QUANTITIES:
         lines.append(_line("axis", guess.axis, CHANNEL))
     if is_like:
-        lines.append(f"like = {_toml_string(model)}   # (guess) same type; or its own unit, sensitivity, ..")
+        lines.append(f"like = {toml_value(model)}   # (guess) same type; or its own unit, sensitivity, ..")
     else:
         lines.append(f'unit = "{guess.unit or MARK}"')
         if guess.sensitivity.value:
@@ -98,7 +98,7 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
 def run_lines(run: RunGuess) -> list[str]:
     """Lines of a run's table."""
     kind = run.kind.value
-    lines = ["[[runs]]", f"id = {_toml_string(Path(run.file).stem)}", f"file = {_toml_string(run.file)}"]
+    lines = ["[[runs]]", f"id = {toml_value(Path(run.file).stem)}", f"file = {toml_value(run.file)}"]
     lines.append(_line("kind", run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
     fields = [field for field in RUN if (kind or "dynamic") in (*field.needed_by, *field.drafted_for)]
     return lines + [_line(field.key, getattr(run, field.guess), RUN) for field in fields]
@@ -116,14 +116,9 @@ def _line(key: str, entry: Entry, fields: tuple[Field, ...] = ()) -> str:
     return f"{key} = {value}   # {mark}{entry.reason}" if mark else f"{key} = {value}"
 
 
-def _toml_string(text: str) -> str:
-    """Write text as a TOML string: quoted, controls escaped."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
 def _key(name: str) -> str:
     bare = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
-    return name if bare else _toml_string(name)
+    return name if bare else toml_value(name)
 
 
 @dataclass

@@ -14,6 +14,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import ROTATIONS
+from rigdata.problem import toml_value
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import answer
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig, converter_step, felt_direction
@@ -293,7 +294,7 @@ def _table(title: str, entries: dict[str, object]) -> str:
     lines = [title] if title else []
     for key, value in entries.items():
         if value is not None:
-            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+            lines.append(f"{key} = {toml_value(value)}")
     return "\n".join(lines) + "\n"
 
 

@@ -182,9 +182,10 @@ class RigPlan:
             cls.like_paper(pads), dynamic=operating_points(PAPER_RIG["plan"]["short"]), locus=locus_points(10)
         )
 
-    def turning(self, rotation: str) -> Self:
-        """The same tests with the shaft turning ``"counter-clockwise"`` or ``"clockwise"``."""
-        dynamic, locus = (tuple(replace(p, rotation=rotation) for p in points) for points in (self.dynamic, self.locus))
+    def turning(self, **shaft: Any) -> Self:
+        """The same tests with another ``rotation`` of the shaft, or another ``shaft_speed`` [rad/s]."""
+        dynamic = tuple(replace(point, **shaft) for point in self.dynamic)
+        locus = tuple(replace(point, **shaft) for point in self.locus)
         return replace(self, dynamic=dynamic, locus=locus)
 
     def runs(self, pivot_angles: Sequence[float]) -> tuple[PlannedRun, ...]:

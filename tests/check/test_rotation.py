@@ -19,7 +19,7 @@ PLAN = RigPlan(dynamic=operating_points([(5000.0, 25.0)]), directions=directions
 
 @pytest.fixture(scope="module", params=ROTATIONS)
 def observations(request, campaign_of):
-    path = campaign_of(rocker_rig(5, plan=PLAN.turning(request.param)), name=f"turns-{request.param}")
+    path = campaign_of(rocker_rig(5, plan=PLAN.turning(rotation=request.param)), name=f"turns-{request.param}")
     return [observe(run) for run in load_campaign(path).runs]
 
 
@@ -61,7 +61,7 @@ def test_few_clear_runs_or_runs_that_disagree_tell_nothing(observations):
 
 @pytest.mark.slow
 def test_check_says_it_once(campaign_of):
-    path = campaign_of(rocker_rig(5, plan=PLAN.turning("clockwise")), name="turns-clockwise")
+    path = campaign_of(rocker_rig(5, plan=PLAN.turning(rotation="clockwise")), name="turns-clockwise")
     campaign = load_campaign(path)
     runs = tuple(replace(r, point=replace(r.point, rotation="counter-clockwise")) for r in campaign.runs)
     (problem,) = [p for p in check_campaign(replace(campaign, runs=runs)) if "goes round" in p.what]

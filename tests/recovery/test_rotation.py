@@ -142,7 +142,7 @@ ONE_WAY = RigPlan(
 
 
 def both_ways(plan):
-    back = plan.turning("clockwise")
+    back = plan.turning(rotation="clockwise")
     return replace(
         plan, dynamic=plan.dynamic + back.dynamic, locus=plan.locus + back.locus, clearance=(ClearanceSweep(),)
     )
@@ -222,7 +222,7 @@ def test_the_mirror_image_of_both_senses(both, compared, tmp_path):
 
 
 def test_runs_that_all_state_the_sense_are_the_shaft_that_states_it(campaign_of, tmp_path):
-    stated = campaign_of(offset_rig(OFFSET, ONE_WAY.turning("clockwise")), name="clockwise")
+    stated = campaign_of(offset_rig(OFFSET, ONE_WAY.turning(rotation="clockwise")), name="clockwise")
 
     def run_by_run(text):
         without = text.replace('[shaft]\nrotation = "clockwise"\n', "")

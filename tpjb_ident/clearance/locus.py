@@ -156,15 +156,15 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     orders = np.array([runs.index(record.run) for record in records], dtype=float)
     noise = _noise(records)
     centre = np.zeros(2) if polygon is None else polygon.centre
-    repeats = _repeats(records, orders, noise, centre)
+    repeats, drift, drift_variance, scatter = _repeats(records, orders, noise, centre)
     moved = [_moved(record, noise) for record in records]
     # with the bearing's centre from the same probes their zero falls out
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
     centre_covariance = zero if polygon is None else polygon.centre_covariance
     points = []
     for record, order, size in zip(records, orders, moved, strict=True):
-        position = record.position - np.nan_to_num(repeats.drift) * order - centre
-        variance = noise.mean_variance(record.span) + repeats.scatter + order**2 * repeats.drift_variance
+        position = record.position - np.nan_to_num(drift) * order - centre
+        variance = noise.mean_variance(record.span) + scatter + order**2 * drift_variance
         # of a steady way the ends are as far from the mean as the halves from each other
         variance += size**2 / 4.0
         covariance = variance * np.eye(2) + centre_covariance
@@ -178,8 +178,8 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     ]
     if off.any():
         on_its_way.append(f"positions go around a place {1e6 * math.hypot(*off):.2g} µm from the polygon's centre")
-    status = (*_status(points, polygon, repeats.count, listed(on_its_way, 4)), *refused_runs(problems))
-    return Locus(tuple(points), centre, repeats.drift, status)
+    status = (*_status(points, polygon, repeats, listed(on_its_way, 4)), *refused_runs(problems))
+    return Locus(tuple(points), centre, drift, status)
 
 
 @dataclass(frozen=True)
@@ -192,16 +192,6 @@ class _Record:
     direction: float  #: [rad]
     span: float  #: [s]
     blocks: tuple[NoiseSeries, NoiseSeries]  #: of either component
-
-
-@dataclass(frozen=True)
-class _Repeats:
-    """What runs at a set point that was there before say of all runs."""
-
-    count: int
-    drift: FloatArray  #: (2,) per run [m]; NaN without any
-    drift_variance: float = 0.0  #: of a component [m^2]
-    scatter: float = 0.0  #: variance by which the shaft comes back elsewhere [m^2]; zero where fewer than two tell it
 
 
 def _from_down(direction: float) -> float:
@@ -285,8 +275,12 @@ def _off_centre(points: Sequence[LocusPoint], polygon: ClearancePolygon) -> Floa
     return np.array([middle.real, middle.imag]) if abs(middle) > limit else np.zeros(2)
 
 
-def _repeats(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, centre: FloatArray) -> _Repeats:
-    """Drift and scatter by least squares, with a place of its own for every set point.
+def _repeats(
+    records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, centre: FloatArray
+) -> tuple[int, FloatArray, float, float]:
+    """Runs at a set point that was there before: how many, what drift (2,) per run [m], its variance, and scatter.
+
+    By least squares, with a place of its own for every set point; of a component [m^2], drift NaN without any repeat.
 
     Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number. A
     repeat meets its set point otherwise than the first time: the shaft follows the load around the centre, and by half
@@ -297,7 +291,7 @@ def _repeats(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, 
     firsts = same.argmax(axis=0)
     count = len(records) - len(np.unique(firsts))
     if count == 0:
-        return _Repeats(0, np.full(2, np.nan))
+        return 0, np.full(2, np.nan), 0.0, 0.0
     pull = np.array([r.load * np.exp(1j * r.direction) for r in records])
     met = pull / np.where(pull[firsts] == 0, 1e-300, pull[firsts])
     more, turn = np.abs(met) - 1, np.angle(met)
@@ -315,7 +309,7 @@ def _repeats(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, 
     if count > 1:
         left = 0.5 * np.sum((remainder @ places) ** 2) * student_widening(2 * (count - 1)) ** 2
         scatter = max(left - np.diag(remainder) @ variance, 0.0) / (count - 1)
-    return _Repeats(count, weight @ places, weight**2 @ (variance + scatter), scatter)
+    return count, weight @ places, weight**2 @ (variance + scatter), scatter
 
 
 def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:

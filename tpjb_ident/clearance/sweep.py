@@ -24,7 +24,7 @@ from tpjb_ident.phasors.slow_samples import (
     slow_samples,
     spare_slopes,
 )
-from tpjb_ident.pivot.dry_record import refusal
+from tpjb_ident.pivot.dry_record import pad_axes, refusal
 
 _BLOCK = 0.1  # [s]; five mains periods
 _CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its deflection
@@ -72,8 +72,7 @@ class ContactIntervals:
         Where it rubs on all pads that it touches, their forces are those of a load turned back by the angle of
         friction; where oil is squeezed out, those of a load some time ago.
         """
-        turn = np.array([[np.cos(lag), np.sin(lag)], [-np.sin(lag), np.cos(lag)]])
-        carried = _carried(self.force @ turn.T, angles, self.touched)
+        carried = _carried(self.force @ pad_axes(lag).T, angles, self.touched)
         return replace(self, load=carried[np.arange(len(self.pad)), self.pad])
 
 

@@ -244,7 +244,7 @@ class Command(Terminal):
                 few = len(frame) <= _MOST_ROWS
                 data[stem] = frame.to_dict("records") if few else {"rows": len(frame), "file": name}
             elif ending == ".json" and name != RECORD:
-                data[stem] = json.loads((self.target / name).read_text(encoding="utf-8"))
+                data[stem] = json.loads((self.target / name).read_text("utf-8"))
         return {
             "schema": "tpjb-command/1",
             "command": self.name,
@@ -388,5 +388,4 @@ def _places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
 
 def _plain(options: Mapping[str, Any]) -> dict[str, Any]:
     """Options as JSON holds them; of a file its name: its place is of no use elsewhere, its SHA-256 tells which."""
-    plain = json.loads(json.dumps(options, default=lambda value: getattr(value, "name", str(value))))
-    return plain
+    return json.loads(json.dumps(options, default=lambda value: getattr(value, "name", str(value))))

@@ -16,7 +16,7 @@ from tpjb_ident.errors import BadInputError
 DEMO, ROCKER = "rigdata/samples/demo.h5", "model/bearings/rocker.toml"
 
 
-_TABLE = Path(__file__).with_name("options.csv").read_text(encoding="utf-8")
+_TABLE = Path(__file__).with_name("options.csv").read_text("utf-8")
 #: Options by the name of their parameter, those of one command alone behind its name.
 _OPTIONS = {row["parameter"]: row for row in csv.DictReader(_TABLE.splitlines())}
 

@@ -36,7 +36,7 @@ _FORETELLS = 0.02
 _SPACE = "  "
 
 
-_TABLE = csv.DictReader(Path(__file__).with_name("printed.csv").read_text(encoding="utf-8").splitlines())
+_TABLE = csv.DictReader(Path(__file__).with_name("printed.csv").read_text("utf-8").splitlines())
 #: How columns of tables on disk are printed, by name.
 PRINTED = {row["column"]: Column(row["title"], row["form"], bool(row["words"])) for row in _TABLE}
 #: Called with what is being done, how many are done, of how many.

@@ -46,7 +46,7 @@ def counted_twice(effects: Sequence[Effect]) -> tuple[str, ...]:
 
 def counts_from_measured(path: Path | None) -> bool:
     """Whether an effects file says that its sizes are meant beside measured pivots, as a diagnosis from there does."""
-    entries = {} if path is None else parse_toml(path.read_text(encoding="utf-8-sig"))
+    entries = {} if path is None else parse_toml(path.read_text("utf-8-sig"))
     return entries.get("counted_from") == "measured pivots"
 
 

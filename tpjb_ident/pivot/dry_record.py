@@ -222,9 +222,9 @@ def _less_zero(record: DryRecord, zero: FloatArray, covariance: FloatArray, unta
     )
 
 
-def names_of(run: Run, quantity: str) -> frozenset[str]:
-    """Names of a run's probes or cells."""
-    return frozenset(name for name, channel in axial_channels(run).items() if channel.quantity == quantity)
+def probes_of(run: Run) -> frozenset[str]:
+    """Names of a run's probes."""
+    return frozenset(name for name, channel in axial_channels(run).items() if channel.quantity == "displacement")
 
 
 def axial_channels(run: Run) -> dict[str, Channel]:

@@ -117,10 +117,11 @@ class LawFit:
         jacobian[:, _shape(law)] = scale * self.reference_load * phi_q
         value = theta[OFFSET] + deflection
         if self.contact:
-            decay = np.exp(-load / np.exp(theta[-1]))
+            ratio = load / np.exp(theta[-1])
+            decay = np.exp(-ratio)
             value = value - theta[-2] * decay
             jacobian[:, -2] = -decay
-            jacobian[:, -1] = -theta[-2] * decay * load / np.exp(theta[-1])
+            jacobian[:, -1] = -theta[-2] * decay * ratio
         return value, jacobian
 
 

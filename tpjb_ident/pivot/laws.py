@@ -154,7 +154,7 @@ def _spline_precision() -> FloatArray:
 
 def _spline_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
     """The logarithm of the compliance is piecewise linear in that of the load; beyond the nodes its slope goes on."""
-    weights = interpolation(np.log(np.maximum(u, 1e-9)), NODES)[:, _FREE]
+    weights = interpolation(_log(u))[:, _FREE]
     value = np.exp(weights @ q)
     return value, weights * value[:, None]
 
@@ -180,11 +180,11 @@ def _spline_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
     return phi, between[:, 1:] * phi[:, None]
 
 
-def interpolation(x: FloatArray, knots: FloatArray) -> FloatArray:
-    """Weights (n, k) of linear interpolation at rising knots (k,); linear extrapolation beyond the ends."""
-    cell = np.clip(np.searchsorted(knots, x) - 1, 0, len(knots) - 2)
-    share = (x - knots[cell]) / (knots[cell + 1] - knots[cell])
-    weights = np.zeros((len(x), len(knots)))
+def interpolation(x: FloatArray) -> FloatArray:
+    """Weights (n, k) of linear interpolation at the nodes (k,); linear extrapolation beyond the ends."""
+    cell = np.clip(np.searchsorted(NODES, x) - 1, 0, len(NODES) - 2)
+    share = (x - NODES[cell]) / (NODES[cell + 1] - NODES[cell])
+    weights = np.zeros((len(x), len(NODES)))
     rows = np.arange(len(x))
     weights[rows, cell] = 1.0 - share
     weights[rows, cell + 1] = share
@@ -193,7 +193,7 @@ def interpolation(x: FloatArray, knots: FloatArray) -> FloatArray:
 
 # ln u on which the compliance is integrated
 _GRID, _GRID_STEP = np.linspace(np.log(2e-3), np.log(25.0), 320, retstep=True)
-_GRID_COLUMNS = np.column_stack([np.ones(len(_GRID)), interpolation(_GRID, NODES)[:, _FREE]])
+_GRID_COLUMNS = np.column_stack([np.ones(len(_GRID)), interpolation(_GRID)[:, _FREE]])
 
 
 def _law(name: str, phi: Shape, psi: Shape, parameters: dict[str, tuple[float, float, float, float]]) -> Law:

@@ -18,8 +18,8 @@ from tpjb_ident.pivot.dry_record import (
     LOAD_LIMIT,
     DryRecord,
     displacement_direction,
-    names_of,
     pooled_noise,
+    probes_of,
     with_load_zero,
 )
 from tpjb_ident.pivot.pickup import mistake
@@ -152,7 +152,7 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     """
     alike = defaultdict(list)
     for record in records:  # other probes have another zero
-        alike[names_of(record.run, "displacement")].append(record)
+        alike[probes_of(record.run)].append(record)
     problems = []
     for group in alike.values():
         if len({record.pad for record in group}) >= 3:
@@ -220,7 +220,7 @@ def _slope_error(record: DryRecord, noise: NoiseModel) -> float:
     moved = record.blocks.deflection - record.blocks.deflection.mean()
     variance = moved @ record.blocks.covariance(noise) @ moved
     # a component of more than two probes has less noise than each
-    probes = len(names_of(record.run, "displacement"))
+    probes = len(probes_of(record.run))
     return math.sqrt(variance * max(probes / 2.0, 1.0)) / max(moved @ moved, 1e-300)
 
 

@@ -6,7 +6,6 @@ denser than any reader's interpolation can spoil; no parameters are written, so 
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.problem import toml_value
 from tpjb_ident.conditions import sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve
@@ -144,11 +144,11 @@ def pivots_text(curves: Sequence[PivotCurve], source: str) -> str:
     lines = [
         "# Measured pivot laws: pivot and housing together, as the probes on the housing see them.",
         f'schema = "{_SCHEMA}"',
-        f"source = {_toml(source)}",
+        f"source = {toml_value(source)}",
         "includes_housing = true",
     ]
     for curve in sorted(curves, key=lambda c: c.pad):
-        lines += ["", "[[pads]]", *(f"{name} = {_toml(value)}" for name, value in pad_table(curve).items())]
+        lines += ["", "[[pads]]", *(f"{name} = {toml_value(value)}" for name, value in pad_table(curve).items())]
     return "\n".join(lines) + "\n"
 
 
@@ -206,8 +206,3 @@ def pad_table(curve: PivotCurve) -> dict[str, Any]:
 
 def _rounded(values: FloatArray, digits: int) -> list[float]:
     return [float(f"{value:.{digits}g}") for value in values]
-
-
-def _toml(value: Any) -> str:
-    escaped = json.dumps(value, ensure_ascii=False)  # a TOML value but for DEL, which TOML does not allow in a string
-    return escaped.replace("\x7f", "\\u007f")

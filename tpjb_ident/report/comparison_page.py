@@ -194,8 +194,7 @@ def _flagged(comparison: Comparison) -> list[tuple[str, Condition]]:
     """Every flag of points, pivot curves, polygon and locus, and where it stands."""
     identified = comparison.identification
     labels = point_labels(points_table(identified.points))
-    parts = []
-    parts += [(place, p.quality) for place, p in zip(labels, identified.points, strict=True)]
+    parts = [(place, p.quality) for place, p in zip(labels, identified.points, strict=True)]
     parts.append(("campaign", identified.conditions))
     parts += [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
     tests = {"clearance": comparison.clearance, "locus": comparison.locus}

@@ -96,18 +96,18 @@ def _sections(difference: Difference) -> list[Section]:
         sections.append(Section("Coefficients", panels=[Panel("difference", _TITLE, _drawn, points)], tables=tables))
     if len(pivots):
         loads = (pivots["force_N"] / size("load")).map("{:.3g}".format)
-        cells = {"pad": _pads(pivots), f"load, {symbol('load')}": loads, **_both(pivots, TANGENT, "stiffness")}
+        cells = {
+            "pad": pivots["pad"].map("#{:g}".format),
+            f"load, {symbol('load')}": loads,
+            **_both(pivots, TANGENT, "stiffness"),
+        }
         table = table_of("Tangent stiffness of the pivots, where both were measured; 95 %", cells)
         sections.append(Section("Pivots", tables=[table]))
     if len(clearance):
-        cells = {"pad": _pads(clearance), **_both(clearance, "clearance_m", "length")}
+        cells = {"pad": clearance["pad"].map("#{:g}".format), **_both(clearance, "clearance_m", "length")}
         table = table_of("Assembled clearance at zero push load, 95 %", cells)
         sections.append(Section("Clearance", tables=[table]))
     return sections
-
-
-def _pads(frame: pd.DataFrame) -> pd.Series:
-    return frame["pad"].map("#{:g}".format)
 
 
 def _both(frame: pd.DataFrame, name: str, quantity: str) -> dict[str, Iterable[str]]:

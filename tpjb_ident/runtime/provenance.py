@@ -83,7 +83,7 @@ def read_document(path: Path, kind: str) -> Document:
     try:
         if path.stat().st_size > _LARGEST:
             raise ValueError(f"larger than {_LARGEST >> 20} MB")
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise BadInputError(f"{path}: cannot be read as JSON ({error}). {remedy}.") from error
     stated = document.get("schema") if isinstance(document, dict) else None

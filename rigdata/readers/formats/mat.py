@@ -166,7 +166,7 @@ def _columns(name: str, value: np.ndarray, texts: dict[str, list[str]]) -> tuple
     if value.ndim == 1 or 1 in value.shape:
         return {name: np.ascontiguousarray(value).reshape(-1)}, {}
     level = name.rpartition(".")[0]
-    lists = {key.rpartition(".")[2].lower(): cells for key, cells in texts.items() if key.rpartition(".")[0] == level}
+    lists = {_last_part(key).lower(): cells for key, cells in texts.items() if key.rpartition(".")[0] == level}
     names = _listed(lists, _NAMES, value.shape) or [name] * value.shape[1]
     units = _listed(lists, _UNITS, (len(names),)) or [""] * len(names)
     columns, column_units = {}, {}

@@ -125,14 +125,10 @@ class Hdf5Reader(RunReader):
         if _GROUP in self.opened_members:  # by whoever called
             yield
             return
+        needed = min(2 * self._layout().largest_chunk, _MOST_CACHE)  # the cache is given when a file is opened
         stack = ExitStack()
         try:
-            self.opened_members[_GROUP] = stack.enter_context(self._group(_LEAST_CACHE))
-            needed = min(2 * self._layout().largest_chunk, _MOST_CACHE)
-            if needed > _LEAST_CACHE:  # the cache is given when a file is opened
-                self.opened_members.clear()
-                stack.close()
-                self.opened_members[_GROUP] = stack.enter_context(self._group(needed))
+            self.opened_members[_GROUP] = stack.enter_context(self._group(max(needed, _LEAST_CACHE)))
             yield
         finally:  # closed without the block's own errors, which are no faults of the file
             self.opened_members.clear()
@@ -263,16 +259,12 @@ class Hdf5Reader(RunReader):
 
     def problems(self) -> tuple[Problem, ...]:
         """Tell which datasets nobody describes, and which state another unit than the manifest."""
-        return self._notes("datasets", self._layout().members, self._units())
-
-    def _units(self) -> dict[str, str]:
-        """Units that datasets state in an attribute."""
-        units = {}
+        members, units = self._layout().members, {}
         with self._group() as group:
-            for name in filter(self._layout().members.__contains__, self.channels):
+            for name in filter(members.__contains__, self.channels):
                 with suppress(RigDataError):  # raised when that channel is asked for
                     units[name] = self._unit(group, name)
-        return units
+        return self._notes("datasets", members, units)
 
     def _unit(self, group: Any, name: str) -> str:
         attributes = self._dataset(group, name).attrs

@@ -41,7 +41,7 @@ def demo(c: Command) -> None:
             c.json("check.json", summary)
             result = compare_campaign(campaign, bearing, progress=show, model=model)
             c.table("prediction", result.predictions["measured"])
-            truth = json.loads(path.with_name("demo.truth.json").read_text(encoding="utf-8"))
+            truth = json.loads(path.with_name("demo.truth.json").read_text("utf-8"))
             error = 100 * _largest_error(result, truth)
             note = f"The records are computed: identified direct coefficients are within {error:.2f} % of the truth."
             c.next("init", "FOLDER-OF-YOUR-RECORDS")

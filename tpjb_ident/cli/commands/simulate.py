@@ -56,10 +56,10 @@ def simulate(
     from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 
     sense = rotation_choice(c, drawing)
-    tests = replace(_plan(plan, len(drawing.pads), load, excitation, speed), repeats=repeats).turning(sense)
+    tests = replace(_plan(plan, len(drawing.pads), load, excitation, speed), repeats=repeats).turning(rotation=sense)
     largest = max(point.static_load for point in tests.dynamic)
     rig = VirtualRig(
-        truth=rig_truth(drawing, settings, bearing.read_text(encoding="utf-8-sig")),
+        truth=rig_truth(drawing, settings, bearing.read_text("utf-8-sig")),
         instruments=erring_instruments(Instruments.like_paper(len(drawing.pads), seed, largest), settings.effects),
         noise=Noise.like_samples().scaled(noise) if noise > 0 else Noise.none(),
         seed=seed,
@@ -81,12 +81,10 @@ def _plan(plan: str, pads: int, load: str | None, excitation: str | None, speed:
 
     refuse_unknown(plan, PLANS, "--plan")
     rig_plan = RigPlan.like_paper(pads) if plan == "paper" else RigPlan.short(pads)
-    points = tuple(operating_points(load or "5 kN", "-90 deg", speed, excitation or "25 Hz"))
-    turning = points[0].shaft_speed
-    if load is None and excitation is None:
-        points = tuple(replace(point, shaft_speed=turning) for point in rig_plan.dynamic)
-    locus = tuple(replace(point, shaft_speed=turning) for point in rig_plan.locus)
-    return replace(rig_plan, dynamic=points, locus=locus)
+    points = operating_points(load or "5 kN", "-90 deg", speed, excitation or "25 Hz")
+    rig_plan = rig_plan.turning(shaft_speed=points[0].shaft_speed)
+    is_typed = load is not None or excitation is not None
+    return replace(rig_plan, dynamic=tuple(points)) if is_typed else rig_plan
 
 
 def _fault_arguments(text: str) -> dict[str, Any]:

@@ -12,11 +12,13 @@ from matplotlib.patches import Ellipse
 from numpy.typing import ArrayLike
 
 from rigdata.arrays import FloatArray
+from rigdata.vector import directions
 from tpjb_ident.clearance.locus import Locus
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.clearance.polygon import corners
 from tpjb_ident.columns import size, symbol
 from tpjb_ident.pivot import PivotCurve
+from tpjb_ident.pivot.dry_record import pad_axes
 from tpjb_ident.pivot.tables import Formula
 from tpjb_ident.report.drawing.picture import (
     GREY,
@@ -150,9 +152,9 @@ def pad_projection(curves: Sequence[PivotCurve]) -> Figure:
 
 def _draw_vectors(axes: Axes, curve: PivotCurve, vectors: FloatArray, off: float) -> None:
     """One pad's points (n, 2) along and across its direction, measured and projected, and the direction."""
-    axis = np.array([math.cos(curve.angle), math.sin(curve.angle)])
+    frame = pad_axes(curve.angle)
+    axis, measured = frame[0], vectors @ frame
     projected = np.outer(vectors[:, 0], axis)
-    measured = projected + np.outer(vectors[:, 1], [-axis[1], axis[0]])
     end = 1.12 * np.max(vectors[:, 0]) * axis
     axes.plot([0.0, end[0]], [0.0, end[1]], "--", color=GREY, linewidth=0.9, zorder=1)
     style = style_of(curve.pad - 1) | {"linestyle": "none"}
@@ -290,16 +292,16 @@ def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
     """Number of each pad, just inside its side."""
     for k, (angle, clearance) in enumerate(zip(polygon.angles, polygon.clearance, strict=True), 1):
         if np.isfinite(clearance):
-            toward = np.array([np.cos(angle), np.sin(angle)])
+            toward = directions(angle)
             axes.annotate(f"#{k}", tuple(clearance / size("length") * toward), tuple(-10.0 * toward),
                           textcoords="offset points", ha="center", va="center", fontsize=SMALL)  # fmt: skip
 
 
 def _draw_locus(axes: Axes, locus: Locus) -> None:
     for point in locus.points:
-        variances, directions = np.linalg.eigh(point.covariance / size("length") ** 2)
+        variances, axes_of_region = np.linalg.eigh(point.covariance / size("length") ** 2)
         sides = 2.0 * _TWO_SIGMA * np.sqrt(np.maximum(variances, 0.0))
-        turn = np.degrees(np.arctan2(directions[1, 0], directions[0, 0]))
+        turn = np.degrees(np.arctan2(axes_of_region[1, 0], axes_of_region[0, 0]))
         place = tuple(point.position / size("length"))
         axes.add_patch(Ellipse(place, *sides, angle=turn, color=INK, alpha=0.25, linewidth=0))
     if locus.points:
