@@ -46,6 +46,11 @@ def vector_rows(channels: Sequence[Channel], readings: Sequence[FloatArray]) -> 
     return rows
 
 
+def wrapped(angle: FloatArray) -> FloatArray:
+    """Angles [rad] from -pi to pi."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
 def plane_vector(along: FloatArray, values: ComplexArray) -> ComplexArray:
     """X and Y (.., 2) of components (.., m) along unit vectors (.., m, 2), by least squares over those with a value.
 

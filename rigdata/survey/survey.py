@@ -32,6 +32,7 @@ from rigdata.survey.channels import (
 )
 from rigdata.survey.exports import Export, in_seconds
 from rigdata.survey.runs import NEAR, RunGuess, guess_run, of_quantity, strongest_lines
+from rigdata.vector import wrapped
 
 #: Directions [deg] no farther apart than this lead to one pad; a dry test so near a pad's is toward that pad.
 _ALIKE, _TOWARD = 3.0, 15.0
@@ -132,7 +133,7 @@ class _Folder:
             return stated
         hinted = stated.direction(readings)
         nearest = self.pivots[self._nearest_pad(hinted)]
-        if np.abs(np.angle(np.exp(1j * (hinted - nearest)))).max() > math.radians(_ALIKE):
+        if np.abs(wrapped(hinted - nearest)).max() > math.radians(_ALIKE):
             return stated  # the names' directions lead to no pads
         return fitted_frame(pair, readings, nearest, f"its name and {len(readings)} dry steps toward pads") or stated
 

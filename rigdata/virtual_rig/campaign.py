@@ -170,7 +170,6 @@ def _write_csv(folder: Path, rig: VirtualRig, records: _Records, layout: CsvLayo
 
 def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> str:
     columns, rate = _stored(record, rig, layout.time_name), record.readings.rate
-    sensors = {sensor.name: sensor for sensor in rig.instruments.sensors}
     names, units, forms = [], [], []
     for name, _ in columns:
         names.append(name)
@@ -178,9 +177,10 @@ def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> st
             units.append("s")
             forms.append("%.6f" if (1e6 / rate).is_integer() else "%.9f")
             continue
-        units.append(sensors[name].unit)
+        sensor = rig.instruments.named(name)
+        units.append(sensor.unit)
         # decimals that keep a hundredth of a converter step
-        decimals = ceil(-log10(converter_step(sensors[name], rig.noise.bits or _UNQUANTISED_BITS))) + 2
+        decimals = ceil(-log10(converter_step(sensor, rig.noise.bits or _UNQUANTISED_BITS))) + 2
         forms.append(f"%.{max(0, decimals)}f")
     table = np.stack([values for _, values in columns], axis=1)
     tail = layout.delimiter if layout.trailing_delimiter else ""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.vector import directions
+from rigdata.vector import directions, wrapped
 from rigdata.virtual_rig.instruments import Instruments, Noise, stream
 from rigdata.virtual_rig.truth import (
     ClearanceSweep,
@@ -247,9 +247,9 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     for pad, after in zip(pads, following, strict=True):
         angle, next_angle = truth.pivot_angles[pad], truth.pivot_angles[after]
         gap = (next_angle - angle) % (2 * np.pi)
-        passed, remaining = _wrapped(direction - angle - lag), _wrapped(next_angle + lag - direction)
+        passed, remaining = wrapped(direction - angle - lag), wrapped(next_angle + lag - direction)
         share = 0.25 * (1 + np.tanh(passed / _SLIDE_WIDTH)) * (1 + np.tanh(remaining / _SLIDE_WIDTH))
-        turned = np.clip(_wrapped(direction - angle), 0.0, gap)
+        turned = np.clip(wrapped(direction - angle), 0.0, gap)
         forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
         reach = np.stack([_reach(truth, k, force) for k, force in zip((pad, after), forces, strict=True)])
         shares.append(share)
@@ -267,11 +267,6 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
 def _reach(truth: RigTruth, pad: int, force: FloatArray) -> FloatArray:
     """How far (n,) [m] the shaft gets toward a pad, counted from 0, that carries a force (n,) [N]."""
     return truth.clearance[pad] + truth.deflection(pad + 1, force)
-
-
-def _wrapped(angle: FloatArray) -> FloatArray:
-    """Angles [rad] from -pi to pi."""
-    return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def _sides(truth: RigTruth) -> list[int]:

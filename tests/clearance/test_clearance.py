@@ -21,7 +21,7 @@ from tpjb_ident.clearance.polygon import corners, find_centre
 from tpjb_ident.clearance.sweep import _settled
 from tpjb_ident.compare.static_tests import bearing_problems
 from tpjb_ident.conditions import sentences
-from tpjb_ident.pivot import fit_pivots
+from tpjb_ident.pivot.fit import fit_pivots
 
 WHOLE = rig(
     RigPlan(dry=tuple(DryTest(p) for p in range(1, 6)), clearance=(ClearanceSweep(), ClearanceSweep(push=800.0)))

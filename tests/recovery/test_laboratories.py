@@ -11,7 +11,7 @@ from rigdata.survey.survey import survey
 from tests.rigs.laboratories import through
 from tests.rigs.strange_exports import CLEARANCES, KGF, LABORATORIES, LBF, PADS, deflection, planned_runs, write_exports
 from tpjb_ident.clearance.measure import measure_clearance
-from tpjb_ident.pivot import fit_pivots
+from tpjb_ident.pivot.fit import fit_pivots
 
 pytestmark = pytest.mark.slow
 

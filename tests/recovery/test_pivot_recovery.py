@@ -28,7 +28,7 @@ from rigdata.virtual_rig import (
 )
 from tpjb_ident.clearance.locus import measure_locus
 from tpjb_ident.clearance.measure import measure_clearance
-from tpjb_ident.pivot import fit_pivots
+from tpjb_ident.pivot.fit import fit_pivots
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 LOADS = np.array([1000.0, 2000.0, 4000.0])

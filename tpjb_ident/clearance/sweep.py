@@ -14,7 +14,7 @@ from scipy.ndimage import uniform_filter1d
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.campaign import Run
-from rigdata.vector import directions
+from rigdata.vector import directions, wrapped
 from tpjb_ident.phasors.bad_samples import robust_deviation, white_noise
 from tpjb_ident.phasors.slow_samples import (
     REMEDY,
@@ -59,7 +59,7 @@ class ContactIntervals:
     def lag(self, angles: FloatArray) -> float:
         """Usual angle [rad] by which the load is past a corner's last pad when the shaft leaves it."""
         load = np.angle(self.force @ [1.0, 1j])
-        past = np.where(self.touched, np.angle(np.exp(1j * (load[:, None] - angles))), np.nan)
+        past = np.where(self.touched, wrapped(load[:, None] - angles), np.nan)
         first, last = np.nanmin(past, axis=1), np.nanmax(past, axis=1)
         outside = np.where(first > 0.0, first, np.minimum(last, 0.0))
         corner = self.touched @ (1 << np.arange(len(angles))) * (self.touched.sum(axis=1) == 2)

@@ -1,14 +1,13 @@
 """A table of coefficients, as a paper's figures or another program give them: K and C with how far they hold."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from rigdata.arrays import IntArray
 from rigdata.operating_point import ROTATIONS, OperatingPoint
@@ -16,9 +15,6 @@ from tpjb_ident.columns import amount, spinning
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 HZ = 2.0 * math.pi
 VALUES = list(COEFFICIENT_COLUMNS)

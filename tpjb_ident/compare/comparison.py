@@ -26,7 +26,7 @@ from tpjb_ident.compare.predictions import (
 from tpjb_ident.compare.static_tests import StaticTests, measure_static
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.pivot import PivotCurve
+from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.presentation import Presented, changed
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY

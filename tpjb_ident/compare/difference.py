@@ -65,12 +65,13 @@ def measured_side(campaign: Campaign, identification: Identification | None, sta
         named = dict(zip(identification.calibration_names, changes.reshape(len(changes), -1, 8), strict=False))
         sensors = {name: moved for name, moved in named.items() if name.partition(":")[0] in _OF_INSTRUMENTS}
     pivots = clearance = None
-    if static is not None and static.curves:
-        pivots = pivot_table(static.curves)
-        scales = {curve.pad: curve.relative_calibration for curve in static.curves}
-        pivots["relative_calibration"] = pivots["pad"].map(scales)
-    if static is not None and static.clearance is not None:
-        clearance = static.clearance.to_frame()
+    if static is not None:
+        if static.curves:
+            pivots = pivot_table(static.curves)
+            scales = {curve.pad: curve.relative_calibration for curve in static.curves}
+            pivots["relative_calibration"] = pivots["pad"].map(scales)
+        if static.clearance is not None:
+            clearance = static.clearance.to_frame()
     return Side(campaign.id, coefficients, pivots, clearance, campaign, sensors)
 
 

@@ -24,7 +24,7 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
 if TYPE_CHECKING:
-    from tpjb_ident.pivot import PivotCurve
+    from tpjb_ident.pivot.curve import PivotCurve
     from tpjb_ident.pivot.tables import Formula
 
 

@@ -15,7 +15,8 @@ from rigdata.run import Run
 from tpjb_ident.clearance.locus import Locus, measure_locus
 from tpjb_ident.clearance.measure import ClearancePolygon, measure_run, measure_sweeps
 from tpjb_ident.conditions import Condition
-from tpjb_ident.pivot import PivotCurve, fit_pivots
+from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.pivot.fit import fit_pivots
 
 #: Measured over drawn clearance beyond which the probes' scale is wrong, or the bearing file is another bearing's.
 _SCALE = (0.5, 2.0)

@@ -62,8 +62,8 @@ class DryRecord:
     lost: float  #: share of samples lost
     quantisation: float  #: [m]
     pickup: PickupSignature | None = None
-    load_direction: PadDirection = field(default_factory=PadDirection)
-    displacement_direction: PadDirection = field(default_factory=PadDirection)
+    load_direction: PadDirection = PadDirection()
+    displacement_direction: PadDirection = PadDirection()
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)  #: of readings, where more than two tell a vector
     friction: tuple[float, float] = (
         FRICTION_SHARE,

@@ -11,6 +11,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Run
 from rigdata.problem import Problem, RigDataError, Severity
+from rigdata.vector import wrapped
 from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import REMEDY, contradictions
@@ -99,7 +100,7 @@ def _suspect(record: DryRecord, pad_angles: FloatArray) -> str:
     load, moved = record.load_direction.angle, record.displacement_direction.angle
     load_elsewhere, moved_elsewhere = abs(load) > LOAD_LIMIT, abs(moved) > DISPLACEMENT_LIMIT
     if load_elsewhere and abs(math.remainder(load - moved, 2 * math.pi)) < DISPLACEMENT_LIMIT:
-        distances = np.abs(np.angle(np.exp(1j * (record.angle + load - pad_angles))))
+        distances = np.abs(wrapped(record.angle + load - pad_angles))
         if np.nanmin(distances, initial=np.inf) < LOAD_LIMIT:
             return f"wrong pad: load and displacement both point at pad {np.nanargmin(distances) + 1}"
         return f"wrong angle: load and displacement turn together by {math.degrees(load):+.0f} deg"

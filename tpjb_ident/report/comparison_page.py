@@ -14,7 +14,7 @@ from tpjb_ident.compare.comparison import Comparison, predicted_loci
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
 from tpjb_ident.conditions import Condition
-from tpjb_ident.pivot import PivotCurve
+from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.tables import Formula
 from tpjb_ident.report.drawing.picture import DIRECT, MODEL_LABELS, point_labels, points_table
 from tpjb_ident.report.page import Page, Section, Table, table_of, write_page

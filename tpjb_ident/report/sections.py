@@ -1,23 +1,33 @@
 """What pages and commands share: what was tested, tables and panels of results, set-up, runs, raw evidence."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from rigdata.arrays import FloatArray
+from rigdata.calibration import Channel
+from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
+from rigdata.readers.series import Series
+from rigdata.run import Run
+from rigdata.survey.spectrum import Spectrum
+from tpjb_ident.clearance.locus import Locus
+from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.columns import amount, channel_unit, degrees, place_of, size, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
-from tpjb_ident.conditions import SEVERITIES, untrusted
+from tpjb_ident.compare.comparison import Comparison
+from tpjb_ident.conditions import SEVERITIES, Condition, untrusted
+from tpjb_ident.diagnosis.plan import CampaignPlan
+from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.pivot.tables import Formula
 from tpjb_ident.report.drawing.picture import (
     BLUE,
     CROSS,
@@ -38,27 +48,11 @@ from tpjb_ident.report.plots.coefficients import coefficient, frf
 from tpjb_ident.report.plots.records import coherence, coherence_spectrum, orbit, spectra
 from tpjb_ident.report.plots.residuals import isolability
 from tpjb_ident.report.plots.static_tests import clearance_and_locus, load_deflection, pad_projection, pivot_stiffness
+from tpjb_ident.results.identification import Identification
+from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.rounding import counted, fixed, with_interval
 from tpjb_ident.runtime.tables import printable
 from tpjb_ident.schema import DAMPING, ENTRIES, KINDS, STIFFNESS, Coefficient
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from rigdata.calibration import Channel
-    from rigdata.campaign import Campaign
-    from rigdata.readers.series import Series
-    from rigdata.run import Run
-    from rigdata.survey.spectrum import Spectrum
-    from tpjb_ident.clearance.locus import Locus
-    from tpjb_ident.clearance.measure import ClearancePolygon
-    from tpjb_ident.compare.comparison import Comparison
-    from tpjb_ident.conditions import Condition
-    from tpjb_ident.diagnosis.plan import CampaignPlan
-    from tpjb_ident.pivot import PivotCurve
-    from tpjb_ident.pivot.tables import Formula
-    from tpjb_ident.results.identification import Identification
-    from tpjb_ident.results.point_result import PointResult
 
 #: Kinds of runs, where people do not call them by their names.
 KINDS_IN_WORDS = {"locus": "shaft locus", "clearance": "clearance sweep", "dry_pivot": "dry pivot test"}

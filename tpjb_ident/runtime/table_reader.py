@@ -5,8 +5,6 @@ missing or twice there, a number is text, infinite or below what its quantity ca
 interval. Columns that the schema does not know are passed on as text.
 """
 
-from __future__ import annotations
-
 import csv
 import functools
 import itertools
@@ -14,16 +12,15 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import pandas as pd
 
 from rigdata.near_names import nearest_name
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.presentation import UNITS
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, TABLES, Column
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Larger tables are refused before they are read [bytes].
 _LARGEST = 2**28
@@ -83,8 +80,6 @@ def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str]
 
     Numbers are floats, NaN where a cell is empty; `lines` in the frame's attributes holds the line of each row.
     """
-    import pandas as pd
-
     records = _lines(path)
     line, names = next(records, (1, []))
     if not names:

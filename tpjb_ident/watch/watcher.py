@@ -21,8 +21,8 @@ from tpjb_ident.clearance.measure import ClearancePolygon, measure_clearance
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.pivot import fit_pivots
 from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.runs.run_store import FileState, RunStore, file_state

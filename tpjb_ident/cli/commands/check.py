@@ -135,8 +135,7 @@ def _show_coverage(c: Command, campaign: Campaign) -> None:
     for kind in dict.fromkeys(run.kind for run in campaign.runs):
         runs = campaign.of_kind(kind)
         places = {run.pad if kind == "dry_pivot" else run.point.key for run in runs}
-        figures = [_figures(run) for run in runs]
-        rows.append([kind, len(runs), len(places), *zip(*figures, strict=True)])
+        rows.append([kind, len(runs), len(places), *zip(*map(_figures, runs), strict=True)])
     columns = [*words("kind"), "runs", "points, pads", *(Column(title, span) for title in RANGES)]
     c.show(f"{campaign.id}: what it covers", columns, rows)
 

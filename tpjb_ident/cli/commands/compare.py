@@ -124,7 +124,7 @@ def _side(c: Command, path: Path) -> Side:
 def write_comparison(c: Command, result: Comparison, show: Progress, note: str = "") -> None:
     """Write every table, pivots.toml and the report."""
     from tpjb_ident.compare.predictions import printed_formula
-    from tpjb_ident.pivot import pivot_table, write_pivots
+    from tpjb_ident.pivot.tables import pivot_table, write_pivots
     from tpjb_ident.report.comparison_page import write_report
 
     show("writing tables", 0, 2)

@@ -13,7 +13,8 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     """
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.compare.static_tests import bearing_problems
-    from tpjb_ident.pivot import fit_pivots, pads_table, pivot_table, write_pivots
+    from tpjb_ident.pivot.fit import fit_pivots
+    from tpjb_ident.pivot.tables import pads_table, pivot_table, write_pivots
     from tpjb_ident.report.comparison_page import pivot_stiffness_table
     from tpjb_ident.report.sections import pivot_panels
 

@@ -101,7 +101,7 @@ def _measured_laws(c: Command, campaign: Campaign, bearing: Bearing) -> dict[str
     if {run.pad for run in campaign.of_kind("dry_pivot")} < pads:
         return {}
     from tpjb_ident.compare.predictions import measured_laws
-    from tpjb_ident.pivot import fit_pivots
+    from tpjb_ident.pivot.fit import fit_pivots
 
     try:
         curves = fit_pivots(campaign, [pad.pivot_angle for pad in bearing.pads])

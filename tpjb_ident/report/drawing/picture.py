@@ -4,8 +4,6 @@ Pictures are matplotlib figures made without pyplot and without any global setti
 their own stays as it is. Margins are fixed in inches, so that pictures line up side by side and no layout solver runs.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import inspect
@@ -14,7 +12,7 @@ import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -30,10 +28,8 @@ from matplotlib.transforms import Bbox
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, spinning, symbol
+from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
-
-if TYPE_CHECKING:
-    from tpjb_ident.results.point_result import PointResult
 
 #: Okabe and Ito's palette, told apart by most colour-blind readers; ink, rule and paper follow the page.
 LIGHT = {

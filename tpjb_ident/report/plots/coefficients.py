@@ -1,17 +1,17 @@
 """Pictures of coefficients over load or frequency, measured and predicted (the paper's Fig. 15 to 20), and of h."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import size, symbol
+from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.report.drawing.picture import (
     COEFFICIENTS,
     CURVE,
@@ -33,15 +33,10 @@ from tpjb_ident.report.drawing.picture import (
     style_of,
     with_errors,
 )
+from tpjb_ident.results.band_result import BandResult
+from tpjb_ident.results.frequency_model import FrequencyModel
+from tpjb_ident.results.identification import Identification
 from tpjb_ident.schema import ENTRIES, KINDS, STATIC_KEY, coefficient_column
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from tpjb_ident.compare.comparison import Comparison
-    from tpjb_ident.results.band_result import BandResult
-    from tpjb_ident.results.frequency_model import FrequencyModel
-    from tpjb_ident.results.identification import Identification
 
 #: Intervals of a smaller share [%] are hidden by their marks: then differences get a panel of their own.
 _SMALL = 5.0

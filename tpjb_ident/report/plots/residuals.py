@@ -1,10 +1,8 @@
 """Pictures of residuals: over load or frequency, as a map, by observable; and what a plan could tell apart."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,8 +14,12 @@ from numpy.typing import ArrayLike
 
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import symbol
+from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.compare.effect_words import label_in_words
+from tpjb_ident.diagnosis.diagnose import Diagnosis
 from tpjb_ident.diagnosis.observations.gap import gap_at, residuals
+from tpjb_ident.diagnosis.plan import CampaignPlan
+from tpjb_ident.diagnosis.verdict.verdict import Verdict
 from tpjb_ident.report.drawing.picture import (
     BLUE,
     CHARACTER,
@@ -49,12 +51,6 @@ from tpjb_ident.report.drawing.picture import (
 )
 from tpjb_ident.rounding import plain
 from tpjb_ident.schema import POINT_KEY, coefficient_column
-
-if TYPE_CHECKING:
-    from tpjb_ident.compare.comparison import Comparison
-    from tpjb_ident.diagnosis.diagnose import Diagnosis
-    from tpjb_ident.diagnosis.plan import CampaignPlan
-    from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 _COLUMNS = ("model", "entry", *POINT_KEY, "z")
 _TWO_SIDED_95 = 1.959964

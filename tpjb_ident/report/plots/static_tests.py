@@ -17,7 +17,7 @@ from tpjb_ident.clearance.locus import Locus
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.clearance.polygon import corners
 from tpjb_ident.columns import size, symbol
-from tpjb_ident.pivot import PivotCurve
+from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.dry_record import pad_axes
 from tpjb_ident.pivot.tables import Formula
 from tpjb_ident.report.drawing.picture import (
