@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import DIMENSIONS, Channel, Channels
+from rigdata.calibration import DIMENSIONS, Channel, Channels, reading_gain, reading_zero
 from rigdata.device import Device, Grid, by_clock, planned
 from rigdata.manifest.manifest import CsvSpec
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError, Severity, refuse, tables_beside
-from rigdata.units import UnitError, is_signal, parse_unit, temperature_offset, unit_factor
+from rigdata.units import UnitError, is_signal, parse_unit
 
 #: A channel longer than this is rejected: slices of it would be asked for by mistake [samples].
 MAX_SAMPLES = 2**31
@@ -256,22 +256,21 @@ def suffix_hint(path: Path) -> str:
     return f"{suffix or 'no suffix'} is not read; {question}export it as {', '.join(readable)}"
 
 
-def _meaning(unit: str, dimension: str) -> tuple[object, float]:
-    """What a reading in a unit is, a signal's dimension or the quantity with its offset, and the SI value of one."""
+def _meaning(unit: str, quantity: str) -> tuple[object, float]:
+    """What a reading in a unit is, a signal's dimension or the quantity's value at zero, and the SI value of one."""
     if is_signal(unit):
         parsed = parse_unit(unit)
         return parsed.powers, parsed.factor
-    offset = temperature_offset(unit) if dimension == "temperature difference" else 0.0
-    return (dimension, offset), unit_factor(unit, dimension)
+    return reading_zero(quantity, unit, None), reading_gain(quantity, unit, None)
 
 
 def _differ(stated: str, channel: Channel) -> bool:
     """Whether the unit that a file states makes another number of a reading than the manifest's."""
-    dimension = DIMENSIONS.get(channel.quantity)
-    if dimension is None:
+    quantity = channel.quantity
+    if quantity not in DIMENSIONS:
         return False
     try:
-        (kind, factor), (other_kind, other) = _meaning(stated, dimension), _meaning(channel.unit, dimension)
+        (kind, factor), (other_kind, other) = _meaning(stated, quantity), _meaning(channel.unit, quantity)
     except UnitError:
         return False
     return kind != other_kind or not math.isclose(factor, other, rel_tol=_SAME)

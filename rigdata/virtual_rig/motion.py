@@ -159,8 +159,8 @@ def dry_motion(run: PlannedRun, test: DryTest, truth: RigTruth, noise: Noise, se
     sideways = np.array([-toward[1], toward[0]])
     time, load = load_history(test, run.rate)
     flaws = noise.dry
-    off = _either_sign(rng, flaws.direction)
-    side = _either_sign(rng, flaws.side)
+    off = either_sign(rng, flaws.direction)
+    side = either_sign(rng, flaws.side)
     side_start = flaws.side_start * rng.standard_normal()
     gap = rng.uniform(*flaws.contact_gap) if toward[1] > _UPPER else 0.0
     on_pivot = held_back(load * np.cos(off), flaws.friction)
@@ -217,7 +217,8 @@ def held_back(load: FloatArray, friction: float) -> FloatArray:
     return felt
 
 
-def _either_sign(rng: np.random.Generator, limits: tuple[float, float]) -> float:
+def either_sign(rng: np.random.Generator, limits: tuple[float, float]) -> float:
+    """A number whose size is between limits."""
     return float(rng.uniform(*limits) * rng.choice([-1.0, 1.0]))
 
 

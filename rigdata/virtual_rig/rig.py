@@ -16,7 +16,7 @@ from scipy.fft import irfft, next_fast_len
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.near_names import unknown_name
 from rigdata.virtual_rig.instruments import Instruments, Noise, Sensor, stream
-from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
+from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, either_sign, running_motion
 from rigdata.virtual_rig.truth import PAPER_RIG, DryTest, PlannedRun, RigPlan, RigTruth, VirtualRigError
 
 #: Where each kind of fault sits ("sensor", "record", "run" or "file"), what it needs (fields, a layout, times in the
@@ -135,7 +135,7 @@ def draw_glitches(instruments: Instruments, noise: Noise, samples: int, seed: in
         sensor = channels[rng.integers(len(channels))]
         largest = rules.displacement if sensor.quantity == "displacement" else rules.force
         count = min(int(rng.integers(rules.shortest, rules.longest, endpoint=True)), samples)
-        size = float(rng.uniform(0.4, 1.0) * largest * rng.choice([-1.0, 1.0]))
+        size = largest * either_sign(rng, (0.4, 1.0))
         glitches.append(Glitch(sensor.name, int(rng.integers(0, samples - count + 1)), count, size))
     return tuple(glitches)
 

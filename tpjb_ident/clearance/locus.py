@@ -172,10 +172,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     off = np.zeros(2) if polygon is None else _off_centre(points, polygon)
     # nothing tells whether the zero moved before the sweep, after it or within: the interval holds the way
     points = [replace(p, covariance=p.covariance + np.outer(off, off)) for p in points]
-    down = -math.pi / 2 - 1e-9  # a locus is swept from there
-    points.sort(
-        key=lambda p: (p.point.static_load, p.point.spin, (p.point.static_load_direction - down) % (2 * math.pi))
-    )
+    points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
     on_its_way = [
         f"halves of {record.run.id} stand {1e6 * size:.2g} µm apart" for record, size in zip(records, moved) if size
     ]
@@ -195,6 +192,11 @@ class _Record:
     direction: float  #: [rad]
     span: float  #: [s]
     blocks: tuple[NoiseSeries, NoiseSeries]  #: of either component
+
+
+def _from_down(direction: float) -> float:
+    """Angle from straight down, 0 to 2 pi: the order in which a locus is swept."""
+    return (direction + math.pi / 2 + 1e-9) % (2 * math.pi)
 
 
 def _read(run: Run) -> _Record:

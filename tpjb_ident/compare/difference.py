@@ -297,8 +297,8 @@ def _largest_change(points: pd.DataFrame) -> str:
 
 def _mean_direct(frame: pd.DataFrame, name: str, side: str = "") -> pd.Series:
     """Mean size of the direct coefficients of a coefficient's kind at every point."""
-    kind = KINDS[name[0]]
-    return frame[[kind.column(entry) + side for entry in ("xx", "yy")]].abs().mean(axis=1)
+    columns = [KINDS[name[0]].column(entry) + side for entry in ("xx", "yy")]
+    return frame[columns].abs().mean(axis=1)
 
 
 def _sentences_beside(difference: Difference) -> tuple[str, ...]:

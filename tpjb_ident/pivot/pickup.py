@@ -73,12 +73,12 @@ def mistake(
 
 def _undone(signature: PickupSignature, pairs: Sequence[Sequence[str]]) -> list[tuple[str, PickupSignature]]:
     """A run's signature with every simple mistake undone."""
-    names, size, noise = signature.channels, signature.size, signature.noise
+    names, size = signature.channels, signature.size
     variants = []
     for pair in pairs:
         order, places = np.arange(len(names)), [names.index(name) for name in pair]
         order[places] = places[::-1]
-        exchanged = replace(signature, size=size[order], noise=noise[order])
+        exchanged = replace(signature, size=size[order], noise=signature.noise[order])
         variants.append((f"{pair[0]} and {pair[1]} are exchanged", exchanged))
     for place, name in enumerate(names):
         sign = np.where(np.arange(len(names)) == place, -1.0, 1.0)

@@ -74,12 +74,12 @@ def write_report(
     """
     frame = comparison.table
     points, flagged = comparison.identification.points, _flagged(comparison)
-    campaign, bearing = comparison.campaign, comparison.bearing
+    campaign = comparison.campaign
     page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
         subtitle=campaign.description,
         sentences=summary_sentences(comparison),
-        facts=tested_facts(campaign, bearing, points) | ({"Note": note} if note else {}),
+        facts=tested_facts(campaign, comparison.bearing, points) | ({"Note": note} if note else {}),
         key_table=deviations_table(frame),
         values=values_table(points),
         flags=flags_line([[flag for _, flag in flagged]], len(points)),

@@ -39,10 +39,10 @@ _SIDES = {"a": "first", "b": "second", "difference": "difference"}
 
 def write_difference_report(folder: Path, difference: Difference, origin: Mapping[str, Any]) -> Path:
     """Write report.html and its figure into an existing folder."""
-    a, b, points = difference.a, difference.b, difference.points
+    points = difference.points
     flags = [Condition(name) for name in "; ".join(_flags(points)).split("; ") if name in KINDS]
     page = Page(
-        title=f"{a.name} and {b.name}: what changed",
+        title=f"{difference.a.name} and {difference.b.name}: what changed",
         subtitle="Second less first, with 95 % intervals",
         facts=_facts(difference)
         | set_points(list(points.reindex(columns=POINT_KEY).itertuples(index=False, name=None))),

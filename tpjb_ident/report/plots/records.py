@@ -59,8 +59,7 @@ def orbit(run: Run) -> Figure:
         raise ValueError(f"run {run.id} has no displacements to draw")
     path = (path - np.median(path[good], axis=0)) / size("length")
     figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}")
-    shown = path[:_MOST_SAMPLES]
-    axes.plot(*shown.T, color=GREY, linewidth=0.5, label="as measured")
+    axes.plot(*path[:_MOST_SAMPLES].T, color=GREY, linewidth=0.5, label="as measured")
     drive = run.point.excitation
     if drive:
         turns = drive * record.time[good]
