@@ -8,7 +8,7 @@ import re
 import stat
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
@@ -338,11 +338,11 @@ def _assembled(
         except RigDataError as error:
             problems.extend(error.problems)
             continue
-        stated = {item.name: getattr(entry, item.name) for item in fields(RunDescription)}
+        stated = {name: getattr(entry, name) for name in RunDescription.__dataclass_fields__}
         runs.append(Run(**stated, channels=channels if own is None else _used(own), reader=reader))
     if any(p.severity == "error" for p in problems):
         raise RigDataError([*manifest.notes, *problems])
-    described = {item.name: getattr(manifest, item.name) for item in fields(Description)}
+    described = {name: getattr(manifest, name) for name in Description.__dataclass_fields__}
     described |= {"channels": channels, "notes": (*manifest.notes, *problems)}
     return Campaign(**described, runs=tuple(runs), **source)
 

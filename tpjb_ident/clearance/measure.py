@@ -181,11 +181,11 @@ def measure_clearance(
     runs = campaign.of_kind("clearance")
     if not runs:
         raise refuse("campaign.toml", "runs", "has no run of kind clearance", "Record a clearance sweep")
-    return measure_run(coldest_first(runs)[0], pivot_angles, curves)
+    return measure_run(coldest_first(runs)[0], pivot_angles, curves or ())
 
 
 def measure_sweeps(
-    runs: Sequence[Run], pivot_angles: Sequence[float], curves: Sequence[PivotCurve] | None, most: int | None = None
+    runs: Sequence[Run], pivot_angles: Sequence[float], curves: Sequence[PivotCurve], most: int | None = None
 ) -> tuple[list[ClearancePolygon], list[Condition]]:
     """Polygons of sweeps, the coldest first, at `most` so many, and what is wrong with those that are of no use."""
     polygons, problems = usable_runs(coldest_first(runs), lambda run: measure_run(run, pivot_angles, curves), most)
@@ -193,9 +193,7 @@ def measure_sweeps(
     return polygons, refused
 
 
-def measure_run(
-    run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotCurve] | None = None
-) -> ClearancePolygon:
+def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotCurve] = ()) -> ClearancePolygon:
     """Measure the polygon of one run; parameters as `measure_clearance`."""
     angles, run = np.asarray(pivot_angles, dtype=float), live_run(run)
     contact, fit = _read_sides(run, angles, curves, LARGEST_DEFLECTION)
@@ -221,7 +219,7 @@ def measure_run(
 
 
 def _read_sides(
-    run: Run, angles: FloatArray, curves: Sequence[PivotCurve] | None, deflection: float
+    run: Run, angles: FloatArray, curves: Sequence[PivotCurve], deflection: float
 ) -> tuple[ContactIntervals, SideFit]:
     """Averages and sides of a sweep whose pivots deflect by so much [m] at most."""
     contact = read_sweep(run, angles, deflection)
@@ -285,11 +283,11 @@ def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple
     return ratio, (Condition("probe-gains-differ", detail),)
 
 
-def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Condition, ...]:
+def _extrapolated(push: float, curves: Sequence[PivotCurve]) -> tuple[Condition, ...]:
     """The push lies outside what the dry tests measured: true of most sweeps, and to be said."""
-    outside = [c for c in curves or () if c.is_extrapolated(push)]
+    outside = [c for c in curves if c.is_extrapolated(push)]
     lowest = min((c.valid_from for c in outside), default=0.0)
-    pads = "all pads" if len(outside) == len(curves or ()) else "pads " + ", ".join(f"#{c.pad}" for c in outside)
+    pads = "all pads" if len(outside) == len(curves) else "pads " + ", ".join(f"#{c.pad}" for c in outside)
     detail = f"pushed with {push:.0f} N, the dry tests of {pads} hold from {lowest:.0f} N on; the sweep corrects it"
     return holding((outside, "give-extrapolated", detail))
 

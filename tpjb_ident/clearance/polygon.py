@@ -178,24 +178,22 @@ def _pivot_deflection(curves: Sequence[PivotCurve], pad: IntArray, load: FloatAr
     return deflection
 
 
-def fit_sides(
-    contact: ContactIntervals, angles: FloatArray, pads: IntArray, curves: Sequence[PivotCurve] | None
-) -> SideFit:
+def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, curves: Sequence[PivotCurve]) -> SideFit:
     """Fit the sides of the pads (r,) that a sweep reached: angles (n,) [rad] of all pads."""
     place, foot = _place_along_side(contact, angles, pads)
     usable = np.isin(contact.pad, pads) & _consistent(contact, place)
     used, place = contact.take(usable), place[usable]
     noise = _noise(used, place)
     r, of_pad = len(pads), (used.pad[:, None] == pads).astype(float)
-    full = _pivot_deflection(curves or (), pads, np.full(r, used.push))
-    carried = _pivot_deflection(curves or (), used.pad, used.load)
+    full = _pivot_deflection(curves, pads, np.full(r, used.push))
+    carried = _pivot_deflection(curves, used.pad, used.load)
     alone = used.touched.sum(axis=1) == 1
     whitener = _whitener(used, angles, noise, np.hypot(_SLIDING * carried * alone, used.level_error))
     fits, lag = [], used.lag(angles)
     for error in _LAG_ERRORS:
         late = used.lagging(angles, lag + error)
-        late_carried = _pivot_deflection(curves or (), late.pad, late.load)
-        columns, precision, mean = _pivot_terms(late, of_pad, late_carried, None if curves is None else full)
+        late_carried = _pivot_deflection(curves, late.pad, late.load)
+        columns, precision, mean = _pivot_terms(late, of_pad, late_carried, full if curves else None)
         design = np.hstack([of_pad, -of_pad * place[:, None], columns])
         prior = np.r_[np.zeros(r), np.full(r, _TILT_SPREAD**-2), precision]
         fits.append(_least_squares(whitener, used.along, design, prior, np.r_[np.zeros(2 * r), mean]))
@@ -205,7 +203,7 @@ def fit_sides(
     distances, deflection, deflection_se = covariance[:r, :r], pivots[:r], errors[:r]
     distances = distances + used.level_error**2 * np.eye(r)  # a shaft that lies in a corner reads one step for long
     scale = scale_se = np.nan
-    if curves is not None:
+    if curves:
         scale, scale_se = float(pivots[-1]), float(errors[-1])
         deflection, deflection_se = scale * full, full * _secant_errors(curves, pads, used.push)
         # an error of a curve shifts its side by the share of the deflection that the averages carry on the mean

@@ -136,8 +136,9 @@ def cross_coupling_matters(frame: pd.DataFrame) -> BoolArray:
 
     matters = np.zeros(len(frame), dtype=bool)
     for kind in (STIFFNESS, DAMPING):
-        xx, *cross, yy = (np.abs(frame[name].to_numpy()) for name in kind.columns)
-        for name, value in zip(kind.columns[1:3], cross, strict=True):
-            half = 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]).to_numpy()
-            matters |= value - half > _CROSS_COUPLED * 0.5 * (xx + yy)
+        xx, *cross, yy = kind.columns
+        direct = 0.5 * (frame[xx].abs() + frame[yy].abs())
+        for name in cross:
+            half = 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"])
+            matters |= (frame[name].abs() - half > _CROSS_COUPLED * direct).to_numpy()
     return matters

@@ -42,7 +42,7 @@ def measure_static(
     if with_pivots and campaign.of_kind("dry_pivot"):
         curves = fit_pivots(campaign, angles, on_refusal="few")
     most = None if every_sweep else 1
-    polygons, excluded = measure_sweeps(campaign.of_kind("clearance"), angles, curves or None, most)
+    polygons, excluded = measure_sweeps(campaign.of_kind("clearance"), angles, curves, most)
     clearance = polygons[0] if polygons else None
     locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
     excluded += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -76,7 +76,7 @@ class Blocks:
 
     def take(self, chosen: BoolArray) -> Blocks:
         """The blocks where `chosen` (m,) is true."""
-        return Blocks(*(getattr(self, column.name)[chosen] for column in fields(self)))
+        return Blocks(*(column[chosen] for column in vars(self).values()))
 
     def covariance(self, noise: NoiseModel, quantisation: float = 0.0) -> FloatArray:
         """Covariance (m, m) [m^2] of a displacement, whose level may stand between two steps of a converter [m]."""

@@ -190,13 +190,14 @@ def residual_series(
     figure, axes = new_picture(axis_label(over), "(measured - predicted) / sigma", width=5.2, height=3.4)
     axes.axhspan(-2, 2, color=RULE, alpha=0.6, linewidth=0)
     for number, entry in enumerate(chosen):
-        colour, marker = style_of(number)["color"], style_of(number)["marker"]
+        style = style_of(number)
+        colour = style["color"]
         for k, model in enumerate(models):
             rows = series[(series["entry"] == entry) & (series["model"] == model)]
             line = style_of(len(models) - 1 - k)["linestyle"] if len(rows) >= CURVE else "none"
             face = colour if model == models[-1] else PAPER
             name = f"{entry}, {MODEL_LABELS.get(model, model)}"
-            axes.plot(rows["at"], rows["z"], color=colour, marker=marker, linestyle=line,
+            axes.plot(rows["at"], rows["z"], color=colour, marker=style["marker"], linestyle=line,
                       markerfacecolor=face, markersize=4.5, label=name)  # fmt: skip
     add_legend(axes)
     return figure
