@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import h5py
 import numpy as np
 
 from rigdata.arrays import FloatArray
@@ -50,8 +51,6 @@ _MAX_TEXT = 8 * 2**20
 @contextmanager
 def open_readonly(path: Path, file: str, run: str | None = None, cache: int | None = None) -> Iterator[Any]:
     """Open an HDF5 file for reading; turn what h5py raises on a broken file into `RigDataError`."""
-    import h5py
-
     with _translated_faults(file, run), h5py.File(path, "r", locking="best-effort", rdcc_nbytes=cache) as handle:
         yield handle
 
@@ -100,8 +99,6 @@ class Hdf5Reader(RunReader):
 
     @contextmanager
     def _group(self, cache: int | None = None) -> Iterator[Any]:
-        import h5py
-
         if _GROUP in self.opened_members:
             with _translated_faults(self.path.name, self.run):
                 yield self.opened_members[_GROUP]
@@ -136,8 +133,6 @@ class Hdf5Reader(RunReader):
 
     def _dataset(self, group: Any, name: str) -> Any:
         """A dataset that can be read without leaving the file, foreign code or vast memory."""
-        import h5py
-
         if name in self.opened_members:
             return self.opened_members[name]
         dataset = resolve(group, name, self.file, self.run)

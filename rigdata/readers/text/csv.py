@@ -6,6 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv as pv
 
 from rigdata.arrays import FloatArray
 from rigdata.calibration import OVERFLOW
@@ -82,8 +85,6 @@ def _check_times(head: Head, clock: int, times: FloatArray) -> None:
 
 def read_table(head: Head, places: Sequence[int]) -> tuple[dict[int, FloatArray], tuple[Problem, ...]]:
     """Parse the columns at `places`; what was repaired is told."""
-    import pyarrow as pa
-
     try:
         columns, odd_lines = _parse(head, places, numbers=True)
     except pa.ArrowInvalid:
@@ -102,9 +103,6 @@ def read_table(head: Head, places: Sequence[int]) -> tuple[dict[int, FloatArray]
 
 def _options(head: Head, places: Sequence[int], numbers: bool, skip: Any) -> dict[str, Any]:
     """How pyarrow is to read the columns, as numbers or as texts; `skip` is asked about lines of a wrong width."""
-    import pyarrow as pa
-    import pyarrow.csv as pv
-
     labels = [f"c{i}" for i in range(len(head.names))]  # names of a file need not be unique or present
     types = {labels[i]: pa.float64() if numbers and i not in head.stamps else pa.string() for i in places}
     delimiter = "\t" if head.delimiter == " " else head.delimiter
@@ -126,10 +124,6 @@ def _options(head: Head, places: Sequence[int], numbers: bool, skip: Any) -> dic
 
 def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, FloatArray], int]:
     """Columns by place, and how many lines have a wrong number of cells."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-    import pyarrow.csv as pv
-
     record, length, odd_lines = head.record, 0, 0
     stamps: dict[int, list[str | None]] = {i: [] for i in places if i in head.stamps}
     bad = set()
@@ -179,9 +173,6 @@ def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, 
 
 def _to_numbers(column: Any, decimal: str) -> tuple[Any, bool]:
     """Numbers from cells as text, blanks around them and a leading plus taken; and whether all others are missing."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     text = pc.ascii_trim_whitespace(column)
     missing = pc.is_in(text, value_set=pa.array(list(MISSING)))
     good = pc.match_substring_regex(text, number_pattern(decimal))
