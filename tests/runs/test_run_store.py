@@ -79,8 +79,7 @@ def same(first, second) -> bool:
     """Whether all that was read of the runs is alike, bit for bit."""
     for (a, of_a), (b, of_b) in zip(first, second, strict=True):
         blocks = [(a.start, b.start), (of_a.mains, of_b.mains)]
-        for quantity in ("displacement", "cell_force", "acceleration"):
-            blocks += [(getattr(getattr(x, quantity), name) for x in (a, b)) for name in ("phasors", "mean", "lost")]
+        blocks += [(getattr(a, name), getattr(b, name)) for name in ("z", "mean", "scale", "lost", "record")]
         for x, y in blocks:
             if (x is None) != (y is None) or (x is not None and not np.array_equal(x, y, equal_nan=True)):
                 return False

@@ -51,7 +51,7 @@ def _shown(samples: Samples, nominal: float, wander: float) -> float:
     ends = [nominal - reach * step, nominal + reach * step]
     power = np.zeros(2 * reach + 1)
     for quantity in ("displacement", "force"):
-        rows = samples.rows[samples.places(quantity)]
+        rows = samples.rows[samples.pick(quantity)]
         rows = rows - rows.mean(axis=1, keepdims=True)
         spectra = zoom_fft(rows * window, ends, len(power), fs=samples.rate, endpoint=True)
         size = max(float(np.sum(rows**2)) * float(np.sum(window**2)), 1e-300)

@@ -171,7 +171,7 @@ class _Film:
         for run in runs:
             if order in run.turned:
                 turned, motion = run.turned[order], run.D.mean(axis=0)[self.driven]
-                D, F = turned.displacement.phasors, turned.oil_force(slice(None))
+                D, F = turned.displacement, turned.oil_force(slice(None))
                 force = self.unexplained(D, F, run.frequencies - order * run.shaft)[0, self.driven]
                 coherent = motion @ np.linalg.lstsq(motion, force, rcond=_ACROSS)[0]
                 noise = np.sum(np.abs(force - coherent) ** 2) * 2 / max(len(force) - 2, 1)

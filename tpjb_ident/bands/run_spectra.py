@@ -69,7 +69,7 @@ class RunSpectra:
     @cached_property
     def D(self) -> ComplexArray:
         """Displacement, (n_windows, n_bins, 2) [m]."""
-        return self.phasors.displacement.phasors
+        return self.phasors.displacement
 
     @cached_property
     def F(self) -> ComplexArray:

@@ -21,7 +21,7 @@ from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.bad_samples import BAD_LIMIT, robust_deviation
 from tpjb_ident.phasors.channel_times import device_readers
 from tpjb_ident.phasors.lines import HIGHEST
-from tpjb_ident.phasors.run_data import QUANTITIES
+from tpjb_ident.phasors.run_data import QUANTITIES, Directed
 
 #: Share of a channel's samples that may be missing in stretches, bridged by straight lines,
 _MAX_LOST = 0.01
@@ -42,7 +42,7 @@ _PASSES = 3
 
 
 @dataclass(frozen=True)
-class Samples:
+class Samples(Directed):
     """One run in memory, SI."""
 
     rate: float
@@ -56,13 +56,9 @@ class Samples:
         """Samples per channel."""
         return int(self.rows.shape[1])
 
-    def places(self, quantity: str) -> list[int]:
-        """Rows of a quantity's channels."""
-        return [j for j, channel in enumerate(self.channels) if channel.quantity == quantity]
-
     def vector(self, quantity: str) -> FloatArray:
         """X and Y of a quantity, (2, n)."""
-        places = self.places(quantity)
+        places = self.pick(quantity)
         return inverse_directions(tuple(float(self.channels[j].axis or 0.0) for j in places)) @ self.rows[places]
 
     def signals(self) -> FloatArray:
@@ -70,7 +66,7 @@ class Samples:
 
         The command comes alone where there is one: what was meant to move the shaft tells the period best.
         """
-        groups = [self.rows[self.places(q)] for q in ("displacement", "force")]
+        groups = [self.rows[self.pick(q)] for q in ("displacement", "force")]
         if self.command is not None:
             groups = [self.command]
         centred = [rows - rows.mean(axis=1, keepdims=True) for rows in groups]

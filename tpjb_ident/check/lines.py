@@ -73,7 +73,7 @@ def shaft_force(phasors: RunPhasors) -> float:
     place = phasors.lines.place("1X")
     if place is None:
         return math.nan
-    force = phasors.cell_force.phasors[:, place]
+    force = phasors.plane("force", phasors.z[:, place])
     force = force[np.isfinite(force).all(axis=1)]
     if len(force) < 2:
         return math.nan

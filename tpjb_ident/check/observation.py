@@ -12,7 +12,7 @@ from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
-from rigdata.vector import directions, plane_vector
+from rigdata.vector import directions
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.lines import (
     RecordLines,
@@ -28,7 +28,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.phasors.bad_samples import white_noise
 from tpjb_ident.phasors.reading_cache import with_kept_beginning
-from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_data import Directed, RunPhasors
 from tpjb_ident.phasors.run_phasors import run_phasors
 from tpjb_ident.phasors.windows import RecordTooShortError
 
@@ -47,7 +47,7 @@ _ON_CELLS = 0.1
 
 
 @dataclass(frozen=True)
-class Observation:
+class Observation(Directed):
     """One run, seen once: m vector channels that show something, none where it cannot be read."""
 
     run: Run
@@ -65,10 +65,6 @@ class Observation:
     shaft_force: float = math.nan  #: of the 1X force, see `tpjb_ident.check.lines`
     conditions: tuple[Condition, ...] = ()  #: of its phasors
 
-    def pick(self, quantity: str) -> list[int]:
-        """Places of the channels of `quantity` in `channels`."""
-        return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
-
     def of(self, quantity: str) -> list[Channel]:
         """Channels of `quantity`."""
         return [c for c in self.channels if c.quantity == quantity]
@@ -79,15 +75,11 @@ class Observation:
 
     def mean(self, quantity: str) -> FloatArray:
         """X, Y of a quantity's mean (2,); NaN where its channels do not tell it."""
-        return self._vector(quantity, np.asarray(self.lines.mean, complex)).real
+        return self.plane(quantity, self.lines.mean).real
 
     def line(self, quantity: str) -> ComplexArray:
         """X, Y of a quantity at the excitation line (2,); NaN where its channels do not tell it."""
-        return self._vector(quantity, self.lines.phasor)
-
-    def _vector(self, quantity: str, values: ComplexArray) -> ComplexArray:
-        along = directions([channel.axis or 0.0 for channel in self.of(quantity)])
-        return plane_vector(along, values[self.pick(quantity)])
+        return self.plane(quantity, self.lines.phasor)
 
     def film_force(self, mass: float) -> ComplexArray:
         """Force phasor of the film on the housing, F_cell + m_h a_h (2,) [N]; of the cells alone where a is unknown."""

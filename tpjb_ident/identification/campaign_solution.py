@@ -74,7 +74,7 @@ def campaign_blocks(
                 continue
             channels = point.channels[g]
             calibrations = calibrations or [[] for _ in channels]
-            load, loads = data.point.static_load, run.cell_force.mean
+            load, loads = data.point.static_load, run.means("force")
             loads = loads[np.isfinite(loads).all(axis=1)]
             # standard error of the size of the run's mean cell force
             error = float(np.linalg.norm(loads.std(axis=0, ddof=1)) / np.sqrt(len(loads))) if len(loads) > 1 else 0.0
@@ -176,7 +176,7 @@ def solve_campaign(
     loads = static_loads(campaign, points)
 
     def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> CampaignSolution:
-        task = replace(common, sensors=sensors, rates=rates)
+        task = replace(common, channels=sensors, rates=rates)
         means = tuple(workers.map(point_means, [(data,) for data in points], task))
         film = tuple(_film(data, point) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])

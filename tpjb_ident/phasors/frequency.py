@@ -167,7 +167,7 @@ def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, flo
     if line is None:
         return None
     noise = 0.5 * float(np.median(phasor_noise(result, rate)[result.pick("displacement")]))
-    advance = phase_advance(result.displacement.phasors[:, line], result.start, noise)
+    advance = phase_advance(result.displacement[:, line], result.start, noise)
     if advance is None:
         return None
     speeds = np.full(len(result.start), np.nan)

@@ -81,7 +81,7 @@ def mains_lines(run: RunPhasors) -> tuple[ComplexArray | None, ComplexArray | No
     if any(abs(f - mains.frequency) <= mains.wander for f in harmonics):
         return None, None
     typical: list[ComplexArray | None] = []
-    for z in (run.displacement.phasors[:, place], run.oil_force(place)):
+    for z in (run.displacement[:, place], run.oil_force(place)):
         complete = z[np.isfinite(z).all(axis=1)]
         typical.append(complex_median(complete) if len(complete) else None)
     return typical[0], typical[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -29,17 +30,24 @@ class PhasorSettings:
     excitation_lines: tuple[float, ...] = ()
 
 
+class Directed:
+    """What several channels show, side by side; `channels` have a quantity and an axis each."""
+
+    channels: Any
+
+    def pick(self, quantity: str) -> list[int]:
+        """Places of the channels of a quantity."""
+        return [k for k, channel in enumerate(self.channels) if channel.quantity == quantity]
+
+    def plane(self, quantity: str, values: ComplexArray | FloatArray) -> ComplexArray:
+        """X and Y (.., 2) of a quantity from values (.., n_channels) of all channels, NaN where there is none."""
+        places = self.pick(quantity)
+        along = directions([self.channels[k].axis or 0.0 for k in places])
+        return plane_vector(along, np.asarray(values[..., places], complex))
+
+
 @dataclass(frozen=True)
-class PhasorBlock:
-    """Phasors of one vector quantity in some windows of one run."""
-
-    phasors: ComplexArray  #: (n_windows, n_lines, 2) complex: X and Y at every line, SI; NaN where a window gave none
-    mean: FloatArray  #: (n_windows, 2): mean of the quantity, SI
-    lost: FloatArray  #: (n_windows,): share of the samples left out (bad or missing)
-
-
-@dataclass(frozen=True)
-class RunPhasors:
+class RunPhasors(Directed):
     """One run: a phasor per window, line and channel, each fitted at the channel's own sample times."""
 
     run: str
@@ -65,36 +73,13 @@ class RunPhasors:
     rounding: FloatArray = field(default_factory=lambda: np.empty(0))  #: (n_channels,), SI^2: by it on a line, at most
 
     @cached_property
-    def displacement(self) -> PhasorBlock:
-        """X and Y of the probes."""
-        return self._vector("displacement")
+    def displacement(self) -> ComplexArray:
+        """X and Y of the probes, (n_windows, n_lines, 2) [m]; NaN where a window gave none."""
+        return self.plane("displacement", self.z)
 
-    @cached_property
-    def cell_force(self) -> PhasorBlock:
-        """X and Y of the cells."""
-        return self._vector("force")
-
-    @cached_property
-    def acceleration(self) -> PhasorBlock | None:
-        """X and Y of the accelerometers; None where there are none."""
-        return self._vector("acceleration") if self.pick("acceleration") else None
-
-    def pick(self, quantity: str) -> list[int]:
-        """Places of the channels of a quantity."""
-        return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
-
-    def plane(self, quantity: str, values: ComplexArray) -> ComplexArray:
-        """X and Y (.., 2) of a quantity from values (.., n_channels) of all channels, NaN where there is none."""
-        places = self.pick(quantity)
-        along = directions(np.array([self.channels[k].axis or 0.0 for k in places]))
-        return plane_vector(along, values[..., places])
-
-    def _vector(self, quantity: str) -> PhasorBlock:
-        places = self.pick(quantity)
-        lost = self.lost[:, places].max(axis=1, initial=0.0)
-        return PhasorBlock(
-            self.plane(quantity, self.z), self.plane(quantity, np.asarray(self.mean, complex)).real, lost
-        )
+    def means(self, quantity: str) -> FloatArray:
+        """X and Y of a quantity's mean in every window, (n_windows, 2)."""
+        return self.plane(quantity, self.mean).real
 
     def divided(self, gains: ComplexArray) -> RunPhasors:
         """The run without gains of its channels at the whole record's lines, (n_whole_lines, n_channels)."""

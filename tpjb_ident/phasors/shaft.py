@@ -91,7 +91,7 @@ def _by_first_line(phasors: RunPhasors, turning: float) -> ComplexArray:
     place = phasors.lines.place("1X")
     if place is None:
         return _NO_TURNS
-    d = phasors.displacement.phasors[:, place]
+    d = phasors.displacement[:, place]
     middle = phasors.start + 0.5 * phasors.length
     z = (d[:, 0] + 1j * d[:, 1]) * np.exp(2j * np.pi * (phasors.lines.frequencies[place] - turning) * middle)
     z = z[np.abs(z) > 0.0]  # a window at rest, or without the line, tells none

@@ -58,15 +58,16 @@ def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> t
         run = data.runs[data.run_index[i]]
         k = int(i - np.searchsorted(data.run_index, data.run_index[i]))
         direction = float("nan") if run.direction is None else run.direction
-        reason = _reason(data, run.displacement.lost[k], run.cell_force.lost[k], int(i), weights, answered)
+        lost = {name: run.lost[k, run.pick(name)].max(initial=0.0) for name in ("displacement", "force")}
+        reason = _reason(data, lost, int(i), weights, answered)
         verdicts.append(WindowVerdict(run.run, float(run.start[k]), float(weights[i]), direction, reason))
     return tuple(verdicts)
 
 
-def _reason(data: PointData, lost_d: float, lost_f: float, i: int, weights: FloatArray, answered: bool) -> str:
-    for name, lost in (("displacement", lost_d), ("force", lost_f)):
-        if lost > 0.5:
-            return f"{100 * lost:.0f} % of the {name} samples missing or glitched"
+def _reason(data: PointData, lost: Mapping[str, float], i: int, weights: FloatArray, answered: bool) -> str:
+    for name, share in lost.items():
+        if share > 0.5:
+            return f"{100 * share:.0f} % of the {name} samples missing or glitched"
     if not (np.isfinite(data.D[i]).all() and np.isfinite(data.F[i]).all()):
         return "missing values"
     if not answered:

@@ -30,17 +30,17 @@ class RunsOfPoint:
     @property
     def inertia(self) -> float:
         """Housing mass whose inertia stays in the cells' force [kg]: none where accelerometers measure it."""
-        return self.runs[0].housing_mass if self.runs[0].acceleration is None else 0.0
+        return 0.0 if self.runs[0].pick("acceleration") else self.runs[0].housing_mass
 
     @property
     def mean_loads(self) -> FloatArray:
         """Mean cell force of every run, shape (n_runs, 2) [N]."""
-        return np.array([finite_mean(run.cell_force.mean) for run in self.runs])
+        return np.array([finite_mean(run.means("force")) for run in self.runs])
 
     @property
     def mean_positions(self) -> FloatArray:
         """Mean displacement of every run, shape (n_runs, 2) [m]."""
-        return np.array([finite_mean(run.displacement.mean) for run in self.runs])
+        return np.array([finite_mean(run.means("displacement")) for run in self.runs])
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> 
     """Windows of a point's runs, each with the line that is meant."""
     runs = tuple(run for run, _ in members)
     lines = tuple(i for _, i in members)
-    D = [run.displacement.phasors[:, i] for run, i in zip(runs, lines)]
+    D = [run.displacement[:, i] for run, i in zip(runs, lines)]
     F = [run.oil_force(i) for run, i in zip(runs, lines)]
     index = np.repeat(np.arange(len(runs)), [len(d) for d in D])
     return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), index)
