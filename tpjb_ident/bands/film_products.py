@@ -150,7 +150,7 @@ class _Film:
     def unexplained(self, D: ComplexArray, F: ComplexArray, frequencies: FloatArray) -> ComplexArray:
         """Force beyond h D at some frequencies [Hz], negative ones too, (n_windows, n_bins, 2) [N]."""
         h = _columns(2 * np.pi * frequencies, self.middle) @ self.numbers
-        return np.asarray(F - np.einsum("kij,wkj->wki", h, D))
+        return F - np.einsum("kij,wkj->wki", h, D)
 
     def excess(self, runs: Sequence[RunSpectra], places: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Square of every run's unexplained force at some bins along X and Y without its noise, and that noise.

@@ -97,7 +97,7 @@ def _correlation(first: FloatArray, second: FloatArray, finer: int) -> FloatArra
     n = first.shape[1]
     spectra = [np.fft.rfft(rows, 2 * n, axis=1) for rows in (first, second)]
     product = np.sum(spectra[0] * spectra[1].conj(), axis=0).real
-    return np.asarray(np.fft.irfft(product, 2 * n * finer)[: n * finer])
+    return np.fft.irfft(product, 2 * n * finer)[: n * finer]
 
 
 def _combed(

@@ -69,7 +69,7 @@ def nuisance(runs: Sequence[RunSpectra], bins: IntArray, sources: ComplexArray, 
     """
     place = runs[0].frequencies[bins] - runs[0].frequencies[bins].mean()
     place /= max(float(np.abs(place).max()), 1e-300)
-    sloped = np.asarray(np.tile(place, len(runs))[:, None] * sources)
+    sloped = np.tile(place, len(runs))[:, None] * sources
     if not ends:
         return sloped
     return np.concatenate([sloped, np.kron(np.eye(len(runs)), np.vander(place, 2, increasing=True))], axis=1)
@@ -91,7 +91,7 @@ def _driven(run: RunSpectra) -> FloatArray:
     """Directions (2, k) in which the command acts: what rests would be noise alone."""
     assert run.command is not None
     power, along = np.linalg.eigh((run.command[0].T @ run.command[0].conj()).real)
-    return np.asarray(along[:, power > _AT_REST * power[-1]])
+    return along[:, power > _AT_REST * power[-1]]
 
 
 def one_phase_set(runs: Sequence[RunSpectra]) -> bool:
@@ -131,11 +131,11 @@ def _regressed(z: ComplexArray, u: ComplexArray, by_time: ComplexArray, besides:
 
 def orthogonal(rows: ComplexArray, basis: ComplexArray) -> ComplexArray:
     """Rows (b, m) without their part in orthonormal columns (b, j)."""
-    return np.asarray(rows - basis @ (basis.conj().T @ rows))
+    return rows - basis @ (basis.conj().T @ rows)
 
 
 def _outer(rows: ComplexArray) -> ComplexArray:
-    return np.asarray(rows.T @ rows.conj())
+    return rows.T @ rows.conj()
 
 
 def pooled_noise(responses: list[LineResponse]) -> tuple[list[ComplexArray], FloatArray]:

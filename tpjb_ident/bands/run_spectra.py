@@ -41,7 +41,7 @@ def is_broadband(run: Run) -> bool:
     return run.excitation_kind != "sine"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RunSpectra:
     """Phasors of one run over the band: every period's, or those of the whole record's bins."""
 
@@ -54,12 +54,10 @@ class RunSpectra:
     clean_rms: float = 0.0  #: m: of the motion without disturbing lines
     peak: float = 0.0  #: m: largest motion
     one_sided: float = 0.0  #: 1 where what drives goes to one side only, 0 where to both alike
-    by_time: RunSpectra | None = field(default=None, repr=False)  #: of the record times the time from its middle [s]
-    wide: RunSpectra | None = field(
-        default=None, repr=False
-    )  #: of a period, and beyond the band, where the film answers
+    by_time: RunSpectra | None = None  #: of the record times the time from its middle [s]
+    wide: RunSpectra | None = None  #: of a period, and beyond the band, where the film answers
     #: by order n the phasors (1, n_bins, ..) of the record turned n times as fast as the shaft: at f, what is at f - nX
-    turned: dict[int, RunPhasors] = field(default_factory=dict, repr=False)
+    turned: dict[int, RunPhasors] = field(default_factory=dict)
 
     @property
     def frequencies(self) -> FloatArray:
@@ -90,10 +88,10 @@ class RunSpectra:
         sizes = [np.linalg.norm(drive.mean(axis=0), axis=1) for drive in drives]
         share = np.max([size / max(size.max(), 1e-300) for size in sizes], axis=0)
         if self.command is None:
-            return np.asarray(share >= _DRIVEN)
+            return share >= _DRIVEN
         falling = np.sort(share)[::-1]
         ends = np.flatnonzero((falling[1:] < _DRIVEN) & (falling[:-1] > _STEP * falling[1:]))
-        return np.asarray(share >= max(falling[ends[0]] if len(ends) else 0.0, _NOTHING))
+        return share >= max(falling[ends[0]] if len(ends) else 0.0, _NOTHING)
 
     @property
     def amplitude(self) -> float:

@@ -144,7 +144,7 @@ def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
 
 def _has_neighbours(values: FloatArray, at: FloatArray) -> BoolArray:
     """Which places (n,) have readings on either side, as far as the kernel reaches; of its own times every one."""
-    return np.asarray(_is_own(values, at) | (at >= _TAPS) & (at <= len(values) - 1 - _TAPS))
+    return _is_own(values, at) | (at >= _TAPS) & (at <= len(values) - 1 - _TAPS)
 
 
 def _is_own(values: FloatArray, at: FloatArray) -> bool:

@@ -54,7 +54,7 @@ def far(distances: FloatArray, least: float, many: float, count: int = 4) -> Boo
     """
     if len(distances) < count:
         return np.zeros(len(distances), dtype=bool)
-    return np.asarray(distances > max(least, many * float(np.median(distances))))
+    return distances > max(least, many * float(np.median(distances)))
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def _by_channel(values: np.ndarray, phasors: RunPhasors, channels: Sequence[Chan
     """Values of a run's phasors by channel, of the channels asked for; NaN of those that it has not."""
     names = [channel.name for channel in phasors.channels]
     places = np.array([names.index(c.name) if c.name in names else -1 for c in channels], dtype=int)
-    return np.asarray(np.append(values, np.nan)[places])
+    return np.append(values, np.nan)[places]
 
 
 def steady_level(values: FloatArray, rate: float, frequencies: Sequence[float]) -> RecordLines:

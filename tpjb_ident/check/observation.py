@@ -46,22 +46,22 @@ _NO_INERTIA = 1e-3
 _ON_CELLS = 0.1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Observation(Directed):
     """One run, seen once: m vector channels that show something, none where it cannot be read."""
 
     run: Run
-    report: Reporter = field(repr=False)
+    report: Reporter
     channels: tuple[Channel, ...] = ()
-    lines: RecordLines = field(default_factory=lambda: RecordLines.none(0), repr=False)
+    lines: RecordLines = field(default_factory=lambda: RecordLines.none(0))
     #: (3, m): 2 %, 50 % and 98 % quantiles of `channels`, SI
-    spread: FloatArray = field(default_factory=lambda: np.empty((3, 0)), repr=False)
+    spread: FloatArray = field(default_factory=lambda: np.empty((3, 0)))
     #: (n, m): thinned to a few thousand, SI; kept of clearance runs only
-    samples: FloatArray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
+    samples: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     digest: str = ""
     speed: float = math.nan
     #: (m,): size of what turns with the shaft, SI; empty where nothing tells it
-    shaft_line: FloatArray = field(default_factory=lambda: np.empty(0), repr=False)
+    shaft_line: FloatArray = field(default_factory=lambda: np.empty(0))
     shaft_force: float = math.nan  #: of the 1X force, see `tpjb_ident.check.lines`
     conditions: tuple[Condition, ...] = ()  #: of its phasors
 
@@ -83,7 +83,7 @@ class Observation(Directed):
 
     def film_force(self, mass: float) -> ComplexArray:
         """Force phasor of the film on the housing, F_cell + m_h a_h (2,) [N]; of the cells alone where a is unknown."""
-        return np.asarray(self.line("force") + np.nan_to_num(mass * self.line("acceleration")))
+        return self.line("force") + np.nan_to_num(mass * self.line("acceleration"))
 
     def shows(self, quantity: str) -> bool:
         """Whether a channel of a quantity shows the excitation line above its noise."""

@@ -5,7 +5,7 @@ wrong input or with the wrong sign turns the answer into its mirror image, which
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 
@@ -29,7 +29,7 @@ _DEFINITE, _MENDED = 0.05, 0.15
 _UNKNOWN = np.full((2, 2), np.nan + 0j)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PointRuns:
     """Readings of the n runs of one operating point, SI: of two probes and, as a rule, two cells."""
 
@@ -39,7 +39,7 @@ class PointRuns:
     probe_plane: FloatArray  #: `probe_plane`, `cell_plane` (2, 2): from the two readings to X and Y
     cell_plane: FloatArray
     turning: FloatArray  #: (n, 4): size of what turns with the shaft; NaN where that is not told
-    observations: tuple[Observation, ...] = field(default=(), repr=False)
+    observations: tuple[Observation, ...] = ()
     channels: tuple[Channel, ...] = ()  #: probes and cells
 
     def __len__(self) -> int:
@@ -48,12 +48,12 @@ class PointRuns:
     @property
     def displacement(self) -> ComplexArray:
         """X, Y of every run, (n, 2) [m]."""
-        return np.asarray(self.phasors[:, :2] @ self.probe_plane.T)
+        return self.phasors[:, :2] @ self.probe_plane.T
 
     @property
     def force(self) -> ComplexArray:
         """Of the film, X, Y of every run, (n, 2) [N]."""
-        return np.asarray(self.phasors[:, 2:] @ self.cell_plane.T + self.inertia)
+        return self.phasors[:, 2:] @ self.cell_plane.T + self.inertia
 
     def stiffness(self, runs: Sequence[int]) -> ComplexArray:
         """H (2, 2) of F = H D over some runs, each weighted by one over its displacement.
@@ -70,7 +70,7 @@ class PointRuns:
     def misfits(self, stiffness: ComplexArray) -> FloatArray:
         """Share of every run's force that H does not explain, (n,)."""
         residual = self.force - self.displacement @ stiffness.T
-        return np.asarray(np.linalg.norm(residual, axis=1) / np.linalg.norm(self.force, axis=1))
+        return np.linalg.norm(residual, axis=1) / np.linalg.norm(self.force, axis=1)
 
     @cached_property
     def robust_stiffness(self) -> ComplexArray:

@@ -112,4 +112,4 @@ def _report(observation: Observation, shown: ComplexArray, expected: ComplexArra
 def _off(shown: ComplexArray, expected: ComplexArray) -> FloatArray:
     """Distance of vectors (.., 2) from what is expected, as a share of that."""
     distance = np.linalg.norm(shown - expected, axis=-1)
-    return np.asarray(distance / np.maximum(np.linalg.norm(expected, axis=-1), 1e-300))
+    return distance / np.maximum(np.linalg.norm(expected, axis=-1), 1e-300)

@@ -30,7 +30,7 @@ def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple
         faults.append((f"{second} read ten times too {size}", np.diag([1.0, factor])))
     plane = plane_of(channels)
     for words, matrix in faults:
-        yield words, np.asarray(plane @ matrix @ np.linalg.inv(plane))
+        yield words, plane @ matrix @ np.linalg.inv(plane)
 
 
 def explanation(

@@ -18,7 +18,7 @@ others leaves out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -46,7 +46,7 @@ class Prior:
     def estimated(self, posterior: FloatArray) -> BoolArray:
         """Which are estimated, by their posterior variance if all were."""
         is_learnt = np.sqrt(np.abs(posterior) * self.precision) < CONSIDERED
-        return np.asarray((is_learnt | self.always) & ~self.never)
+        return (is_learnt | self.always) & ~self.never
 
 
 @dataclass
@@ -91,33 +91,33 @@ def are_told(A: FloatArray) -> BoolArray:
     """Whether the equations of points (P, 8, 8) determine their numbers, (P,)."""
     size = np.sqrt(np.maximum(np.einsum("paa->pa", A), 1e-300))
     scaled = A / (size[:, :, None] * size[:, None, :])
-    return np.asarray(np.linalg.eigvalsh(scaled)[:, 0] > _TOLD)
+    return np.linalg.eigvalsh(scaled)[:, 0] > _TOLD
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Own:
     """Parameters of every point alone, and what one standard deviation of their priors does."""
 
     change: FloatArray  #: (P, L): of their values in the step
     deviation: FloatArray  #: (P, L): posterior
     estimated: BoolArray  #: (P, L)
-    direct: FloatArray = field(repr=False)  #: (P, k, L): to the point's numbers of H
-    shared: FloatArray = field(repr=False)  #: (P, q, L): to the shared parameters, and through them to all points
+    direct: FloatArray  #: (P, k, L): to the point's numbers of H
+    shared: FloatArray  #: (P, q, L): to the shared parameters, and through them to all points
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Step:
     """One step of the solve, and the covariances that go with it; k numbers of H a point."""
 
     h: FloatArray  #: (P, k)
     theta: FloatArray  #: (q,)
     by_point: Own
-    records: FloatArray = field(repr=False)  #: (P, k, k): that the records leave, the learning of parameters included
-    K: FloatArray = field(repr=False)  #: (P, k, q)
-    S: FloatArray = field(repr=False)  #: (q, q)
-    S_inverse: FloatArray = field(repr=False)  #: (q, q): zero in rows and columns of considered parameters
-    estimated: BoolArray = field(repr=False)  #: (q,)
-    precision: FloatArray = field(repr=False)  #: (q,): Lambda
+    records: FloatArray  #: (P, k, k): that the records leave, the learning of parameters included
+    K: FloatArray  #: (P, k, q)
+    S: FloatArray  #: (q, q)
+    S_inverse: FloatArray  #: (q, q): zero in rows and columns of considered parameters
+    estimated: BoolArray  #: (q,)
+    precision: FloatArray  #: (q,): Lambda
 
     def factors(self) -> FloatArray:
         """One standard deviation of every shared parameter's prior, as it moves all points together, (q, P, k)."""
@@ -190,7 +190,7 @@ def step(sums: Sums, shared: Prior, by_point: Prior) -> Step:
 def _by_prior(is_learnt: BoolArray, learnt: FloatArray, passed: FloatArray, root: FloatArray) -> FloatArray:
     """Changes (P, .., L) by one standard deviation of estimated and considered priors; `root` (P, L) of precision."""
     scale = root[:, None, :]
-    return np.asarray(np.where(is_learnt[:, None, :], learnt * scale, passed / scale))
+    return np.where(is_learnt[:, None, :], learnt * scale, passed / scale)
 
 
 def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -201,10 +201,10 @@ def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray
     n = A.shape[1]
     white = np.linalg.solve(_root(A), np.concatenate([E, np.broadcast_to(np.eye(n), A.shape)], axis=2))
     E_white, back = np.split(white, [E.shape[2]], axis=2)
-    A_inverse = np.asarray(back.transpose(0, 2, 1) @ back, dtype=float)
+    A_inverse = back.transpose(0, 2, 1) @ back
     flat = E_white.reshape(len(A) * n, E.shape[2])
-    K = np.asarray(-back.transpose(0, 2, 1) @ E_white, dtype=float)
-    return A_inverse, K, np.asarray(G - flat.T @ flat, dtype=float)
+    K = -back.transpose(0, 2, 1) @ E_white
+    return A_inverse, K, G - flat.T @ flat
 
 
 def _root(A: FloatArray) -> FloatArray:
@@ -213,7 +213,7 @@ def _root(A: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.cholesky(A), dtype=float)
     except np.linalg.LinAlgError:
         ridge = _TOLD * np.einsum("paa->pa", A)[:, :, None] * np.eye(A.shape[1])
-        return np.asarray(np.linalg.cholesky(A + ridge), dtype=float)
+        return np.linalg.cholesky(A + ridge)
 
 
 def _records(

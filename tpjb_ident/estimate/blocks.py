@@ -60,14 +60,14 @@ class RigStiffness:
         """Whether the rig was measured about `omega` (n,), (n,)."""
         if not len(self.omega):
             return np.zeros(len(omega), dtype=bool)
-        return np.asarray((omega >= 0.98 * self.omega[0]) & (omega <= 1.02 * self.omega[-1]))
+        return (omega >= 0.98 * self.omega[0]) & (omega <= 1.02 * self.omega[-1])
 
     def at(self, omega: FloatArray) -> ComplexArray:
         """H at `omega` (n,), (n, 2, 2) [N/m]; zero where it is not known."""
-        return np.asarray(np.einsum("nf,fij->nij", self.weights(omega), self.h))
+        return np.einsum("nf,fij->nij", self.weights(omega), self.h)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Rig:
     """Sensors in the order of the rows, and the housing that they stand on."""
 
@@ -77,7 +77,7 @@ class Rig:
     mount: str = "cells"  #: "cells", "floating", or "unknown": no accelerometer tells
     #: by term: what its test said of sensors that are since taken as uncertain as it showed them
     contradicted: Mapping[str, tuple[Condition, ...]] = field(default_factory=dict)
-    bare: RigStiffness = field(default_factory=RigStiffness, repr=False)
+    bare: RigStiffness = field(default_factory=RigStiffness)
     static: bool = True  #: whether the cells show the static load
     to_set_point: bool = True  #: whether H is that at the set points, not at the runs' own loads
     #: of the clocks of devices, relative: put right in the readings before they became phasors

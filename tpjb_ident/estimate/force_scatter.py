@@ -66,13 +66,13 @@ class ForceScatter:
         mean = variance.mean(axis=1, keepdims=True)
         excess = np.maximum(variance * size**2, _LEAST * mean) - mean
         covariance = np.eye(COMPONENTS) + (triangle * excess[:, None, :]) @ triangle.transpose(0, 2, 1)
-        root = np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), dtype=float)
+        root = np.linalg.inv(np.linalg.cholesky(covariance))
         return ForceScatter(basis, np.asarray(triangle, dtype=float), root, size)
 
     def white(self, rows: FloatArray) -> FloatArray:
         """Rows (n, k, ..) brought to unit variance."""
         move = (self.root - np.eye(COMPONENTS)) @ (self.basis.transpose(0, 2, 1) @ rows)
-        return np.asarray(rows + self.basis @ move, dtype=float)
+        return rows + self.basis @ move
 
     def along(self, r: FloatArray, J_h: FloatArray) -> AlongForce:
         """What white rows r (n, k) and their columns J_h (n, k, numbers) have along the components."""

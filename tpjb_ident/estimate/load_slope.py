@@ -42,7 +42,7 @@ def slopes_over_load(points: Sequence[OperatingPoint], h: ComplexArray) -> tuple
 def _log_gradient(values: FloatArray, log_load: FloatArray) -> FloatArray:
     """Slope over ln W, (k, 2, 2)."""
     order: Literal[1, 2] = 2 if len(log_load) > 2 else 1
-    plain = np.asarray(np.gradient(values, log_load, axis=0, edge_order=order))
+    plain = np.gradient(values, log_load, axis=0, edge_order=order)
     one_sign = np.abs(np.sign(values).sum(axis=0)) == len(values)
     logarithm = np.log(np.where(one_sign, np.abs(values), 1.0))
     power = values * np.gradient(logarithm, log_load, axis=0, edge_order=order)

@@ -156,8 +156,8 @@ class Scatter:
         # few runs know little of what is usual among them: then only the improbable has no weight
         improbable = float(fdtri(FORCE_ROWS, max(freedom_of_others, 1.0), 1 - _IMPROBABLE))
         limit = max(_NO_WEIGHT**2, improbable)
-        weights = np.asarray(np.maximum(1 - distance / usual / limit, 0.0) ** 2, dtype=float)
-        good = totals(group, np.asarray(weights > _GOOD), points)
+        weights = np.maximum(1 - distance / usual / limit, 0.0) ** 2
+        good = totals(group, weights > _GOOD, points)
         few = good < np.maximum(_MIN_GOOD, _SHARE * runs)
         return np.where(few[group], 1.0, weights)
 
@@ -166,7 +166,7 @@ def _alike(moment: FloatArray, freedom: FloatArray) -> FloatArray:
     """Variances of the components (.., 4) of some freedom, drawn towards their mean."""
     weight = freedom + 1e-9
     mean = np.sum(weight * moment, axis=-1, keepdims=True) / np.sum(weight, axis=-1, keepdims=True)
-    return np.asarray((freedom * moment + _ALIKE * mean) / (freedom + _ALIKE))
+    return (freedom * moment + _ALIKE * mean) / (freedom + _ALIKE)
 
 
 def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:
@@ -188,7 +188,7 @@ def _expected(rows: FloatArray) -> FloatArray:
     first = chdtr(k + 2, limit)
     second = (k + 2) * chdtr(k + 4, limit)
     third = (k + 2) * (k + 4) * chdtr(k + 6, limit)
-    return np.asarray(first - 2 * second / limit + third / limit**2)
+    return first - 2 * second / limit + third / limit**2
 
 
 def _unusual(chi: FloatArray, spare: FloatArray, usable: BoolArray, before: BoolArray) -> BoolArray:

@@ -74,7 +74,7 @@ def remainder(columns: FloatArray, values: FloatArray, root: FloatArray, used: B
     `columns` (n, 8, k), `values` (n, 8, c), both weighed by `root` (n, 8, 8), `used` (n,).
     """
     design, rows = root @ columns, root @ values
-    return np.asarray(rows - design @ least_squares(design[used], rows[used]))
+    return rows - design @ least_squares(design[used], rows[used])
 
 
 def least_squares(columns: FloatArray, rows: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ pulling H towards zero: there is no separate step of errors in variables.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,32 +46,32 @@ _UNTOLD = 1e-14
 _CHUNK = 4096
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Solution:
     """H of every point with its covariance by source; points of a shape are its groups, each with its k numbers."""
 
     h: ComplexArray  #: (P, 2, 2), N/m: at the frequency found; NaN where the runs do not tell it
-    records: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2
-    shares: dict[str, FloatArray] = field(repr=False)  #: (P, 8, 8) by term, (N/m)^2
-    factors: FloatArray = field(repr=False)  #: (q, P, 8), N/m: a standard deviation of every shared parameter
-    fitted: dict[str, Fitted] = field(repr=False)
-    terms: tuple[Term, ...] = field(repr=False)  #: those with parameters
-    all_terms: tuple[Term, ...] = field(repr=False)
-    rig: Rig = field(repr=False)
-    blocks: Blocks = field(repr=False)
-    group: IntArray = field(repr=False)  #: of every point
-    scatter: Scatter = field(repr=False)
+    records: FloatArray  #: (P, 8, 8), (N/m)^2
+    shares: dict[str, FloatArray]  #: (P, 8, 8) by term, (N/m)^2
+    factors: FloatArray  #: (q, P, 8), N/m: a standard deviation of every shared parameter
+    fitted: dict[str, Fitted]
+    terms: tuple[Term, ...]  #: those with parameters
+    all_terms: tuple[Term, ...]
+    rig: Rig
+    blocks: Blocks
+    group: IntArray  #: of every point
+    scatter: Scatter
     chi_square: FloatArray  #: (P,): of the blocks' equations, reduced
     spare: FloatArray  #: (P,): real equations beyond the unknowns
-    scatter_share: FloatArray = field(repr=False)  #: (n, 4): of the components' variance that is the runs' scatter
-    factor: ComplexArray = field(repr=False)  #: (n, m): what multiplies the readings of every block
-    shift: ComplexArray = field(repr=False)  #: (n, m), SI: what is in the readings beside the motion's part
-    run_change: ComplexArray = field(repr=False)  #: (n, 2, 2), N/m: H of a run beside that of its point
+    scatter_share: FloatArray  #: (n, 4): of the components' variance that is the runs' scatter
+    factor: ComplexArray  #: (n, m): what multiplies the readings of every block
+    shift: ComplexArray  #: (n, m), SI: what is in the readings beside the motion's part
+    run_change: ComplexArray  #: (n, 2, 2), N/m: H of a run beside that of its point
     ran_away: bool = False  #: no point has an answer
 
     def blocks_of(self, group: int) -> BoolArray:
         """Blocks of a group, (n,)."""
-        return np.asarray(self.group[self.blocks.point] == group)
+        return self.group[self.blocks.point] == group
 
     def noise_freedom(self, group: int) -> float:
         """Real degrees of freedom of the noise of a group's records."""
@@ -120,7 +120,7 @@ class Solver:
         self.by_point = Table([term for term in self.terms if term.points], self.shape.groups, self.shape.group)
         runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
         enough = 4 * runs >= min(self.shape.numbers, NUMBERS)  # a run has four equations of the film
-        self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)) & enough)
+        self.solvable = np.isfinite(start).all(axis=(1, 2)) & enough
         self.answered = totals(self.shape.group, self.solvable, self.shape.groups) > 0
         self.unit = float(np.median(np.abs(start[self.solvable]))) if self.solvable.any() else 1.0
         self.h = np.where(self.solvable[:, None, None], start, self.unit * np.eye(2))

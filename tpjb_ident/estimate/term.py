@@ -207,10 +207,10 @@ class Additive(Term):
         """What the parameters' values (q,) add to the readings, (n, m + 2)."""
         columns = self.columns(blocks, state)
         if not self.points:
-            return np.asarray(columns @ value)
+            return columns @ value
         table = np.zeros((len(blocks.points), self.width))
         table[list(self.points)] = value.reshape(-1, self.width)
-        return np.asarray(np.einsum("nrl,nl->nr", columns, table[blocks.point]))
+        return np.einsum("nrl,nl->nr", columns, table[blocks.point])
 
 
 class FilmTerm(Additive):
@@ -238,7 +238,7 @@ class FilmTerm(Additive):
         """By how much H of a run differs from its point's, (n, 2, 2) [N/m]."""
         changes, group = self.changes(blocks, state), self.group[blocks.point]
         numbers = value.reshape(-1, changes.shape[1])[group] * (group >= 0)[:, None]
-        return np.asarray(np.einsum("nk,nkij->nij", numbers, changes))
+        return np.einsum("nk,nkij->nij", numbers, changes)
 
 
 def exceeding(fitted: Fitted, parameters: tuple[Parameter, ...]) -> list[int]:

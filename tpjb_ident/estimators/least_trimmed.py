@@ -53,7 +53,7 @@ class Regression:
         Windows alone in their direction cannot be held against a fit that has none of them.
         """
         leverage = _squares(self._x.conj(), np.asarray(np.linalg.inv(self._sums(weights)[0]), dtype=complex))
-        return np.asarray(1 / (1 + np.maximum(leverage, 0.0)))
+        return 1 / (1 + np.maximum(leverage, 0.0))
 
     def scatter(self, rows: ComplexArray, weights: FloatArray, shrinkage: float = 1.0) -> ComplexArray:
         """Weighted mean of r r^H over `shrinkage`, (..., q, q); `rows` (..., q, n), `weights` (..., n).
@@ -63,11 +63,11 @@ class Regression:
         sums = (weights[..., None, :] * rows) @ rows.conj().swapaxes(-1, -2)
         spread = sums / (shrinkage * weights.sum(axis=-1))[..., None, None]
         size = np.einsum("...ii->...", spread).real / np.trace(self.metric).real
-        return np.asarray(spread + (1e-28 + 1e-13 * size)[..., None, None] * self.metric)
+        return spread + (1e-28 + 1e-13 * size)[..., None, None] * self.metric
 
     def residual(self, B: ComplexArray) -> ComplexArray:
         """Y - X B' of every window, (..., q, n); `B` (..., q, 2)."""
-        return np.asarray(self._y - B @ self._x)
+        return self._y - B @ self._x
 
 
 def _squares(rows: ComplexArray, matrix: ComplexArray) -> FloatArray:
@@ -185,7 +185,7 @@ def _nearest(distance: FloatArray, h: int) -> FloatArray:
 
 
 def _log_det(spread: ComplexArray) -> FloatArray:
-    return np.asarray(np.linalg.slogdet(spread)[1])
+    return np.linalg.slogdet(spread)[1]
 
 
 def _reweighted(regression: Regression, core: FloatArray, share: float) -> InitialFit:

@@ -66,16 +66,16 @@ class DynamicStiffness:
 
     h: ComplexArray
     omega: float
-    covariance: FloatArray = field(repr=False)
-    dof: FloatArray = field(repr=False)
+    covariance: FloatArray
+    dof: FloatArray
     method: str
-    weights: FloatArray = field(repr=False)
+    weights: FloatArray
     status: tuple[Condition, ...] = ()
     condition: float = np.nan
     chi_square: float = np.nan
     spare_equations: int = 0
-    attenuation: FloatArray = field(default_factory=lambda: np.full(2, np.nan), repr=False)
-    systematic: FloatArray = field(default_factory=lambda: np.zeros((8, 8)), repr=False)
+    attenuation: FloatArray = field(default_factory=lambda: np.full(2, np.nan))
+    systematic: FloatArray = field(default_factory=lambda: np.zeros((8, 8)))
 
     @property
     def direct(self) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """All bands of a campaign as blocks of the measurement equation: a point a line, a block a run's response."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,13 +30,13 @@ _INSTRUMENTS = {"periods": "periods", "iv": "command", "hv": "displacement"}
 _LEAST = 1e-8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BandBlocks:
     """Blocks of all bands, a point a line: L lines, B bands."""
 
     points: tuple[BandPoint, ...]
     loads: StaticLoads
-    blocks: Blocks = field(repr=False)
+    blocks: Blocks
     omega: FloatArray  #: (L,), rad/s: of every line
     driven: BoolArray  #: (L,): whether an excitation stands above the noise in one direction
     clear: BoolArray  #: (L,): and in both
@@ -157,7 +157,7 @@ def _strengths(rig: Rig, blocks: Blocks) -> FloatArray:
     noise = plane @ blocks.noise[:, probes][:, :, probes] @ plane.transpose(0, 2, 1)
     size = np.sqrt(np.maximum(np.einsum("nii->n", noise).real / 2, 1e-300))
     white = np.nan_to_num(vector(rig, blocks, "displacement")) / size[:, None]
-    return np.asarray(np.linalg.eigvalsh(line_products(blocks, white, white)) / 2)
+    return np.linalg.eigvalsh(line_products(blocks, white, white)) / 2
 
 
 def line_products(blocks: Blocks, first: ComplexArray, second: ComplexArray) -> ComplexArray:

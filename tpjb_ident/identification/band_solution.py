@@ -8,7 +8,7 @@ that is nearest to the band's lines: it need not hold over the band, only bend h
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,16 +38,16 @@ _RUN_AWAY = 3.0
 ONE_LINE = 1e6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BandSolution:
     """All bands of a campaign; L lines."""
 
     data: BandBlocks
-    solution: Solution = field(repr=False)  #: of the lines
-    usable: BoolArray = field(repr=False)  #: (L,): lines that the excitation tells
+    solution: Solution  #: of the lines
+    usable: BoolArray  #: (L,): lines that the excitation tells
     parts: tuple[IntArray, ...]  #: lines of every part: h is that at the middle one
-    part: Solution = field(repr=False)
-    condition: FloatArray = field(repr=False)  #: (L,): condition number of the motions
+    part: Solution
+    condition: FloatArray  #: (L,): condition number of the motions
     run_scatter: float  #: of the runs' gains
 
     @cached_property

@@ -134,18 +134,18 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
     return noises, np.array(freedoms)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CampaignSolution:
     """H of every point of a campaign, and what was put right on the way."""
 
     task: MeansTask
-    means: tuple[PointMeans, ...] = field(repr=False)
-    loads: StaticLoads = field(repr=False)
+    means: tuple[PointMeans, ...]
+    loads: StaticLoads
     film: tuple[FilmChange, ...]
-    solution: Solution = field(repr=False)
-    mains_shift: ComplexArray = field(repr=False)  #: (n, m), SI: pick-up taken off the blocks' readings
-    mains: dict[int, MainsFit] = field(default_factory=dict, repr=False)  #: by point
-    in_cells: dict[int, FloatArray] = field(default_factory=dict, repr=False)  #: by point, (8, 8): mains in the cells
+    solution: Solution
+    mains_shift: ComplexArray  #: (n, m), SI: pick-up taken off the blocks' readings
+    mains: dict[int, MainsFit] = field(default_factory=dict)  #: by point
+    in_cells: dict[int, FloatArray] = field(default_factory=dict)  #: by point, (8, 8): mains in the cells
 
     @cached_property
     def misfits(self) -> FloatArray:

@@ -46,4 +46,4 @@ def shared_changes(
     if not names:
         return np.zeros((1, 8 * len(points))), names
     factors = np.concatenate([solution.factors[np.ix_(rows, points)], *(f[None] for f in further.values())])
-    return np.asarray(factors.reshape(len(names), -1) * np.sqrt(len(names))), names
+    return factors.reshape(len(names), -1) * np.sqrt(len(names)), names

@@ -8,7 +8,7 @@ force where there are accelerometers, as Eq. (13) wants the film's force.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,11 +43,11 @@ class PlainSettings:
     norm: str = "huber"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PlainPoint:
     """One operating point, solved as printed."""
 
-    data: PointData = field(repr=False)
+    data: PointData
     h: ComplexArray  #: (2, 2) complex, N/m
     standard_error: np.ndarray  #: (8,), N/m: statsmodels' own, of Re and Im of h
     status: tuple[str, ...]

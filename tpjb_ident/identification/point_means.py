@@ -25,7 +25,7 @@ _LEAST_WINDOWS = 0.4
 _ONE_LINE = 1e6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PointMeans:
     """What the windows of a point say before the solve."""
 
@@ -33,7 +33,7 @@ class PointMeans:
     means: WindowMeans | None
     channels: tuple[tuple[Channel | None, ...], ...]  #: (g, m): None where a run says nothing of a sensor
     condition: float
-    residual: tuple[ComplexArray, float] = field(repr=False)  #: density of the noise (m, m) and its degrees of freedom
+    residual: tuple[ComplexArray, float]  #: density of the noise (m, m) and its degrees of freedom
     status: tuple[Condition, ...] = ()
     shaft: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (g,): NaN where it is not on the line
     shaft_conditions: tuple[Condition, ...] = ()
@@ -173,7 +173,7 @@ def _clock_turns(data: PointData, task: MeansTask) -> ComplexArray:
     """Unit phasors (n, m) that take off how far the devices' clocks have run ahead."""
     rates = np.array([task.rates.get(sensor.device, 0.0) for sensor in task.channels])
     omega = 2 * np.pi * np.array([r.lines.excitation[i].frequency for r, i in zip(data.runs, data.lines)])
-    return np.asarray(np.exp(1j * np.multiply.outer(omega[data.run_index] * _window_times(data), rates)))
+    return np.exp(1j * np.multiply.outer(omega[data.run_index] * _window_times(data), rates))
 
 
 def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[Condition, ...]]:

@@ -51,7 +51,7 @@ def usual_scale(scale: FloatArray) -> FloatArray:
 def is_present(values: FloatArray) -> BoolArray:
     """Whether a reading is a value: finite, and no overflow mark; (n,)."""
     with np.errstate(invalid="ignore"):  # a NaN compared is what "no value" looks like
-        return np.asarray(np.abs(values) < OVERFLOW)
+        return np.abs(values) < OVERFLOW
 
 
 def with_flanks(outlying: BoolArray) -> BoolArray:

@@ -146,7 +146,7 @@ def _left(windows: ComplexArray, time: FloatArray, places: FloatArray) -> FloatA
     waves = np.exp(2j * np.pi * time[:, None] * places[:, None, :])
     basis = np.linalg.qr(np.concatenate([np.vander(time - 0.5, 3) * waves[..., :1], waves[..., 1:]], axis=2))[0]
     explained = np.sum(np.abs(basis.conj().swapaxes(1, 2) @ windows) ** 2, axis=(1, 2))
-    return np.asarray(np.sum(np.abs(windows) ** 2) - explained)
+    return np.sum(np.abs(windows) ** 2) - explained
 
 
 def _least(windows: ComplexArray, time: FloatArray, places: FloatArray) -> FloatArray:

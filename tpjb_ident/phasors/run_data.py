@@ -105,7 +105,7 @@ class RunPhasors(Directed):
 
 def complex_median(z: ComplexArray) -> ComplexArray:
     """Median of real and imaginary parts over the first axis; `z` (n, ...)."""
-    return np.asarray(np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0))
+    return np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0)
 
 
 def phasor_noise(run: RunPhasors, rate: float) -> FloatArray:

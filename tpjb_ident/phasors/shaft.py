@@ -96,4 +96,4 @@ def _by_first_line(phasors: RunPhasors, turning: float) -> ComplexArray:
     z = (d[:, 0] + 1j * d[:, 1]) * np.exp(2j * np.pi * (phasors.lines.frequencies[place] - turning) * middle)
     z = z[np.abs(z) > 0.0]  # a window at rest, or without the line, tells none
     is_clear = len(z) and abs(z.mean()) > _CLEAR * z.std() / np.sqrt(len(z))
-    return np.asarray(z / np.abs(z)) if is_clear else _NO_TURNS
+    return z / np.abs(z) if is_clear else _NO_TURNS

@@ -54,7 +54,7 @@ class NoiseModel:
         bent = 2.0 * _BEND * (centred**2 - np.mean(centred**2)) / max(float(np.ptp(time)), 1e-300)
         drift = self.drift * np.column_stack([centred, bent])
         slow = self.flicker * flicker_kernel(time, duration) + drift @ drift.T
-        return np.asarray(slow + self.walk**2 * walk_kernel(time, duration))
+        return slow + self.walk**2 * walk_kernel(time, duration)
 
     def mean_variance(self, duration: float) -> float:
         """Variance of one average over `duration` seconds about the run's own level [m^2]."""
@@ -72,14 +72,14 @@ def walk_kernel(time: FloatArray, duration: FloatArray | None = None) -> FloatAr
     square = 0.5 * share**2
     kernel = span * (1.0 / 3.0 + square[:, None] + square - np.maximum(share[:, None], share))
     # the later of two moments within an average comes a sixth of it after its middle
-    return np.asarray(kernel if duration is None else kernel - np.diag(duration / 6.0))
+    return kernel if duration is None else kernel - np.diag(duration / 6.0)
 
 
 def _walk_columns(time: FloatArray) -> FloatArray:
     """Columns (m, k) that sum up, with random factors, to a walk of one metre per square root of a second at `time`."""
     span = max(float(np.ptp(time)), 1e-300)
     waves = np.pi * np.arange(1, _WAVES + 1)
-    return np.asarray(np.cos((time[:, None] - np.min(time)) / span * waves) * np.sqrt(2.0 * span) / waves)
+    return np.cos((time[:, None] - np.min(time)) / span * waves) * np.sqrt(2.0 * span) / waves
 
 
 def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> FloatArray:

@@ -129,7 +129,7 @@ def _outside_both_medians(x: FloatArray, longest: int) -> BoolArray:
         _NOTHING,
     )
     beyond = np.maximum(np.minimum(before, after) - x, x - np.maximum(before, after))
-    return np.asarray(beyond > _THRESHOLD * noise)
+    return beyond > _THRESHOLD * noise
 
 
 def converter_step(x: FloatArray) -> tuple[float, float]:

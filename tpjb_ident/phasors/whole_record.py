@@ -54,7 +54,7 @@ class WholeRecord:
         used = self.residual.shape[1] * np.where(self.used > 0, self.used, np.nan)
         bins = np.fft.rfft(self.residual, axis=1).T * (2 / used)
         turn = np.exp(-2j * np.pi * np.arange(len(bins)) * self.start / self.duration) if self.start else 1.0
-        return np.asarray(bins * np.reshape(turn, (-1, 1)))
+        return bins * np.reshape(turn, (-1, 1))
 
 
 def hann_amplitude(spectrum: ComplexArray) -> FloatArray:
@@ -67,7 +67,7 @@ def hann_amplitude(spectrum: ComplexArray) -> FloatArray:
 
 def noise_floor(amplitude: FloatArray) -> FloatArray:
     """Noise around every bin of a spectrum (n_bins,): a filling-up by splines leaves none at high frequencies."""
-    return np.asarray(median_filter(amplitude, size=min(61, max(len(amplitude) // 10, 3)), mode="nearest"))
+    return median_filter(amplitude, size=min(61, max(len(amplitude) // 10, 3)), mode="nearest")
 
 
 def whole_records(run: Run, result: RunPhasors) -> tuple[WholeRecord, ...]:
@@ -108,7 +108,7 @@ def _rounding(rows: FloatArray) -> FloatArray:
     step = np.where(moves > _NO_STEP * largest, moves, largest).min(axis=1) + np.finfo(float).tiny
     noise = np.array([white_noise(row) for row in np.nan_to_num(rows)])
     dithered = np.exp(-((2 * np.pi * noise / step) ** 2))
-    return np.asarray(_LARGEST * dithered * step**3 / np.fmax(np.std(rows, axis=1), step))
+    return _LARGEST * dithered * step**3 / np.fmax(np.std(rows, axis=1), step)
 
 
 def with_record(result: RunPhasors, records: tuple[WholeRecord, ...]) -> RunPhasors:

@@ -76,7 +76,7 @@ class FrequencyModel:
         """Dynamic stiffness of the model, (2, 2) or (n, 2, 2) [N/m]; `omega` (n,) [rad/s]."""
         K, C, M = (*self.parameters.reshape(-1, 2, 2), np.zeros((2, 2)))[:3]
         w = np.asarray(omega, dtype=float)[..., None, None]
-        return np.asarray(K - w**2 * M + 1j * w * C)
+        return K - w**2 * M + 1j * w * C
 
     def columns(self) -> dict[str, Any]:
         """What the tables say of the model, under `MODEL_COLUMNS`; zero what it does not have."""
@@ -168,7 +168,7 @@ def _systematic(gains: FloatArray, systematic: FloatArray, changes: FloatArray) 
     # what no source explains is the point's own: of its baseline, of mains on the cells
     separate = systematic - np.einsum("qna,qnb->nab", changes, changes) / len(changes)
     single = (gains @ separate @ gains.transpose(0, 2, 1)).sum(axis=0)
-    return np.asarray(together.T @ together / len(changes) + single)
+    return together.T @ together / len(changes) + single
 
 
 def _effective_dof(variances: FloatArray, dof: FloatArray) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,16 +62,16 @@ class Identification(Presented):
     campaign: str
     method: str
     points: tuple[PointResult, ...]
-    calibration_changes: FloatArray = field(repr=False)
+    calibration_changes: FloatArray
     conditions: tuple[Condition, ...] = ()
     bands: tuple[BandResult, ...] = ()
-    calibration_names: tuple[str, ...] = field(default=(), repr=False)
-    cell_stiffness: tuple[float, float] | None = field(default=None, repr=False)
+    calibration_names: tuple[str, ...] = ()
+    cell_stiffness: tuple[float, float] | None = None
 
     @property
     def systematic(self) -> FloatArray:
         """Systematic covariance over all P points, (8 P, 8 P) [N^2/m^2]; made when asked for: it grows with P^2."""
-        joint = np.asarray(self.calibration_changes.T @ self.calibration_changes / len(self.calibration_changes))
+        joint = self.calibration_changes.T @ self.calibration_changes / len(self.calibration_changes)
         for p, point in enumerate(self.points):
             # what no point shares stands with its own alone
             joint[8 * p : 8 * p + 8, 8 * p : 8 * p + 8] = point.stiffness.systematic

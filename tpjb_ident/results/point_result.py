@@ -70,25 +70,25 @@ class PointResult:
 
     point: OperatingPoint
     stiffness: DynamicStiffness
-    by_method: dict[str, DynamicStiffness] = field(repr=False)
+    by_method: dict[str, DynamicStiffness]
     static_load_measured: float
-    position: FloatArray = field(repr=False)
-    position_se: FloatArray = field(repr=False)
-    temperatures: dict[int, float] = field(repr=False)
+    position: FloatArray
+    position_se: FloatArray
+    temperatures: dict[int, float]
     n_records: int
     n_windows: int
     outlier_fraction: float
     coherence: float
     amplitude: float
     quality: tuple[Condition, ...]
-    rejected: tuple[WindowVerdict, ...] = field(repr=False)
-    runs: tuple[str, ...] = field(repr=False)
-    load_miss: ComplexArray | None = field(default=None, repr=False)
-    linearity: AmplitudeSlope = field(default_factory=AmplitudeSlope, repr=False)
+    rejected: tuple[WindowVerdict, ...]
+    runs: tuple[str, ...]
+    load_miss: ComplexArray | None = None
+    linearity: AmplitudeSlope = field(default_factory=AmplitudeSlope)
     inertia_corrected: bool = False
-    clearance: float | None = field(default=None, repr=False)
-    budget: dict[str, FloatArray] = field(default_factory=dict, repr=False)
-    scattering: tuple[str, ...] = field(default=("random", "load miss", "load direction", "mains"), repr=False)
+    clearance: float | None = None
+    budget: dict[str, FloatArray] = field(default_factory=dict)
+    scattering: tuple[str, ...] = ("random", "load miss", "load direction", "mains")
 
     def __str__(self) -> str:
         flags = f" ({', '.join(str(q) for q in self.quality)})" if self.quality else ""

@@ -19,11 +19,11 @@ from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.runs.point_data import gather
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class DryTest:
     """What a campaign's dry shaker test says."""
 
-    stiffness: RigStiffness = field(default_factory=RigStiffness, repr=False)
+    stiffness: RigStiffness = field(default_factory=RigStiffness)
     conditions: tuple[Condition, ...] = ()  #: where no run gives an answer
 
     def missing(self, omega: float) -> tuple[Condition, ...]:

@@ -8,7 +8,7 @@ that loses all of its runs is told as lost.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from rigdata.arrays import ComplexArray
 from rigdata.operating_point import OperatingPoint
@@ -24,17 +24,17 @@ from tpjb_ident.rounding import listed
 _LISTED = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RunDigest:
     """What a run says."""
 
-    phasors: RunPhasors = field(repr=False)  #: of its excitation lines alone
+    phasors: RunPhasors  #: of its excitation lines alone
     mains: ComplexArray | None  #: (2,) complex, m: displacement at the mains line, where it stands apart
     mains_force: ComplexArray | None  #: (2,) complex, N: oil force at the mains line, where it stands apart
     temperatures: dict[int, float]
     harmonics: tuple[FilmLines | None, ...] = ()
     sample_rate: float = 0.0
-    observations: tuple[Observation, ...] = field(default=(), repr=False)
+    observations: tuple[Observation, ...] = ()
 
     @property
     def run(self) -> str:

@@ -103,7 +103,7 @@ def _set_point(data: RunsOfPoint) -> complex:
 def _ratio(data: RunsOfPoint, zero: complex) -> ComplexArray:
     """Cells over set point of every run (n_runs,): size and direction; NaN without a load."""
     set_point = _set_point(data)
-    return np.asarray((_measured(data) - zero) / set_point if set_point else _measured(data) * np.nan)
+    return (_measured(data) - zero) / set_point if set_point else _measured(data) * np.nan
 
 
 def load_misses(points: Sequence[RunsOfPoint], zero: complex = 0.0) -> tuple[list[ComplexArray], complex]:

@@ -46,7 +46,7 @@ class Clock(Factor):
     def slope_columns(self, blocks: Blocks, reading: ComplexArray) -> ComplexArray:
         """-i omega times the reading, per 100 ppm."""
         turned = -1j * _UNIT * blocks.omega[:, None] * reading
-        return np.asarray(turned[:, :, None] * self.sensors)
+        return turned[:, :, None] * self.sensors
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Rates that stand clear of their errors."""
@@ -64,4 +64,4 @@ class Clock(Factor):
         )
 
     def _total(self, fitted: Fitted) -> FloatArray:
-        return np.asarray(fitted.value + self._taken_off / _UNIT)
+        return fitted.value + self._taken_off / _UNIT

@@ -103,10 +103,10 @@ class Housing(Term):
         """What every block's cells, or probes where the housing floats, let the accelerometers show, (n, 2) [m/s^2]."""
         square = (blocks.omega**2)[:, None]
         if self.rig.mount == "cells":
-            return np.asarray(-square * vector(self.rig, blocks, "force") @ _compliance(fitted.value))
+            return -square * vector(self.rig, blocks, "force") @ _compliance(fitted.value)
         kappa, compliance = _kappa(fitted.value)
         moved = vector(self.rig, blocks, "displacement") @ kappa.T
-        return np.asarray(square * (moved + film_force(self.rig, blocks) @ compliance))
+        return square * (moved + film_force(self.rig, blocks) @ compliance)
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """In the housing's own rows, which are linear in every single parameter."""

@@ -93,7 +93,7 @@ class MainsEquations:
 
     def vectors(self, x: FloatArray) -> ComplexArray:
         """Disturbance of every run in X, Y, (g, 2) [m]; `x` (8 + g m,)."""
-        return np.asarray(np.exp(1j * x[8:].reshape(len(self.D), -1)) @ self.patterns)
+        return np.exp(1j * x[8:].reshape(len(self.D), -1)) @ self.patterns
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Weighted residuals, (4 g,); `x` (8 + g m,)."""
@@ -123,7 +123,7 @@ class MainsEquations:
     def _angles(self, h: ComplexArray) -> FloatArray:
         """Angles for given H, batched: (..., 2, 2) -> (..., g, m)."""
         remaining = self.D - self.F @ np.swapaxes(np.linalg.inv(h), -1, -2)
-        return np.asarray(np.angle(remaining @ np.linalg.pinv(self.patterns)))
+        return np.angle(remaining @ np.linalg.pinv(self.patterns))
 
     def solve(self) -> list[Minimum]:
         """Distinct minima, best first.
