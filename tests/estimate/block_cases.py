@@ -8,8 +8,7 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tests.phasors.phasor_cases import complex_normal
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
-from tpjb_ident.estimate.sensors import CORNERS
+from tpjb_ident.estimate.equation import CORNERS, Blocks, Rig, Sensor
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.load_turn import PLAUSIBLE

@@ -13,7 +13,7 @@ from tests.phasors.phasor_cases import OMEGA, WINDOWS, run_phasors
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.identification.identify import assemble
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.runs.finished_runs import ExcludedRun, FinishedRuns, digest
+from tpjb_ident.runs.point_data import ExcludedRun, FinishedRuns, digest
 
 LOADS = (3000.0, 8000.0)
 CHANNELS = [

@@ -13,8 +13,8 @@ from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandRig, band_plans
 from tests.seeds import first_quick, seeds
 from tpjb_ident.conditions import untrusted
-from tpjb_ident.estimate.sensors import found_mount
-from tpjb_ident.identification.clocks import with_found_devices
+from tpjb_ident.estimate.equation import found_mount
+from tpjb_ident.identification.campaign_solution import with_found_devices
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.terms.registry import learnt_rig
 

@@ -11,11 +11,10 @@ from tests.rigs.held_run import HeldReader, channels, columns, lines_in_noise, r
 from tpjb_ident.estimate.solve import Solver
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.frequency import speeds_from_runout
-from tpjb_ident.phasors.lines import known_lines
-from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.phasors.windows import RecordTooShortError
+from tpjb_ident.phasors.lines import RecordTooShortError, known_lines
+from tpjb_ident.phasors.run_data import PhasorSettings
+from tpjb_ident.phasors.run_phasors import extract, run_phasors
 
 
 def stiffness(point):

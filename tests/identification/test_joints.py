@@ -13,7 +13,7 @@ from tests.phasors.phasor_cases import place as at
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimators.estimate import instrumental_fit
 from tpjb_ident.estimators.r_matrix import phasor_table
-from tpjb_ident.phasors.shaft import FIRST_LOOK, MAX_DEPARTURE, shaft_speed
+from tpjb_ident.phasors.frequency import FIRST_LOOK, MAX_DEPARTURE, shaft_speed
 from tpjb_ident.runs.point_data import finite_mean, group, point_data
 
 NORMAL = 1.959963984540054  # of 95 %

@@ -12,14 +12,13 @@ from rigdata.problem import RigDataError
 from rigdata.run import Run
 from tests.rigs import held_run
 from tests.rigs.held_run import HeldReader, channels, columns
-from tpjb_ident.phasors import extraction
+from tpjb_ident.phasors import run_phasors
 from tpjb_ident.phasors.compensation import compensated
-from tpjb_ident.phasors.extraction import MAX_JITTER, extract
+from tpjb_ident.phasors.frequency import ShaftCourse
 from tpjb_ident.phasors.line_fit import LineFitter
-from tpjb_ident.phasors.lines import known_lines
+from tpjb_ident.phasors.lines import WindowSettings, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings
-from tpjb_ident.phasors.shaft import ShaftCourse
-from tpjb_ident.phasors.windows import WindowSettings
+from tpjb_ident.phasors.run_phasors import MAX_JITTER, extract
 
 RATE = 1000.0
 #: No whole number of cycles in a second, so that a wrong origin of time shows.
@@ -102,7 +101,7 @@ def exact(result, quantity="displacement", but=(), tolerance=1e-9):
 
 @pytest.mark.parametrize("chunk", [1, 400, 1000, 2**15])
 def test_windows_are_the_same_in_chunks_of_any_length(monkeypatch, chunk):
-    monkeypatch.setattr(extraction, "CHUNK", chunk)
+    monkeypatch.setattr(run_phasors, "CHUNK", chunk)
     found = taken(held())
     exact(found)
     exact(found, "force")
@@ -184,7 +183,7 @@ def test_following_keeps_to_windows_of_their_own_clock():
 def test_a_long_disturbance_is_told_by_the_other_windows(monkeypatch):
     """A fifth of one window moves by itself, at the excitation's own frequency: with chunks of one window too."""
     for chunk in (400, 2**15):
-        monkeypatch.setattr(extraction, "CHUNK", chunk)
+        monkeypatch.setattr(run_phasors, "CHUNK", chunk)
         run = held()
         probes_in_memory = [run.reader.data[name] for name in ("DX", "DY")]
         noise = 2e-8 * np.random.default_rng(3).standard_normal((4000, 2)).T

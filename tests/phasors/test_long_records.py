@@ -8,12 +8,10 @@ import pytest
 from rigdata.campaign import load_campaign
 from tests.identification.test_identify import rig
 from tests.rigs.held_run import POINT, held_run
-from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.line_fit import BLOCK, LineFitter, even_design
-from tpjb_ident.phasors.lines import known_lines
-from tpjb_ident.phasors.reading_cache import SHORT
-from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.phasors.windows import WindowSettings, line_design
+from tpjb_ident.phasors.lines import WindowSettings, known_lines, line_design
+from tpjb_ident.phasors.run_data import SHORT, PhasorSettings
+from tpjb_ident.phasors.run_phasors import extract, run_phasors
 
 FREQUENCIES = np.array([25.0, 22.0, 44.0, 50.0])
 

@@ -9,15 +9,16 @@ from rigdata.problem import RigDataError
 from tests.seeds import seeds
 from tpjb_ident.phasors import line_fit, run_phasors
 from tpjb_ident.phasors.line_fit import LineFitter
-from tpjb_ident.phasors.lines import LineSettings, known_lines
-from tpjb_ident.phasors.run_data import PhasorSettings
-from tpjb_ident.phasors.windows import (
+from tpjb_ident.phasors.lines import (
+    LineSettings,
     RecordTooShortError,
     WindowSettings,
+    known_lines,
     plan_windows,
     shortest_window,
     variance_inflation,
 )
+from tpjb_ident.phasors.run_data import PhasorSettings
 
 RATE = 1000.0
 TRUE = {25.0: (3.0 - 1.0j, 0.5 + 2.0j), 22.0: (1.0j, 2.0), 44.0: (0.3, 0.1j), 50.0: (0.2 + 0.2j, -0.1)}

@@ -11,7 +11,7 @@ from tests.phasors import phasor_cases
 from tests.phasors.phasor_cases import H
 from tpjb_ident.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.identification.point import disagreement
-from tpjb_ident.results.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
+from tpjb_ident.results.point_result import amplitude, coherence, directional_pattern, flags, rejected_windows
 from tpjb_ident.runs.point_data import PointData
 
 

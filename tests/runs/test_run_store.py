@@ -19,10 +19,10 @@ from tests.command_line import ended
 from tests.good_campaigns import directions, written
 from tests.identification.test_identify import rig
 from tpjb_ident.cli.commands.identify import KEPT
-from tpjb_ident.phasors.run_phasors import PhasorSettings
+from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs import run_jobs
+from tpjb_ident.runs.run_jobs import RunStore, fingerprint
 from tpjb_ident.runs.run_jobs import all_runs as gathered_runs
-from tpjb_ident.runs.run_store import RunStore, fingerprint
 from tpjb_ident.runtime.executors import local_workers
 
 TABLES = ("coefficients", "estimators", "windows", "frequency_fits", "budget")

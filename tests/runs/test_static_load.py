@@ -10,7 +10,7 @@ from rigdata import load_campaign
 from rigdata.problem import RigDataError
 from tests.phasors.phasor_cases import place
 from tests.rigs import closed_form as cf
-from tpjb_ident.estimate.blocks import Sensor
+from tpjb_ident.estimate.equation import Sensor
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs.baseline import dry_test

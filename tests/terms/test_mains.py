@@ -9,9 +9,9 @@ import pytest
 
 from tests.phasors.phasor_cases import FILM_H as H
 from tests.phasors.phasor_cases import complex_normal
-from tpjb_ident.estimate.shape import complex_matrix
-from tpjb_ident.phasors.line_means import mains_lines
+from tpjb_ident.estimate.arrowhead import complex_matrix
 from tpjb_ident.phasors.lines import LineSettings, known_lines
+from tpjb_ident.phasors.run_data import mains_lines
 from tpjb_ident.terms import mains
 from tpjb_ident.terms.mains import (
     _LOCKED,

@@ -22,7 +22,7 @@ from scipy.signal import fftconvolve
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.bands.run_spectra import RunSpectra
-from tpjb_ident.estimate.shape import MODELS, power_columns
+from tpjb_ident.estimate.arrowhead import MODELS, power_columns
 from tpjb_ident.estimate.term import ALLOWED_CHANGE, CHANGE_BY_ORBIT
 
 #: Undriven lines that tell, at least, and how much of what falls on driven lines must fall on them.
@@ -118,7 +118,7 @@ def _curvature(sums: FloatArray, power: FloatArray, noise: FloatArray) -> tuple[
     `noise` (n,): of the powers, which are besides as uncertain as they are large.
     """
     size = np.maximum(sums.max(axis=0), np.finfo(float).tiny)
-    unit = max(float(np.abs(power).max()), 1e-300)
+    unit = max(np.abs(power).max(), 1e-300)
     fitted = np.full(len(power), unit)
     for _ in range(_ROUNDS):
         expected = np.maximum((fitted + noise) / unit, 1e-3)

@@ -13,9 +13,8 @@ from tpjb_ident.arguments import as_campaign
 from tpjb_ident.check.findings import is_shared, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.check.response import check_film, point_runs
 from tpjb_ident.check.rig_fit import rig_fit
-from tpjb_ident.check.run_gain import check_agreement, check_positions, check_shaft_lines
+from tpjb_ident.check.run_gain import check_agreement, check_film, check_positions, check_shaft_lines, point_runs
 from tpjb_ident.check.set_points import check_excitation, check_rotation, check_speed, check_static_loads
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
 from tpjb_ident.conditions import SEVERITIES, Condition

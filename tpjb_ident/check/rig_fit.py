@@ -11,13 +11,22 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
-from tpjb_ident.check.findings import far
+from tpjb_ident.check.findings import explanation, far, repairs
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.wiring import explanation, repairs
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, film_force, stacked, vector
+from tpjb_ident.estimate.arrowhead import free_force
+from tpjb_ident.estimate.equation import (
+    Blocks,
+    Rig,
+    Sensor,
+    alive,
+    axes_of,
+    campaign_rig,
+    film_force,
+    sensors_of,
+    stacked,
+    vector,
+)
 from tpjb_ident.estimate.scatter import Scatter
-from tpjb_ident.estimate.sensors import alive, axes_of, campaign_rig, sensors_of
-from tpjb_ident.estimate.shape import free_force
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.terms.axis import Axis
 from tpjb_ident.terms.corner import Corner

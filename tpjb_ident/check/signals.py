@@ -98,6 +98,6 @@ def check_clock(report: Reporter, time: FloatArray) -> None:
     if len(usual) < len(steps) / 2:
         return
     scatter, resolution = float(np.std(usual)), float(np.min(steps[steps > 0], initial=1.0))
-    is_rounded = resolution > 0.3 and float(np.max(np.abs(usual - 1))) <= resolution
+    is_rounded = resolution > 0.3 and np.max(np.abs(usual - 1)) <= resolution
     cause = "the time column is rounded" if is_rounded else "the clock jitters"
     report.ask("jitter", min(scatter, 0.2) if is_rounded else scatter, cause=cause, scatter=scatter)

@@ -9,9 +9,8 @@ import numpy as np
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.vector import directions
-from tpjb_ident.check.findings import far
+from tpjb_ident.check.findings import explanation, far, indefiniteness, plane_of, pointing, repairs
 from tpjb_ident.check.observation import NO_NOISE, Observation
-from tpjb_ident.check.wiring import explanation, indefiniteness, plane_of, pointing, repairs
 from tpjb_ident.clearance.sweep import sweep_samples
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.slow_samples import live_run

@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter1d
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.vector import directions
-from tpjb_ident.phasors.bad_samples import robust_deviation, white_noise
+from tpjb_ident.phasors.line_fit import robust_deviation, white_noise
 from tpjb_ident.phasors.slow_samples import (
     REMEDY,
     contradictions,

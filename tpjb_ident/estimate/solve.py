@@ -6,31 +6,79 @@ pulling H towards zero: there is no separate step of errors in variables.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.arrowhead import NUMBERS, Step, Sums, are_told, step
-from tpjb_ident.estimate.blocks import Blocks, Rig, totals, vector
+from tpjb_ident.estimate.arrowhead import NUMBERS, Prior, Shape, Step, Sums, are_told, step
 from tpjb_ident.estimate.equation import (
     HOUSING_ROWS,
     UNKNOWNS,
+    Blocks,
+    Rig,
     State,
     film_columns,
     film_force_rows,
     motion_matrix,
+    totals,
+    vector,
     with_factor,
 )
-from tpjb_ident.estimate.force_scatter import PHASES, AlongForce, ForceScatter
-from tpjb_ident.estimate.load_slope import slopes_over_load
-from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns
-from tpjb_ident.estimate.parameters import Table
-from tpjb_ident.estimate.scatter import Residuals, Scatter, mixed_dof
-from tpjb_ident.estimate.shape import Shape
+from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns, slopes_over_load
+from tpjb_ident.estimate.scatter import PHASES, AlongForce, ForceScatter, Residuals, Scatter, mixed_dof
 from tpjb_ident.estimate.term import Additive, FilmTerm, Fitted, Term
+
+#: Standard deviation that a parameter has at least, in its unit.
+_LEAST = 1e-9
+
+
+class Table:
+    """Parameters of some terms; where a row has none of a term, its place stays as it is.
+
+    `row` (P,): row of every point, None where all points share one. What another solve made of terms (`held`, by
+    name) stays as it is, with its error.
+    """
+
+    def __init__(
+        self, terms: Sequence[Term], rows: int, row: IntArray | None = None, held: Mapping[str, Fitted] | None = None
+    ) -> None:
+        self.terms, self._shared = list(terms), row is None
+        ends = np.cumsum([0] + [term.width for term in terms]).tolist()
+        self.mean, deviation = np.zeros((rows, ends[-1])), np.ones((rows, ends[-1]))
+        self.always, self.never = np.zeros((2, rows, ends[-1]), dtype=bool)
+        self._place: dict[str, tuple[IntArray, slice]] = {}
+        for term, first, last in zip(terms, ends, ends[1:]):
+            mine = np.zeros(1, dtype=np.intp) if row is None else row[list(term.points)]
+            assert len(np.unique(mine)) == len(mine), f"{term.name}: points of one group have nothing of their own"
+            place = self._place[term.name] = (mine, slice(first, last))
+            known = (held or {}).get(term.name)
+            mean = [p.mean for p in term.parameters] if known is None else known.value
+            spread = [p.deviation for p in term.parameters] if known is None else known.deviation
+            self.mean[place] = np.reshape(mean, (-1, term.width))
+            deviation[place] = np.maximum(np.reshape(spread, (-1, term.width)), _LEAST)
+            self.always[place] = term.always_estimated and known is None
+            self.never[place] = term.never_estimated or known is not None
+        self.precision = 1 / deviation**2
+        self.value = self.mean.copy()
+
+    def of(self, term: Term, values: FloatArray | BoolArray) -> FloatArray:
+        """A term's part of values (rows, columns), in the order of its parameters."""
+        return np.asarray(values[self._place[term.name]].ravel())
+
+    def chosen(self, term: Term) -> BoolArray:
+        """Places of a term's parameters, (rows, columns)."""
+        mask = np.zeros(self.mean.shape, dtype=bool)
+        mask[self._place[term.name]] = True
+        return mask
+
+    def prior(self) -> Prior:
+        """What is known beforehand, as far as the values are from their means; without rows where all share one."""
+        parts = (self.mean - self.value, self.precision, self.always, self.never)
+        return Prior(*(part[0] for part in parts)) if self._shared else Prior(*parts)
+
 
 #: Steps of Gauss-Newton, at most, and the relative change of H at which it ends.
 _STEPS, _CONVERGED = 18, 1e-9

@@ -14,8 +14,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
-from tpjb_ident.estimate.equation import HOUSING_ROWS, State, film_change_rows
+from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, Sensor, State, film_change_rows
 
 if TYPE_CHECKING:
     from tpjb_ident.estimate.solve import Solution

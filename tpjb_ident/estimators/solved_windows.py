@@ -12,10 +12,10 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked
+from tpjb_ident.estimate.arrowhead import Shape
+from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, stacked
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.scatter import Scatter
-from tpjb_ident.estimate.shape import Shape
 from tpjb_ident.estimate.solve import Solver
 from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation, window_means
 from tpjb_ident.estimators.r_matrix import PhasorTable, TableFit

@@ -17,13 +17,12 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
 from tpjb_ident.bands.run_spectra import is_broadband
-from tpjb_ident.estimate.shape import real_numbers
+from tpjb_ident.estimate.arrowhead import real_numbers
+from tpjb_ident.estimators.estimate import RlmSettings, rlm_fit
 from tpjb_ident.estimators.r_matrix import r_matrix
-from tpjb_ident.estimators.rlm import RlmSettings, rlm_fit
-from tpjb_ident.phasors.extraction import extract
-from tpjb_ident.phasors.lines import Line, LineSet
+from tpjb_ident.phasors.lines import Line, LineSet, WindowSettings
 from tpjb_ident.phasors.run_data import PhasorSettings
-from tpjb_ident.phasors.windows import WindowSettings
+from tpjb_ident.phasors.run_phasors import extract
 from tpjb_ident.results.point_result import quality_cell
 from tpjb_ident.runs.point_data import PointData, gather
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY

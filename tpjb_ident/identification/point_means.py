@@ -9,13 +9,12 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Sensor
-from tpjb_ident.estimate.sensors import alive
+from tpjb_ident.estimate.equation import Sensor, alive
 from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation, motion_in, window_means
-from tpjb_ident.estimators.mm import mm_fit, within_directions
+from tpjb_ident.estimators.least_trimmed import mm_fit, within_directions
 from tpjb_ident.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
+from tpjb_ident.phasors.frequency import shaft_order
 from tpjb_ident.phasors.run_data import Directed
-from tpjb_ident.phasors.shaft import shaft_order
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 
@@ -128,11 +127,13 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
     described: list[dict[int, Channel]] = []
     for g, (run, line) in enumerate(zip(data.runs, data.lines)):
         table = {(channel.name, channel.quantity): k for k, channel in enumerate(run.channels)}
-        least = _LEAST_WINDOWS * float(np.isfinite(run.z[:, line]).mean(axis=0).max(initial=0.0))
+        least = _LEAST_WINDOWS * np.isfinite(run.z[:, line]).mean(axis=0).max(initial=0.0)
         described.append({})
         for j, sensor in enumerate(task.channels):
             k = table.get((sensor.name, sensor.quantity))
-            if k is not None and _usual(run.z[:, line, k], least):
+            finite = [] if k is None else run.z[np.isfinite(run.z[:, line, k]), line, k]
+            # phasors in more than a share of the windows, and not zeros throughout
+            if k is not None and len(finite) > least * len(run.z) and np.any(finite):
                 channel = described[g][j] = run.channels[k]
                 gain = warm_gain(channel, task.temperatures.get(run.run, np.nan))
                 z[data.run_index == g, j] = run.z[:, line, k] / gain
@@ -143,12 +144,6 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
         shown = np.isfinite(z[data.run_index == g]).any(axis=0)
         living.append(tuple(channels.get(j) if is_shown else None for j, is_shown in enumerate(shown)))
     return z * _clock_turns(data, task), tuple(living)
-
-
-def _usual(values: ComplexArray, least: float) -> bool:
-    """Whether a channel has phasors in more than a share `least` of a run's windows, and not zeros throughout."""
-    finite = np.isfinite(values)
-    return bool(finite.mean() > least and np.abs(values[finite]).max(initial=0.0) > 0)
 
 
 def warm_gain(channel: Channel, temperature: float) -> float:

@@ -18,10 +18,9 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import holding, merged
-from tpjb_ident.phasors.channel_times import device_readers
-from tpjb_ident.phasors.found_lines import vertex
 from tpjb_ident.phasors.lines import SPEED_DRIFT
-from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_data import RunPhasors, device_readers
+from tpjb_ident.phasors.whole_record import vertex
 
 #: Seconds from the start that are looked at, and powers of two of samples, at least and at most.
 _LOOK, _LEAST_POWER, _MOST_POWER = 2.0, 13, 15

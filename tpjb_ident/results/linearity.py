@@ -20,7 +20,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.term import ALLOWED_CHANGE, CHANGE_BY_ORBIT, worth_stating
 from tpjb_ident.estimators.stiffness import DynamicStiffness
-from tpjb_ident.phasors.line_means import FilmLines
+from tpjb_ident.phasors.run_data import FilmLines
 from tpjb_ident.runs.point_data import PointData
 
 #: Runs of one direction must differ in amplitude by this factor to tell anything.
@@ -64,8 +64,8 @@ def amplitude_slope(data: PointData, h: ComplexArray, weights: FloatArray) -> Am
             D, F = (np.average(z[places], axis=0, weights=weights[places]) for z in (data.D, data.F))
             fitted = h @ D
             excess = float((fitted.conj() @ (F - fitted)).real / np.linalg.norm(fitted) ** 2)
-            angle = round(float(np.degrees(run.direction)) % 180.0, 1)
-            groups.setdefault(angle, []).append((np.log2(float(np.linalg.norm(D))), excess))
+            angle = round(np.degrees(run.direction) % 180.0, 1)
+            groups.setdefault(angle, []).append((np.log2(np.linalg.norm(D)), excess))
     # Differences within a direction only: what a direction as a whole is off by is no amplitude effect.
     centred = [np.array(g) - np.mean(g, axis=0) for g in groups.values()]
     centred = [g for g in centred if np.ptp(g[:, 0]) > np.log2(MIN_RATIO)]
@@ -111,7 +111,7 @@ def _size(runs: Sequence[FilmLines], name: str, h: ComplexArray) -> FloatArray:
         if line is None or not np.isfinite(line.force).all():
             continue
         stiffness = h.real + 1j * line.ratio * h.imag
-        noise = line.force_noise + float(np.linalg.norm(stiffness, 2)) ** 2 * line.displacement_noise
+        noise = line.force_noise + np.linalg.norm(stiffness, 2) ** 2 * line.displacement_noise
         excess = float(np.sum(np.abs(line.force - stiffness @ line.displacement) ** 2))
         squares.append((excess - noise) / run.force**2)
         noises.append(noise / run.force**2)
@@ -133,8 +133,8 @@ def change_conditions(
     """
     uncertain = change.share
     if "amplitude" in budget:  # runs of several amplitudes may have told it
-        size = float(np.linalg.norm(est.h)) / np.sqrt(2)
-        uncertain = min(float(1.96 * np.sqrt(np.diag(budget["amplitude"]).max()) / size), uncertain)
+        size = np.linalg.norm(est.h) / np.sqrt(2)
+        uncertain = min((1.96 * np.sqrt(np.diag(budget["amplitude"]).max()) / size), uncertain)
     if uncertain > _REFUSED:
         text = "by what the film makes of the motion at multiples of its frequency, the coefficients may be off by"
         return (Condition("film-not-linear", f"{text} {100 * uncertain:.0f} %. Excite less"),)

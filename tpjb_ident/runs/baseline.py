@@ -12,10 +12,11 @@ from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.blocks import RigStiffness
+from tpjb_ident.estimate.equation import RigStiffness
 from tpjb_ident.estimators.estimate import estimate_table
 from tpjb_ident.estimators.r_matrix import phasor_table
-from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
+from tpjb_ident.phasors.run_data import PhasorSettings
+from tpjb_ident.phasors.run_phasors import run_phasors
 from tpjb_ident.runs.point_data import gather
 
 

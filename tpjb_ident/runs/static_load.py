@@ -22,7 +22,7 @@ from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
 from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.blocks import Sensor
+from tpjb_ident.estimate.equation import Sensor
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.runs.point_data import RunsOfPoint
@@ -129,7 +129,7 @@ def _common_ratio(ratios: ComplexArray) -> complex:
     middles = ratios[:: 1 + len(ratios) // _MIDDLES]
     reach = np.sort(np.abs(middles[:, None] - ratios), axis=1)[:, half]
     # groups of runs that each agree among themselves are as good as one another
-    alike = np.flatnonzero(reach <= max(2 * float(reach.min()), _ONE_HALF))
+    alike = np.flatnonzero(reach <= max(2 * reach.min(), _ONE_HALF))
     place = alike[np.argmin(np.abs(middles[alike] - 1))]
     return complex(ratios[np.abs(ratios - middles[place]) <= 4 * reach[place] + 1e-12].mean())
 
@@ -180,7 +180,7 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, uncertainty: float 
     size = np.abs(x)
     design, shares = np.stack([x, np.ones_like(x)], axis=1) / size[:, None], y / size
     values, weights, _, _ = reweighted(design, shares, lambda u: huber_weight(u, _BEND), most=_ROUNDS)
-    spread = float(np.sum(weights * np.abs(shares - design @ values) ** 2) / max(float(weights.sum()) - 2.0, 1.0))
+    spread = float(np.sum(weights * np.abs(shares - design @ values) ** 2) / max(weights.sum() - 2.0, 1.0))
     covariance = np.linalg.inv((design * weights[:, None]).conj().T @ design).real * spread
     zero, error = complex(values[1]), float(np.sqrt(covariance[1, 1]))
     is_clear = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()

@@ -9,10 +9,8 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.arrowhead import NUMBERS
-from tpjb_ident.estimate.blocks import Blocks, Rig, totals
-from tpjb_ident.estimate.equation import State, entry_changes, entry_sizes
-from tpjb_ident.estimate.shape import real_numbers
+from tpjb_ident.estimate.arrowhead import NUMBERS, real_numbers
+from tpjb_ident.estimate.equation import Blocks, Rig, State, entry_changes, entry_sizes, totals
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION, FilmTerm, Fitted, numbered
 
 #: Name of the condition where the runs tell G.

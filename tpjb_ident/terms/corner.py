@@ -12,8 +12,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
-from tpjb_ident.estimate.equation import State
+from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, State
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter
 
 #: Standard errors from which a corner is negative.

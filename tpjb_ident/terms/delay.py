@@ -8,7 +8,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, exceeding
 
 _MILLISECOND = 1e-3

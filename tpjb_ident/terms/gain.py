@@ -4,7 +4,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
+from tpjb_ident.estimate.equation import Blocks, Rig, Sensor
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
 
 #: Difference of gains beyond any calibration: an axis, a sign or a cable is wrong.

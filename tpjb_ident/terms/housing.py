@@ -12,8 +12,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, film_force, vector
-from tpjb_ident.estimate.equation import State, housing_rows
+from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, State, film_force, housing_rows, vector
 from tpjb_ident.estimate.term import OUT_OF_STEP, Fitted, Parameter, Term
 
 _NANOMETRE = 1e-9
@@ -223,7 +222,7 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
             low += [support] if 4 * place <= len(usable) else []
             left += float(np.linalg.norm(shown - pushes @ support)) ** 2 * len(pushes) / (len(pushes) - 3)
             judged += float(np.linalg.norm(shown)) ** 2
-    if supports < 2 or not judged > 0.5 * float(np.linalg.norm(np.nan_to_num(acceleration))) ** 2:
+    if supports < 2 or not judged > 0.5 * np.linalg.norm(np.nan_to_num(acceleration)) ** 2:
         return not (blocks.windows > 1).any()
     if not left < _LEFT**2 * judged:
         return False

@@ -15,7 +15,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.shape import complex_matrix, real_numbers
+from tpjb_ident.estimate.arrowhead import complex_matrix, real_numbers
 
 MAINS_ON_LINE = "mains on excitation line"
 MAINS_CORRECTED = "mains corrected"
@@ -139,7 +139,7 @@ class MainsEquations:
             if fit.status <= 0 or any(np.abs(fit.x[:8] - m.x[:8]).max() < 1e-5 for m in minima):
                 continue
             normal = fit.jac.T @ fit.jac
-            log_volume = -0.5 * float(np.linalg.slogdet(normal)[1])
+            log_volume = -0.5 * np.linalg.slogdet(normal)[1]
             if not np.isfinite(log_volume):
                 continue  # a valley without a floor: these runs leave H open there
             covariance = np.linalg.pinv(normal)[:8, :8] * self.scale**2

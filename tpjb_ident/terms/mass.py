@@ -10,10 +10,8 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.arrowhead import NUMBERS
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State
-from tpjb_ident.estimate.shape import MODELS, power_columns, real_numbers, remainder
+from tpjb_ident.estimate.arrowhead import MODELS, NUMBERS, power_columns, real_numbers, remainder
+from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION, Additive, Fitted, Parameter
 

@@ -7,8 +7,7 @@ drive stands otherwise against the shaft tell it from the motion.
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State
+from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.term import Additive, Parameter
 
 #: Name of the condition where it was told apart.

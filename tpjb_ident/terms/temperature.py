@@ -4,7 +4,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
 
 #: Parts in a thousand per kelvin, the unit of a coefficient in the solve.

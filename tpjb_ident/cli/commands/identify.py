@@ -23,8 +23,8 @@ from tpjb_ident.runtime.executors import cores, forks
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
-    from tpjb_ident.phasors.run_phasors import PhasorSettings
-    from tpjb_ident.runs.run_store import RunStore
+    from tpjb_ident.phasors.run_data import PhasorSettings
+    from tpjb_ident.runs.run_jobs import RunStore
 
 #: Records [bytes] above which several processes are quicker than one though each has to import everything, runs above
 #: which copies of this one are, and how many copies.
@@ -94,7 +94,7 @@ def _finished_runs(target: Path) -> Iterator[RunStore]:
     Results come into the folder whole or not at all; what is stored for a rerun is apart from them, in a folder of
     its own, and goes when the command ends, well or with an error.
     """
-    from tpjb_ident.runs.run_store import RunStore
+    from tpjb_ident.runs.run_jobs import RunStore
 
     store = RunStore(target / KEPT)
     try:

@@ -39,9 +39,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.compare.comparison import Comparison
-    from tpjb_ident.results.band_result import BandResult
     from tpjb_ident.results.frequency_model import FrequencyModel
-    from tpjb_ident.results.identification import Identification
+    from tpjb_ident.results.identification import BandResult, Identification
 
 #: Intervals of a smaller share [%] are hidden by their marks: then differences get a panel of their own.
 _SMALL = 5.0
@@ -235,7 +234,7 @@ def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
 def _frf_rows(source: Any) -> tuple[pd.DataFrame | None, FrequencyModel | None]:
     """Rows as in ``frf.csv`` (without coherence where sines were run), and the model through them."""
     if hasattr(source, "supported"):  # one band
-        from tpjb_ident.results.band_result import frf_frame
+        from tpjb_ident.results.identification import frf_frame
 
         return frf_frame([source]), source.models.get(source.supported)
     table = as_table(source)
