@@ -42,7 +42,7 @@ def test_without_accelerometers_the_static_load_tells_it(ratio, mount):
 
 
 def devices(sensors):
-    return {sensor.quantity: sensor.device for sensor in sensors}
+    return {sensor.quantity: sensor.clock for sensor in sensors}
 
 
 @pytest.mark.parametrize("ppm", [100.0, -300.0])
@@ -77,7 +77,7 @@ def test_a_beat_of_one_device_is_no_clock(seed):
 
 
 def test_stated_clocks_are_as_stated():
-    rig, blocks, _ = made(replace(CASE, rates={"force": 1e-4}, stated={"displacement": {"device": "a"}}))
+    rig, blocks, _ = made(replace(CASE, rates={"force": 1e-4}, stated={"displacement": {"clock": "a"}}))
     assert with_found_devices(rig.sensors, blocks, START) == (rig.sensors, {})
 
 

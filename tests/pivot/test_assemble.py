@@ -11,7 +11,8 @@ import pytest
 from rigdata.problem import RigDataError
 from rigdata.record import VectorRecord
 from tpjb_ident.conditions import sentences
-from tpjb_ident.phasors.slow_samples import NoiseModel, live_run
+from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.blocks import Blocks, Hold, LoadCourse
 from tpjb_ident.pivot.dry_record import (
     FRICTION_SE,

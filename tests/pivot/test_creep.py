@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.pivot.test_assemble import LEVELS, record
-from tpjb_ident.phasors.slow_samples import NoiseModel
+from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.blocks import Blocks, Hold
 from tpjb_ident.pivot.creep import without_creep
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from tpjb_ident.phasors.slow_samples import DRIFT_OVER_FLICKER, NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
+from tpjb_ident.phasors.slow_noise import DRIFT_OVER_FLICKER, NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 from tpjb_ident.pivot.blocks import Blocks
 from tpjb_ident.pivot.dry_record import pooled_noise
 from tpjb_ident.pivot.pickup import PickupSignature, _mismatch, measure_pickup, mistake

@@ -20,7 +20,7 @@ from rigdata.record import VectorRecord
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.clearance.polygon import corners
-from tpjb_ident.phasors.slow_samples import NoiseModel
+from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
 from tpjb_ident.pivot.dry_record import PadDirection
 from tpjb_ident.pivot.law_fit import LawFit

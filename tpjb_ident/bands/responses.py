@@ -87,18 +87,13 @@ def _sources(run: RunSpectra, instrument: str) -> tuple[ComplexArray, ComplexArr
     assert run.by_time is not None
     parts = run, run.by_time
     if instrument == "command":
-        along = _driven(run)
-        first, by_time = (part.command[0] @ along for part in parts if part.command is not None)
+        commands = [part.command[0] for part in parts if part.command is not None]
+        # in directions in which the command acts: what rests would be noise alone
+        power, along = np.linalg.eigh((commands[0].T @ commands[0].conj()).real)
+        first, by_time = (command @ along[:, power > _AT_REST * power[-1]] for command in commands)
     else:
         first, by_time = (part.D[0] for part in parts)
     return first, by_time
-
-
-def _driven(run: RunSpectra) -> FloatArray:
-    """Directions (2, k) in which the command acts: what rests would be noise alone."""
-    assert run.command is not None
-    power, along = np.linalg.eigh((run.command[0].T @ run.command[0].conj()).real)
-    return along[:, power > _AT_REST * power[-1]]
 
 
 def one_phase_set(runs: Sequence[RunSpectra]) -> bool:
@@ -174,7 +169,11 @@ class ClassicLine:
 
 def classic_line(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> ClassicLine:
     """H1, H2, Hv and coherence over all rows of a line: periods, or bins."""
-    rows, used = _rows(spectra, bins, ends)
+    rows = np.concatenate([np.concatenate([s.D[:, bins], s.F[:, bins]], axis=2).reshape(-1, 4) for s in spectra])
+    used = 0  # columns that slope and leakage take
+    if spectra[0].period is None:
+        basis = np.linalg.qr(nuisance(spectra, bins, rows[:, :2], ends))[0]
+        rows, used = orthogonal(rows, basis), basis.shape[1]
     S, n, freedom = rows.T @ rows.conj(), len(rows), len(rows) - used - 2
     size = np.sqrt(np.diag(S).real)
     if freedom < 1 or not (size > 0).all() or not np.linalg.cond(S[:2, :2] / np.outer(size, size)[:2, :2]) < _ONE_LINE:
@@ -184,15 +183,6 @@ def classic_line(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> C
     noise = (freedom + 2) / freedom * np.diag(S[2:, 2:] - h1 @ S[:2, 2:]).real
     h = {"h1": h1, "h2": h2, "hv": signal[2:] @ np.linalg.inv(signal[:2])}
     return ClassicLine(h, np.clip(1 - noise / size[2:] ** 2, 0.0, 1.0), n)
-
-
-def _rows(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[ComplexArray, int]:
-    """Displacement and force of all runs' rows (n, 4) without slope and leakage, and how many columns that took."""
-    rows = np.concatenate([np.concatenate([s.D[:, bins], s.F[:, bins]], axis=2).reshape(-1, 4) for s in spectra])
-    if spectra[0].period is not None:
-        return rows, 0
-    basis = np.linalg.qr(nuisance(spectra, bins, rows[:, :2], ends))[0]
-    return orthogonal(rows, basis), basis.shape[1]
 
 
 #: Lines over a band where a record resolves more, and bins that a line takes at least.

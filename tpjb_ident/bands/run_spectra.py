@@ -356,7 +356,7 @@ def _bins(rows: FloatArray, length: int, places: IntArray) -> ComplexArray:
     """Phasors (n_windows, n_bins, m) of rows (m, n) in stretches of `length` samples."""
     folded = rows.reshape(len(rows), -1, length)
     spectra = np.fft.rfft(folded, axis=2)[:, :, places] * (2.0 / length)
-    return np.asarray(spectra.transpose(1, 2, 0))
+    return spectra.transpose(1, 2, 0)
 
 
 def _phasors(run: Run, samples: Samples, z: ComplexArray, places: IntArray, mean: FloatArray) -> RunPhasors:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.signal import zoom_fft
 
 from rigdata.arrays import BoolArray, FloatArray
-from rigdata.calibration import Channel
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
 from rigdata.vector import directions, inverse_directions
@@ -25,7 +25,7 @@ from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.phasors.line_fit import BAD_LIMIT, even_design, robust_deviation
 from tpjb_ident.phasors.lines import HIGHEST, MAINS_DRIFT, SPEED_DRIFT, Line, LineSettings, strong_lines
-from tpjb_ident.phasors.run_data import QUANTITIES, Directed, device_readers
+from tpjb_ident.phasors.run_data import Directed, device_readers
 from tpjb_ident.phasors.whole_record import vertex
 
 #: Share of a channel's samples that may be missing in stretches, bridged by straight lines,
@@ -93,7 +93,9 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
     rate = run.sample_rate
     n = min(run.length, round(seconds * rate))
     recorded = _on_first_grid(run, n, highest)
-    inside = np.all([_has_neighbours(values, at) for _, values, at in recorded], axis=0)
+    inside = np.ones(n, dtype=bool)
+    for _, values, at in recorded:  # as far as the kernel reaches; of its own times every one
+        inside &= _is_own(values, at) | (at >= _TAPS) & (at <= len(values) - 1 - _TAPS)
     channels, rows, lost, command = [], [], 0.0, np.zeros((2, n))
     single = len(run.of("command")) == 1
     for channel, values, at in recorded:
@@ -131,7 +133,7 @@ def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, Floa
             _refuse_unlike(run, reader.channels[0].name, reader.rate, highest)
         at = places if is_alike else (places / run.sample_rate + begins[0] - begins[-1]) * reader.rate
         recorded += [(channel, values, at) for channel, values in zip(reader.channels, rows)]
-    return sorted(recorded, key=lambda record: (*QUANTITIES, "command").index(record[0].quantity))
+    return sorted(recorded, key=lambda record: (*VECTOR_QUANTITIES, "command").index(record[0].quantity))
 
 
 def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
@@ -145,11 +147,6 @@ def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
         raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
     return float(np.median(off)) / rate
-
-
-def _has_neighbours(values: FloatArray, at: FloatArray) -> BoolArray:
-    """Which places (n,) have readings on either side, as far as the kernel reaches; of its own times every one."""
-    return _is_own(values, at) | (at >= _TAPS) & (at <= len(values) - 1 - _TAPS)
 
 
 def _is_own(values: FloatArray, at: FloatArray) -> bool:
@@ -301,7 +298,7 @@ def _without_periodic(rows: FloatArray, period: int | None) -> FloatArray:
     if period is None:
         return rows
     folded = rows.reshape(len(rows), -1, period)
-    return np.asarray((folded - folded.mean(axis=1, keepdims=True)).reshape(len(rows), -1))
+    return (folded - folded.mean(axis=1, keepdims=True)).reshape(len(rows), -1)
 
 
 def bins_taken(frequencies: FloatArray, lines: tuple[Line, ...], seconds: float, width: float = LEFT_OUT) -> BoolArray:

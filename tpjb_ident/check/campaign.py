@@ -58,7 +58,9 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
     observations, conditions = judged(campaign, observations)
     findings = [f for observation in observations for f in observation.report.findings]
     merged = merge(findings, campaign.path.name, campaign.runs)
-    merged += [_problem(condition, campaign.path.name) for condition in conditions]
+    for condition in conditions:
+        severity: Severity = "error" if condition.severity == "error" else "warning"
+        merged.append(Problem(severity, campaign.path.name, str(condition), condition.detail, condition.meaning))
     return _sorted([*campaign.notes, *merged, *_leftovers(campaign)])
 
 
@@ -95,11 +97,6 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     _check_duplicates(observations)
     fit = rig_fit(campaign, dynamic, static)
     return observations, () if fit is None else fit.conditions()
-
-
-def _problem(condition: Condition, file: str) -> Problem:
-    severity: Severity = "error" if condition.severity == "error" else "warning"
-    return Problem(severity, file, str(condition), condition.detail, condition.meaning)
 
 
 def _spread_doubts(observations: Sequence[Observation]) -> None:

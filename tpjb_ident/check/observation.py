@@ -306,7 +306,7 @@ def _at_rest(phasors: RunPhasors, mass: float) -> frozenset[str]:
     push = np.median(np.abs(force @ along.T), axis=0)
     missed = _NO_INERTIA * np.median(np.linalg.norm(force, axis=1))
     size = mass * np.median(np.abs(line[:, accelerometers]), axis=0)
-    inertia = float(np.max(size / np.maximum(push, max(missed, 1e-300))))
+    inertia = np.max(size / np.maximum(push, max(missed, 1e-300)))
     # a housing that hangs free moves without a push
     still = (0.0 < inertia < _ON_CELLS) & (inertia * push < missed)
     return frozenset(phasors.channels[k].name for k, rests in zip(accelerometers, still) if rests)

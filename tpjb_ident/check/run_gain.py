@@ -78,7 +78,7 @@ class PointRuns:
         if len(sizes) < 2 or not np.all(sizes > 0):
             return _NO_STIFFNESS
         solution, _, _, singular = np.linalg.lstsq(D / sizes, F / sizes, rcond=None)
-        return np.asarray(solution.T) if singular[-1] >= _ONE_LINE * singular[0] else _NO_STIFFNESS
+        return solution.T if singular[-1] >= _ONE_LINE * singular[0] else _NO_STIFFNESS
 
     def misfits(self, stiffness: ComplexArray) -> FloatArray:
         """Share of every run's force that H does not explain, (n,)."""
@@ -335,7 +335,7 @@ def dynamic_difference(runs: PointRuns, run: int, fellows: Sequence[int], stiffn
         return None
     rows = list(fellows)
     unit, direction = D[rows] / sizes[rows, None], D[run] / sizes[run]
-    leverage = float(np.real(direction.conj() @ np.linalg.solve(unit.T @ unit.conj(), direction)))
+    leverage = np.real(direction.conj() @ np.linalg.solve(unit.T @ unit.conj(), direction))
     scatter = np.sum(np.abs(residual[rows] / sizes[rows, None]) ** 2) / spare
     variance = scatter * sizes[run] ** 2 * (1 + leverage)
     variance += (_LEAST_PHASOR * np.linalg.norm(runs.force[run])) ** 2
@@ -367,7 +367,7 @@ def static_difference(runs: PointRuns, run: int, fellows: Sequence[int], stiffne
     misses = others[:, 2:] @ runs.cell_plane.T
     wander = others[:, :2] @ runs.probe_plane.T - misses @ compliance.T
     spare = 2 * (len(means) - 1)
-    size = float(np.linalg.norm(runs.cell_plane @ mean[2:]))
+    size = np.linalg.norm(runs.cell_plane @ mean[2:])
     to_probes, to_cells = np.linalg.inv(runs.probe_plane), np.linalg.inv(runs.cell_plane)
     by_load = np.vstack([to_probes @ compliance, to_cells])
     by_place = np.vstack([to_probes, np.zeros((2, 2))])

@@ -64,7 +64,7 @@ def without_static_part(ratios: ComplexArray) -> bool:
     if not len(ratios):
         return False
     mean = abs(complex(ratios.mean()))
-    error = float(np.sqrt(np.mean(np.abs(ratios - ratios.mean()) ** 2) / max(len(ratios) - 1, 1)))
+    error = np.sqrt(np.mean(np.abs(ratios - ratios.mean()) ** 2) / max(len(ratios) - 1, 1))
     return bool(mean < _NO_STATIC[0] or (mean < _NO_STATIC[1] and mean < 4 * error))
 
 

@@ -91,7 +91,7 @@ def check_clock(report: Reporter, time: FloatArray) -> None:
     steps = np.diff(time) * rate
     gaps = np.flatnonzero(steps > 1.9)  # a late sample of a jittering clock is no gap: there the next step is short
     if len(gaps):
-        longest, lost = int(gaps[np.argmax(steps[gaps])]), float(np.sum(steps[gaps] - 1))
+        longest, lost = int(gaps[np.argmax(steps[gaps])]), np.sum(steps[gaps] - 1)
         words = {"gaps": len(gaps), "longest": steps[longest] / rate, "sample": longest}
         report.ask("gap", lost / len(steps), lost=lost, **words)
     usual = steps[steps < 1.5]

@@ -14,7 +14,8 @@ from rigdata.vector import directions
 from tpjb_ident.clearance.polygon import SideFit, alike, corners, find_centre, fit_sides, gain_ratio
 from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, holding, sentences
-from tpjb_ident.phasors.slow_samples import NoiseModel, live_run
+from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.dry_record import axial_channels, refusal, relative_calibration
 from tpjb_ident.pivot.refusals import usable_runs

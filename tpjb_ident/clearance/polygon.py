@@ -36,7 +36,7 @@ from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.phasors.line_fit import robust_deviation
-from tpjb_ident.phasors.slow_samples import NoiseModel, NoiseSeries, estimate_noise
+from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.pivot.curve import PivotCurve
 
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre

@@ -16,14 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.vector import directions
 from tpjb_ident.phasors.line_fit import robust_deviation, white_noise
-from tpjb_ident.phasors.slow_samples import (
-    REMEDY,
-    contradictions,
-    level_error,
-    piece_means,
-    slow_samples,
-    spare_slopes,
-)
+from tpjb_ident.phasors.slow_samples import REMEDY, contradictions, level_error, piece_means, slow_samples, spare_slopes
 from tpjb_ident.pivot.dry_record import refusal
 
 if TYPE_CHECKING:

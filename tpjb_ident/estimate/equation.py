@@ -27,31 +27,19 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rigdata.calibration import Channel
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
 from rigdata.vector import plane_vector
 from tpjb_ident.conditions import Condition
 
-#: Quantities of the equation, in the order of its rows.
-QUANTITIES = ("displacement", "force", "acceleration")
-
 
 @dataclass(frozen=True)
-class Sensor:
-    """A channel as the equation knows it: what is stated of it, SI."""
+class Sensor(Channel):
+    """A channel as the equation knows it, with the axis that the campaign has; a run's own counts in its blocks."""
 
-    name: str
-    quantity: str
-    uncertainty: float | None = None
-    axis_uncertainty: float = 0.0
-    delay_uncertainty: float = 0.0
-    device: str = ""
-    plane: float = 0.0
-    temperature_coefficient_uncertainty: float = 0.0
     corner_uncertainty: float = 0.0  #: Hz: of a low corner that nobody states, one deviation
     out_of_step: bool = False  #: leads what the springs under the housing make of the cells' force
-    axis: float = 0.0  #: rad: as the campaign has it; a run's own counts in its blocks
 
     def doubted(self, gain: float, turn: float = 0.0) -> Sensor:
         """The sensor, its gain and axis [rad] known no better than this."""
@@ -176,11 +164,20 @@ def stacked(
         "z": none + 0j,
         "noise": np.diag(none) + 0j,
         "dof": 1.0,
+        "present": none > 0,
+        "along": np.zeros((sensors, 2)),
+        "calibration": none.astype(int),
+        "slope": none + 0j,
+        "slope_noise": np.eye(sensors) + 0j,
+        "windows": 1.0,
+        "time": 0.0,
+        "temperature": np.nan,
+        "shaft": np.nan + 0j,
+        "uneven": np.zeros(2),
+        "gain_scatter": 0.0,
+        "miss": 0j,
+        "miss_error": 0.0,
     }
-    usual |= {"present": none > 0, "along": np.zeros((sensors, 2)), "calibration": none.astype(int)}
-    usual |= {"slope": none + 0j, "slope_noise": np.eye(sensors) + 0j, "windows": 1.0, "time": 0.0}
-    usual |= {"temperature": np.nan, "shaft": np.nan + 0j, "uneven": np.zeros(2), "gain_scatter": 0.0}
-    usual |= {"miss": 0j, "miss_error": 0.0}
     columns: dict[str, Any] = {
         "bent": np.zeros(len(points)) if bent is None else bent,
         "band": np.full(len(points), -1) if band is None else band,
@@ -339,30 +336,17 @@ def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
     for run in campaign.of_kind("dynamic"):
         channels = dict(run.channels) | channels
     sensors: list[Sensor] = []
-    for quantity in QUANTITIES:
+    for quantity in VECTOR_QUANTITIES:
         alike = [channel for channel in channels.values() if channel.quantity == quantity and channel.axis is not None]
         unstated = _USUAL_GAIN if len(alike) > 2 else None
-        sensors += [
-            Sensor(
-                channel.name,
-                quantity,
-                unstated if channel.uncertainty is None else channel.uncertainty,
-                channel.axis_uncertainty,
-                channel.delay_uncertainty,
-                channel.clock,
-                channel.plane,
-                channel.temperature_coefficient_uncertainty,
-                0.0 if _has_low_corner(channel) else CORNERS.get(quantity, 0.0),
-                axis=float(channel.axis or 0.0),
-            )
-            for channel in alike
-        ]
+        for channel in alike:
+            stated = vars(channel)
+            if channel.uncertainty is None:
+                stated = stated | {"uncertainty": unstated}
+            # with a filter that ends at a low corner, or a measured response, it is known
+            corner = all(getattr(filtered, "side", "high") != "high" for filtered in channel.response.filters)
+            sensors.append(Sensor(**stated, corner_uncertainty=CORNERS.get(quantity, 0.0) * corner))
     return tuple(sensors)
-
-
-def _has_low_corner(channel: Channel) -> bool:
-    """Whether a filter that is stated ends at a low corner, or the response was measured."""
-    return any(getattr(filtered, "side", "high") == "high" for filtered in channel.response.filters)
 
 
 def alive(sensors: Sequence[Sensor], size: FloatArray, least: float = _NOTHING) -> BoolArray:

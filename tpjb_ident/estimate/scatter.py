@@ -281,7 +281,7 @@ def _unusual(chi: FloatArray, spare: FloatArray, usable: BoolArray, before: Bool
         worst = int(np.argmax(ratio))
         remaining = usual.copy()
         remaining[worst] = False
-        all_spare = float(spare[remaining].sum())
+        all_spare = spare[remaining].sum()
         typical = max(chi[remaining].sum() / max(all_spare, 1.0), _LEAST_CHI)
         if float(fdtrc(spare[worst], max(all_spare, 1.0), ratio[worst] / typical)) >= _CHANCE:
             break

@@ -87,7 +87,7 @@ class Regression:
 def _squares(rows: ComplexArray, matrix: ComplexArray) -> FloatArray:
     """r^H A r of every window, (..., n); `rows` (..., q, n), `matrix` (..., q, q)."""
     moved = matrix @ rows
-    return np.asarray((rows.real * moved.real + rows.imag * moved.imag).sum(axis=-2))
+    return (rows.real * moved.real + rows.imag * moved.imag).sum(axis=-2)
 
 
 def distance2(rows: ComplexArray, inner: ComplexArray) -> FloatArray:

@@ -164,7 +164,7 @@ def _scale(phasors: ComplexArray) -> float:
     """Median modulus of the rows: a scale that a few gross outliers cannot move far."""
     if not len(phasors):
         return 1.0
-    scale = float(np.median(np.linalg.norm(phasors, axis=1)))
+    scale = np.median(np.linalg.norm(phasors, axis=1))
     return scale if scale > 0 else 1.0
 
 

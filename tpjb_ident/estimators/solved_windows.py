@@ -13,11 +13,11 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.arrowhead import Shape
-from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, stacked
+from tpjb_ident.estimate.equation import Rig, Sensor, stacked
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.solve import Solver
-from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation, window_means
+from tpjb_ident.estimate.window_means import Readings, attenuation, window_means
 from tpjb_ident.estimators.r_matrix import PhasorTable, TableFit
 
 #: Fewer spare repeats than this cannot give a 4x4 complex covariance worth using.
@@ -36,7 +36,13 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
     means = window_means(z, table.direction, np.zeros(len(z)), Readings([""] * 4, np.zeros((4, 4))), weights, present)
     if means is None or means.spare < _MIN_SPARE_REPEATS:
         return None
-    blocks = _blocks(means)
+    noise = unbiased_noise(means.noise, means.spare)
+    rows: list[dict[str, object]] = []  # a block a direction that has windows
+    for g in np.flatnonzero(means.count > 0):
+        row = {"run": g, "omega": 1.0, "z": means.mean[g], "noise": noise / means.count[g], "dof": means.spare}
+        rows.append(row | {"present": np.ones(4, dtype=bool), "along": _AXES})
+    names = [str(g) for g in range(len(means.count))]
+    blocks = stacked([OperatingPoint(0.0, excitation=1.0)], names, 4, rows)
     # what scatter a good rig has is not asked: a table may be computed
     shape = Shape(np.zeros(1, dtype=np.intp), scatter=replace(Scatter.none(1, len(blocks)), usual=0.0))
     solution = Solver(_RIG, blocks, (), start[None], shape).run()
@@ -59,14 +65,3 @@ def not_locked(wandering: int, directions: int) -> tuple[Condition, ...]:
     """Say in how many directions the drive's phase wanders."""
     text = f"drive phase wanders in {wandering} of {directions} directions; their windows were turned to one phase"
     return holding((wandering, "drive-not-locked", text))
-
-
-def _blocks(means: WindowMeans) -> Blocks:
-    """A block a direction that has windows."""
-    noise = unbiased_noise(means.noise, means.spare)
-    rows: list[dict[str, object]] = []
-    for g in np.flatnonzero(means.count > 0):
-        row = {"run": g, "omega": 1.0, "z": means.mean[g], "noise": noise / means.count[g], "dof": means.spare}
-        rows.append(row | {"present": np.ones(4, dtype=bool), "along": _AXES})
-    names = [str(g) for g in range(len(means.count))]
-    return stacked([OperatingPoint(0.0, excitation=1.0)], names, 4, rows)

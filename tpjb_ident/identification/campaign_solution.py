@@ -16,14 +16,12 @@ import numpy as np
 from scipy.special import chdtrc
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.calibration import Channel
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.campaign import Campaign
 from tpjb_ident.conditions import Condition, holding
 from tpjb_ident.estimate.arrowhead import complex_matrix
 from tpjb_ident.estimate.equation import (
-    QUANTITIES,
     Blocks,
-    Rig,
     RigStiffness,
     Sensor,
     axes_of,
@@ -83,7 +81,7 @@ def solved_with_clocks(
     sensors, rates = with_found_devices(sensors, answer.solution.blocks, START / rate)
     if rates:
         answer = solve(sensors, rates)
-    for _ in range(_CLOCK_PASSES if len({sensor.device for sensor in sensors}) > 1 else 0):
+    for _ in range(_CLOCK_PASSES if len({sensor.clock for sensor in sensors}) > 1 else 0):
         solution, blocks = answer.solution, answer.solution.blocks
         more = Clock(solution.rig, blocks).rates(solution.fitted[Clock.name].value)
         turn = max(map(abs, more.values())) * (2 * blocks.time * blocks.omega).max()
@@ -101,7 +99,7 @@ def with_found_devices(
 
     They started within `start` [s] of the first, one deviation.
     """
-    force = None if any(sensor.device for sensor in sensors) else _rate(sensors, blocks, "force")
+    force = None if any(sensor.clock for sensor in sensors) else _rate(sensors, blocks, "force")
     if force is None or not force.clear:
         return sensors, {}
     acceleration = _rate(sensors, blocks, "acceleration")
@@ -112,8 +110,8 @@ def with_found_devices(
     ):
         devices["acceleration"] = "accelerometers" if acceleration.clear else ""
         rates |= {"accelerometers": acceleration.rate} if acceleration.clear else {}
-    separate = [replace(s, device=devices.get(s.quantity, "")) for s in sensors]
-    return tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.device else s for s in separate), rates
+    separate = [replace(s, clock=devices.get(s.quantity, "")) for s in sensors]
+    return tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.clock else s for s in separate), rates
 
 
 class _Rate(NamedTuple):
@@ -161,7 +159,7 @@ _LEAST_SCATTER = 1e-3
 
 def unstated(campaign: Campaign) -> tuple[Condition, ...]:
     """Say which probes and cells have no uncertainty in the manifest."""
-    names = [s.name for s in sensors_of(campaign) if s.quantity in QUANTITIES[:2] and s.uncertainty is None]
+    names = [s.name for s in sensors_of(campaign) if s.quantity in VECTOR_QUANTITIES[:2] and s.uncertainty is None]
     text = f"no uncertainty in the manifest for {', '.join(names)}: their systematic part is left out"
     return holding((names, "calibration-uncertainty-unstated", text))
 
@@ -313,7 +311,10 @@ def solve_campaign(
     on_line = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE) and p in blocks.point]
     fits = _mains(on_line, digests, solution, force) if correct and on_line else {}
     if fits:
-        shift = _mains_readings(solution.rig, blocks, fits)
+        shift, probes = np.zeros_like(blocks.z), solution.rig.of("displacement")
+        for p, fit in fits.items():
+            rows = np.ix_(np.flatnonzero(blocks.point == p), probes)
+            shift[rows] = np.einsum("nja,na->nj", blocks.along[rows], fit.pickup)
         again = solve(solution.rig, replace(blocks, z=blocks.z - shift), solution.h)
         last = replace(last, solution=again, mains_shift=shift, mains=fits)
     D = vector(solution.rig, blocks, "displacement")
@@ -323,7 +324,7 @@ def solve_campaign(
 
 def _film(data: PointData, point: PointMeans) -> FilmChange:
     lines = [digest.harmonics[line] for digest, line in zip(data.digests, data.lines) if digest.harmonics]
-    return film_change([line for line in lines if line is not None], point.start)
+    return film_change(lines, point.start)
 
 
 def _mains(
@@ -341,9 +342,9 @@ def _mains(
     fits = {}
     for p in points:
         mine = blocks.point == p
-        usual = float(np.median(np.linalg.norm(F[mine], axis=1)))
+        usual = np.median(np.linalg.norm(F[mine], axis=1))
         in_cells = np.linalg.norm(force) / usual / np.sqrt(2)
-        scatter = float(np.hypot(max(typical, _LEAST_SCATTER), in_cells if in_cells > typical else 0.0))
+        scatter = np.hypot(max(typical, _LEAST_SCATTER), in_cells if in_cells > typical else 0.0)
         fit = fit_mains(D[mine], F[mine], pickup, scatter) if np.isfinite(solution.h[p]).all() else None
         if fit is not None:
             fits[p] = fit
@@ -363,16 +364,6 @@ def misfits(solution: Solution) -> FloatArray:
     D, F = at_set_point(solution)
     residual = F - np.einsum("nij,nj->ni", solution.h[solution.blocks.point], D)
     return np.linalg.norm(residual, axis=1) / np.linalg.norm(F, axis=1)
-
-
-def _mains_readings(rig: Rig, blocks: Blocks, fits: Mapping[int, MainsFit]) -> ComplexArray:
-    """Pick-up of the probes, (n, m) [m]."""
-    shift = np.zeros_like(blocks.z)
-    probes = rig.of("displacement")
-    for p, fit in fits.items():
-        places = np.flatnonzero(blocks.point == p)
-        shift[np.ix_(places, probes)] = np.einsum("nja,na->nj", blocks.along[np.ix_(places, probes)], fit.pickup)
-    return shift
 
 
 #: Terms whose uncertainty scatters with the runs: of points that each have runs of their own.

@@ -104,12 +104,14 @@ def identify(
     if sines.of_kind("dynamic"):
         finished = all_runs(sines, settings.phasors, report, workers, store)
         identification = assemble(sines, finished, settings, report, workers, dry)
-    identification = identification if bands is None else _joined(identification, bands)
-    # positions of the shaft are as uncertain as the probes' stated zeros
+    return _doubted(identification if bands is None else _joined(identification, bands), campaign)
+
+
+def _doubted(identification: Identification, campaign: Campaign) -> Identification:
+    """Points that other frequencies contradict; positions are as uncertain as the probes' stated zeros."""
     zero = zero_uncertainty(campaign.channels.values(), "displacement")
     points = with_frequency_outliers(identification.points)
-    uncertain = tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in points)
-    return replace(identification, points=uncertain)
+    return replace(identification, points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in points))
 
 
 def _joined(sines: Identification, bands: Identification) -> Identification:
@@ -191,7 +193,7 @@ def identify_bands(
     excluded: list[ExcludedRun] = []
 
     def solve(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> BandSolution:
-        fast = {sensor.name: rates[sensor.device] for sensor in sensors if sensor.device in rates}
+        fast = {sensor.name: rates[sensor.clock] for sensor in sensors if sensor.clock in rates}
         points = []
         excluded[:] = unusable
         for group in groups:

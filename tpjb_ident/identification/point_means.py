@@ -49,7 +49,7 @@ class MeansTask(Directed):
     @property
     def along(self) -> FloatArray:
         """Unit vectors of the sensors' axes, (m, 2)."""
-        return directions([sensor.axis for sensor in self.channels])
+        return directions([sensor.axis or 0.0 for sensor in self.channels])
 
 
 def point_means(task: MeansTask, data: PointData) -> PointMeans:
@@ -60,7 +60,7 @@ def point_means(task: MeansTask, data: PointData) -> PointMeans:
     table = phasor_table(D, F, data.run_index)
     weights, start, status = _robust_start(table)
     film = _film(task, data.mass)
-    readings = Readings([sensor.device for sensor in task.channels], film)
+    readings = Readings([sensor.clock for sensor in task.channels], film)
     means = window_means(z, data.run_index, _window_times(data), readings, weights, present)
     condition = displacement_condition(table.D, weights[table.valid])
     shaft, conditions = _shaft(data, means, task)
@@ -143,7 +143,11 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
     for g, channels in enumerate(described):
         shown = np.isfinite(z[data.run_index == g]).any(axis=0)
         living.append(tuple(channels.get(j) if is_shown else None for j, is_shown in enumerate(shown)))
-    return z * _clock_turns(data, task), tuple(living)
+    # how far the devices' clocks have run ahead
+    rates = [task.rates.get(sensor.clock, 0.0) for sensor in task.channels]
+    omega = 2 * np.pi * np.array([r.lines.driven[i] for r, i in zip(data.runs, data.lines)])
+    ahead = np.multiply.outer(omega[data.run_index] * _window_times(data), rates)
+    return z * np.exp(1j * ahead), tuple(living)
 
 
 def warm_gain(channel: Channel, temperature: float) -> float:
@@ -162,13 +166,6 @@ def vectors(z: ComplexArray, data: PointData, task: MeansTask) -> tuple[ComplexA
 def _window_times(data: PointData) -> FloatArray:
     """Middles of the windows of all runs, (n,) [s]."""
     return np.concatenate([run.start + 0.5 * run.length for run in data.runs])
-
-
-def _clock_turns(data: PointData, task: MeansTask) -> ComplexArray:
-    """Unit phasors (n, m) that take off how far the devices' clocks have run ahead."""
-    rates = np.array([task.rates.get(sensor.device, 0.0) for sensor in task.channels])
-    omega = 2 * np.pi * np.array([r.lines.excitation[i].frequency for r, i in zip(data.runs, data.lines)])
-    return np.exp(1j * np.multiply.outer(omega[data.run_index] * _window_times(data), rates))
 
 
 def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[Condition, ...]]:

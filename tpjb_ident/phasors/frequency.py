@@ -16,7 +16,7 @@ from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.lines import NAMED_HARMONICS, SPEED_DRIFT, LineSet, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors, phasor_noise
 
-#: Samples from which the speed of the run is taken.
+#: Samples of tachometer and keyphasor that are looked at.
 FIRST_LOOK = 2**17
 #: A tachometer this far from the set point is not believed.
 MAX_DEPARTURE = 0.05
@@ -24,8 +24,6 @@ MAX_DEPARTURE = 0.05
 _LOCKED = 0.98
 #: The 1X line stands so many times above its scatter over the windows, or tells no phase.
 _CLEAR = 10.0
-#: Samples of the keyphasor that are looked at.
-_LOOK = 2**17
 #: Unit phasors where nothing tells the shaft's turning.
 _NO_TURNS = np.empty(0, complex)
 
@@ -86,7 +84,7 @@ def _by_keyphasor(run: Run, turning: float) -> ComplexArray:
     """Unit phasors at the frequency `turning` [Hz] of the shaft as every pulse of the keyphasor shows it."""
     pulses = np.empty(0)
     for channel in run.of("keyphasor")[:1]:
-        record = run.record(channel.name, 0, min(run.length, _LOOK))
+        record = run.record(channel.name, 0, min(run.length, FIRST_LOOK))
         pulses = pulse_times(record.values, record.time)
         pulses = pulses[np.isfinite(pulses)]
     return np.exp(-2j * np.pi * turning * pulses) if len(pulses) > 2 else _NO_TURNS
@@ -155,7 +153,7 @@ class _Advance:
     @property
     def slip(self) -> float:
         """Error of the frequency that stands clear of the steps' scatter [Hz], else zero."""
-        slip = float(np.median(self.steps))
+        slip = np.median(self.steps)
         spread = robust_deviation(self.steps - slip)
         return slip if abs(slip) > 4 * spread / np.sqrt(len(self.steps)) else 0.0
 
@@ -166,25 +164,22 @@ def phase_advance(phasors: ComplexArray, start: FloatArray, noise: float) -> _Ad
     if len(windows) < 3:
         return None
     z, spacing = phasors[windows], np.diff(start[windows])
-    size = float(np.median(np.linalg.norm(z, axis=1)))
+    size = np.median(np.linalg.norm(z, axis=1))
     if not size > 10 * noise:
         return None
     turns = np.angle(np.einsum("ni,ni->n", z[1:], z[:-1].conj())) / (2 * np.pi)
     return _Advance(windows, turns / spacing, noise / size / (2 * np.pi * float(np.median(spacing))))
 
 
-def _line_advance(result: RunPhasors, line: int, rate: float, places: list[int] | slice) -> _Advance | None:
-    """Advance of a line in some channels together, each weighted by its power over its noise."""
+def _line_slip(result: RunPhasors, line: int | None, rate: float, places: list[int] | slice = _ALL) -> float:
+    """Frequency error of a line by some channels together, each weighted by its power over its noise [Hz]."""
+    if line is None:
+        return 0.0
     z, noise = result.z[:, line, places], 0.5 * phasor_noise(result, rate)[places]
     present = np.isfinite(z).any(axis=0) & np.isfinite(noise)
     # a channel without noise must not stand for all
     least = 1e-9 * np.nanmax(np.abs(z[:, present]), axis=0)
-    return phase_advance(z[:, present] / np.maximum(noise[present], least), result.start, 1.0)
-
-
-def _line_slip(result: RunPhasors, line: int | None, rate: float, places: list[int] | slice = _ALL) -> float:
-    """Frequency error of a line by some channels together [Hz]."""
-    advance = None if line is None else _line_advance(result, line, rate, places)
+    advance = phase_advance(z[:, present] / np.maximum(noise[present], least), result.start, 1.0)
     return 0.0 if advance is None else advance.slip
 
 

@@ -265,7 +265,7 @@ def _level(design: FloatArray, frequencies: FloatArray, duration: float) -> Floa
     A line that does not turn once in the window is part of it, and so is one that is no turn apart from such a line:
     their columns are told from a constant by their sum alone.
     """
-    weights = np.asarray(design.mean(axis=0))
+    weights = design.mean(axis=0)
     turns = np.sort(frequencies) * duration
     separate = turns[np.diff(turns, prepend=0.0) >= 1.0]
     is_resolved = frequencies * duration >= separate.min(initial=np.inf)

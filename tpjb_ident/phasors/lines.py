@@ -185,14 +185,7 @@ MAX_SAMPLES = 2**16
 
 
 class RecordTooShortError(TpjbError):
-    """The record cannot resolve its lines; `needed` [s] says how long it has to be."""
-
-    def __init__(self, message: str, needed: float) -> None:
-        super().__init__(message)
-        self.needed = needed
-
-    def __reduce__(self) -> tuple[type[RecordTooShortError], tuple[str, float]]:
-        return RecordTooShortError, (str(self), self.needed)
+    """The record cannot resolve its lines."""
 
 
 def line_design(time: FloatArray, frequencies: FloatArray, drift_order: int = 1) -> FloatArray:
@@ -237,7 +230,7 @@ def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> fl
             return length
         length *= 1.05
     raise RecordTooShortError(
-        f"lines {np.array2string(frequencies, precision=4)} Hz cannot be told apart by any window", math.inf
+        f"lines {np.array2string(frequencies, precision=4)} Hz cannot be told apart by any window"
     )
 
 
@@ -252,8 +245,7 @@ def plan_windows(n_samples: int, rate: float, lines: LineSet, settings: WindowSe
         if seconds < shortest * 0.999:
             raise RecordTooShortError(
                 f"{name} of {seconds:.3g} s cannot tell the lines apart: the nearest to the excitation is "
-                f"{_gap(lines):.3g} Hz away; it takes at least {shortest:.3g} s",
-                shortest,
+                f"{_gap(lines):.3g} Hz away; it takes at least {shortest:.3g} s"
             )
     count = max(1, int(available / wanted + 1e-9))
     return n_samples // count if settings.length is None else round(wanted * rate), count

@@ -51,7 +51,7 @@ class DeviceReader:
 def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
     """Devices of a run that have channels with a direction, or a command if asked; that of the first probe first."""
     directed = []
-    for quantity in QUANTITIES:
+    for quantity in VECTOR_QUANTITIES:
         if quantity != "acceleration" or run.of(quantity):
             directed += run.vector_channels(quantity)
     if command:
@@ -69,9 +69,6 @@ def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
         if channels:
             readers.append(DeviceReader(run, device, channels, rate, length))
     return tuple(readers)
-
-
-QUANTITIES = VECTOR_QUANTITIES
 
 
 @dataclass(frozen=True)
@@ -182,16 +179,12 @@ class FilmLine:
     force_noise: float  #: N^2
 
 
-@dataclass(frozen=True)
-class FilmLines:
-    """One excitation line of a run, and the lines beside it by name: "2f", "3f", "2X-f"; those that stand alone."""
-
-    force: float  #: N: size of the oil force at the excitation
-    lines: dict[str, FilmLine]
+#: What the film makes of one excitation line of a run: "2f", "3f", "2X-f"; those that stand alone.
+FilmLines = dict[str, FilmLine]
 
 
 def film_lines(run: RunPhasors) -> tuple[FilmLines | None, ...]:
-    """Every excitation line of a run with what the film makes of it; None where the whole record was not fitted."""
+    """What the film makes of every excitation line of a run; None where it has none, or not the whole record's."""
     if not len(run.record) or len(run.residual) < len(run.record):
         return tuple(None for _ in run.lines.excitation)
     displacement, force = run.plane("displacement", run.record), run.film_force(run.record)
@@ -201,17 +194,22 @@ def film_lines(run: RunPhasors) -> tuple[FilmLines | None, ...]:
     def noise(rows: ComplexArray) -> FloatArray:
         return np.array([_mean_square(run.plane("displacement", rows)), _mean_square(run.film_force(rows))])
 
-    result = []
+    result: list[FilmLines | None] = []
     for i, driven in enumerate(run.lines.excitation):
+        size = np.linalg.norm(force[i])
+        if not size > 0:
+            result.append(None)
+            continue
         crossed = abs(2 * run.lines.speed - driven.frequency)
         wanted = {"2f": 2 * driven.frequency, "3f": 3 * driven.frequency, "2X-f": crossed}
         lines = {}
         for name, frequency in wanted.items():
             place = _alone(run, frequency, name)
             if place is not None:
-                noises = noise(run.residual[place]) + noise(steps)
-                lines[name] = FilmLine(frequency / driven.frequency, displacement[place], force[place], *noises)
-        result.append(FilmLines(float(np.linalg.norm(force[i])), lines))
+                noises = (noise(run.residual[place]) + noise(steps)) / size**2
+                vectors = displacement[place] / size, force[place] / size
+                lines[name] = FilmLine(frequency / driven.frequency, *vectors, *noises)
+        result.append(lines)
     return tuple(result)
 
 

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import merged
@@ -23,7 +24,6 @@ from tpjb_ident.phasors.frequency import DRIFT, ShaftCourse, device_rates, retun
 from tpjb_ident.phasors.line_fit import SCALE_LIMIT, LineFitter, WindowFit, usual_scale
 from tpjb_ident.phasors.lines import HIGHEST, LineSet, RecordTooShortError, known_lines, plan_windows
 from tpjb_ident.phasors.run_data import (
-    QUANTITIES,
     SHORT,
     DeviceReader,
     PhasorSettings,
@@ -136,7 +136,7 @@ def extract(
     """Fit all windows of a run; `clocks`: by how much lines turn faster by a device's clock, relative."""
     readers = device_readers(run)
     channels = [(c, reader.device.name) for reader in readers for c in reader.channels]
-    channels.sort(key=lambda described: QUANTITIES.index(described[0].quantity))
+    channels.sort(key=lambda described: VECTOR_QUANTITIES.index(described[0].quantity))
     length, count = plan_windows(run.length, run.sample_rate, lines, settings.windows)
     seconds = length / run.sample_rate
     middles = np.asarray((np.arange(count) + 0.5) * length / run.sample_rate, dtype=float)

@@ -19,7 +19,8 @@ from scipy import ndimage
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.phasors.line_fit import robust_deviation, white_noise
-from tpjb_ident.phasors.slow_samples import NoiseModel, piece_means
+from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.phasors.slow_samples import piece_means
 
 BLOCK = 0.1  # [s]
 MOST_BLOCKS = 220  # the covariance is a full matrix: keep it small

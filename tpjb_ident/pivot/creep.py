@@ -18,7 +18,7 @@ from scipy import special
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.phasors.slow_samples import NoiseModel
+from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.dry_record import DryRecord, pooled_noise, smooth_columns
 
 _PLAUSIBLE = 0.03  # share of the deflection that liners and joints creep: what holds hardly show is not made large

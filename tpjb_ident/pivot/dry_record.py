@@ -17,16 +17,8 @@ from scipy import special
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
-from tpjb_ident.phasors.slow_samples import (
-    NoiseModel,
-    NoiseSeries,
-    estimate_noise,
-    good_samples,
-    level_error,
-    live_run,
-    slow_samples,
-    spare_slopes,
-)
+from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
+from tpjb_ident.phasors.slow_samples import good_samples, level_error, live_run, slow_samples, spare_slopes
 from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, LoadCourse, cut_blocks, find_holds, load_course
 from tpjb_ident.pivot.pickup import PickupSignature, measure_pickup
 

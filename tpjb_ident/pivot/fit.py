@@ -20,7 +20,8 @@ from scipy import linalg, optimize, special
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError, refuse
 from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.phasors.slow_samples import NoiseModel, refused_runs
+from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.phasors.slow_samples import refused_runs
 from tpjb_ident.pivot.blocks import slid
 from tpjb_ident.pivot.creep import without_creep
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop

@@ -12,7 +12,8 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Problem, RigDataError, Severity
 from tpjb_ident.phasors.line_fit import robust_deviation
-from tpjb_ident.phasors.slow_samples import REMEDY, NoiseModel, contradictions
+from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.phasors.slow_samples import REMEDY, contradictions
 from tpjb_ident.pivot.dry_record import (
     LOAD_LIMIT,
     DryRecord,

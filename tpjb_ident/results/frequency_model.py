@@ -133,7 +133,7 @@ def fit_over_frequency(
     if len(np.unique(omega)) < needed:
         raise ArgumentError(f"{model} needs {needed} frequencies with an answer, got {len(np.unique(omega))}")
     # Natural scales keep the normal equations well conditioned: per omega, per omega^2.
-    middle = float(np.sqrt(omega.min() * omega.max()))
+    middle = np.sqrt(omega.min() * omega.max())
     design = power_columns(omega / middle, MODELS[model])
     y, covariance = np.array([e.vector for e in chosen]), np.array([e.covariance for e in chosen])
     weight = np.linalg.inv(covariance)
@@ -240,7 +240,7 @@ def with_frequency_outliers(points: Sequence[PointResult]) -> tuple[PointResult,
         outlier = frequency_outlier([points[i].stiffness for i in places])
         if outlier is not None:
             k, distance = outlier
-            share = float(np.linalg.norm(distance) / np.linalg.norm(points[places[k]].stiffness.h))
+            share = np.linalg.norm(distance) / np.linalg.norm(points[places[k]].stiffness.h)
             others = f"the other {len(places) - 1} frequencies of this load"
             doubt = Condition("frequency-outlier", f"h is {100 * share:.0f} % from what {others} let expect")
             result[places[k]] = _widened(points[places[k]], CHANGE_AS_DEVIATION * distance, doubt)

@@ -314,14 +314,11 @@ def frf_frame(results: Sequence[BandResult], every_method: bool = False) -> pd.D
     for result in results:
         for line in result.lines:
             chosen = line.by_method if every_method else {line.method: line.stiffness}
-            rows += [_line_row(result, line, name, est) for name, est in chosen.items()]
+            for name, est in chosen.items():
+                figures = [*line.coherence, name, float(np.min(est.dof)), len(result.runs), line.n_rows]
+                figures += [result.resolution, est.condition, quality_cell(result.quality)]
+                rows.append([*result.key().values(), line.frequency, *est.figures()[:, :5].ravel(), *figures])
     return pd.DataFrame(rows, columns=_LINE_COLUMNS)
-
-
-def _line_row(result: BandResult, line: BandLine, method: str, est: DynamicStiffness) -> list[Any]:
-    figures = [*line.coherence, method, float(np.min(est.dof)), len(result.runs), line.n_rows]
-    figures += [result.resolution, est.condition, quality_cell(result.quality)]
-    return [*result.key().values(), line.frequency, *est.figures()[:, :5].ravel(), *figures]
 
 
 def models_frame(results: Sequence[BandResult]) -> pd.DataFrame:

@@ -87,9 +87,9 @@ class FilmChange:
     hidden: float = np.inf  #: what could stay unseen of it
 
 
-def film_change(runs: Sequence[FilmLines], h: ComplexArray) -> FilmChange:
+def film_change(runs: Sequence[FilmLines | None], h: ComplexArray) -> FilmChange:
     """Share by which h (2, 2) [N/m] may be off through the amplitude of the motion, by its runs' lines."""
-    usable = [run for run in runs if run.force > 0] if np.isfinite(h).all() else []
+    usable = [run for run in runs if run is not None] if np.isfinite(h).all() else []
     sizes = {name: _size(usable, name, h) for name in ("2f", *_WEIGHTS)}
     rows = [weight * sizes[name] for name, weight in _WEIGHTS.items()]
     parts = np.array(rows if np.isfinite(sizes["3f"]).all() else [_SECOND * sizes["2f"] ** 2])
@@ -107,14 +107,14 @@ def _size(runs: Sequence[FilmLines], name: str, h: ComplexArray) -> FloatArray:
     """
     squares, noises = [], []
     for run in runs:
-        line = run.lines.get(name)
+        line = run.get(name)
         if line is None or not np.isfinite(line.force).all():
             continue
         stiffness = h.real + 1j * line.ratio * h.imag
         noise = line.force_noise + np.linalg.norm(stiffness, 2) ** 2 * line.displacement_noise
-        excess = float(np.sum(np.abs(line.force - stiffness @ line.displacement) ** 2))
-        squares.append((excess - noise) / run.force**2)
-        noises.append(noise / run.force**2)
+        excess = np.sum(np.abs(line.force - stiffness @ line.displacement) ** 2)
+        squares.append(excess - noise)
+        noises.append(noise)
     if 2 * len(squares) < len(runs) or not squares:
         return np.full(2, np.nan)
     return np.sqrt([max(float(np.median(squares)), 0.0), np.median(noises) / len(squares)])
@@ -144,7 +144,7 @@ def change_conditions(
     if amplitude > NEVER_LINEAR * clearance and not change.share:
         text = f"amplitude {share:.0f} % of the clearance without a harmonic of the film: check probes and clearance"
         return (Condition("large-amplitude", text),)
-    room = float(np.min(np.abs(est.half_width()[[0, 3]] / np.diag(est.h).real)))
+    room = np.min(np.abs(est.half_width()[[0, 3]] / np.diag(est.h).real))
     if change.hidden < room or uncertain < change.share:  # what stays unseen is less than the interval
         return ()
     text = f"amplitude {share:.1f} % of the clearance > 5 %, and no harmonic tells what it does"

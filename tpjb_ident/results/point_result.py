@@ -123,7 +123,7 @@ def of_runs(recorded: RunsOfPoint, temperatures: Sequence[dict[int, float]]) -> 
     positions, runs = recorded.mean_positions, len(recorded.names)
     error = positions.std(axis=0, ddof=1) / np.sqrt(runs) if runs > 1 else np.full(2, np.nan)
     return {
-        "static_load_measured": float(np.linalg.norm(recorded.mean_loads.mean(axis=0))),
+        "static_load_measured": float(np.abs(recorded.mean_loads.mean())),
         "position": positions.mean(axis=0),
         "position_se": error,
         "temperatures": pad_means(temperatures),

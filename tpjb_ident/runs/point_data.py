@@ -153,9 +153,9 @@ class RunsOfPoint:
         return 0.0 if self.runs[0].pick("acceleration") else self.runs[0].housing_mass
 
     @property
-    def mean_loads(self) -> FloatArray:
-        """Mean cell force of every run, shape (n_runs, 2) [N]."""
-        return np.array([finite_mean(run.means("force")) for run in self.runs])
+    def mean_loads(self) -> ComplexArray:
+        """Mean cell force of every run, X + i Y, shape (n_runs,) [N]."""
+        return np.array([finite_mean(run.means("force")) @ [1.0, 1j] for run in self.runs])
 
     @property
     def mean_positions(self) -> FloatArray:

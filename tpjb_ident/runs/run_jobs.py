@@ -37,7 +37,6 @@ from tpjb_ident.phasors.frequency import shaft_phases
 from tpjb_ident.phasors.lines import Line, LineSet, RecordTooShortError
 from tpjb_ident.phasors.run_data import (
     FilmLine,
-    FilmLines,
     PhasorSettings,
     RunPhasors,
     beginning_of,
@@ -65,7 +64,7 @@ _NOT_OURS = (
 )
 #: Classes that a result is made of, field by field, and series of values.
 _RECORDS = (
-    RunDigest, RunPhasors, OperatingPoint, LineSet, Line, FilmLines, FilmLine,
+    RunDigest, RunPhasors, OperatingPoint, LineSet, Line, FilmLine,
     Observation, RecordLines, Reporter, Finding, Problem,
 )  # fmt: skip
 _MADE: dict[str, Any] = {kind.__name__: kind for kind in (*_RECORDS, tuple, list, set)}
@@ -267,7 +266,7 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDiges
         try:
             phasors = run_phasors(cached, housing_mass, settings)
         except RecordTooShortError as error:
-            raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
+            raise RecordTooShortError(f"run {run.id}: {error}") from error
         observations = _observed(run, cached, phasors)
         phasors, dead = _without_dead(phasors, observations[0])
         repairs = [f"{p.file}, {p.place}: {p.what}" for p in run.reader.problems() if p.severity == "warning"]

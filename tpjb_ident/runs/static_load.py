@@ -88,22 +88,12 @@ def static_loads(campaign: Campaign, points: Sequence[RunsOfPoint]) -> StaticLoa
     """Zero of the cells, and the misses of all runs of a campaign's points."""
     stated = max((c.zero_uncertainty for c in campaign.channels.values() if c.quantity == "force"), default=0.0)
     set_points = np.concatenate([np.full(len(data.mean_loads), _set_point(data)) for data in points])
-    zero, error = cell_zero(np.concatenate([_measured(data) for data in points]), set_points, stated)
+    zero, error = cell_zero(np.concatenate([data.mean_loads for data in points]), set_points, stated)
     return StaticLoads(*load_misses(points, zero), zero, error)
-
-
-def _measured(data: RunsOfPoint) -> ComplexArray:
-    return np.asarray(data.mean_loads @ [1.0, 1j])
 
 
 def _set_point(data: RunsOfPoint) -> complex:
     return complex(data.point.static_load * np.exp(1j * data.point.static_load_direction))
-
-
-def _ratio(data: RunsOfPoint, zero: complex) -> ComplexArray:
-    """Cells over set point of every run (n_runs,): size and direction; NaN without a load."""
-    set_point = _set_point(data)
-    return (_measured(data) - zero) / set_point if set_point else _measured(data) * np.nan
 
 
 def load_misses(points: Sequence[RunsOfPoint], zero: complex = 0.0) -> tuple[list[ComplexArray], complex]:
@@ -112,7 +102,10 @@ def load_misses(points: Sequence[RunsOfPoint], zero: complex = 0.0) -> tuple[lis
     The ratio is the mean of the runs about the half that agrees best; of two such halves the one nearer to the set
     points. Cells that show no static force have none: it is zero then.
     """
-    ratios = [_ratio(data, zero) for data in points]
+    ratios = []  # size and direction; NaN without a load
+    for data in points:
+        set_point = _set_point(data)
+        ratios.append((data.mean_loads - zero) / set_point if set_point else data.mean_loads * np.nan)
     measured = np.concatenate(ratios)
     measured = measured[np.isfinite(measured)]
     common = _common_ratio(measured) if len(measured) else complex(1.0)
@@ -180,7 +173,7 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, uncertainty: float 
     size = np.abs(x)
     design, shares = np.stack([x, np.ones_like(x)], axis=1) / size[:, None], y / size
     values, weights, _, _ = reweighted(design, shares, lambda u: huber_weight(u, _BEND), most=_ROUNDS)
-    spread = float(np.sum(weights * np.abs(shares - design @ values) ** 2) / max(weights.sum() - 2.0, 1.0))
+    spread = np.sum(weights * np.abs(shares - design @ values) ** 2) / max(weights.sum() - 2.0, 1.0)
     covariance = np.linalg.inv((design * weights[:, None]).conj().T @ design).real * spread
     zero, error = complex(values[1]), float(np.sqrt(covariance[1, 1]))
     is_clear = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()

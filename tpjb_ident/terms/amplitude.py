@@ -50,7 +50,7 @@ class Amplitude(FilmTerm):
         if not fitted.estimated[part].any():
             return ()
         entries = real_numbers(h)
-        share = float(np.linalg.norm(fitted.value[part] * entries) / np.linalg.norm(entries))
+        share = np.linalg.norm(fitted.value[part] * entries) / np.linalg.norm(entries)
         text = f"h at the runs' mean amplitude differs by {100 * share:.1f} % from that at none"
         return (Condition(ZERO_AMPLITUDE, f"{text}; K and C are those at none, by the runs' several amplitudes"),)
 

@@ -256,7 +256,7 @@ def _shaft_compliance(rig: Rig, blocks: Blocks) -> float:
 
 def _otherwise(fitted: Fitted, least: float) -> str:
     """How accelerometers of a floating stator differ from its probes, if by more than `least` and chance."""
-    kappa, error = fitted.value[:4].reshape(2, 2), float(fitted.deviation[:4].max())
+    kappa, error = fitted.value[:4].reshape(2, 2), fitted.deviation[:4].max()
     limit = least + 3 * error
     turn = (kappa[1, 0] - kappa[0, 1]) / 2
     if abs(turn) > limit:

@@ -62,7 +62,7 @@ def not_told(order: int, phasors: ComplexArray, motion: ComplexArray) -> str:
     if not np.isfinite(motion).all():
         return "a run has no usable window"
     combine = np.linalg.svd(phasors[None, :])[2][1:].conj()
-    condition = float(np.linalg.cond(combine @ motion))
+    condition = np.linalg.cond(combine @ motion)
     if condition < _ILL_CONDITIONED:
         return ""
     return (

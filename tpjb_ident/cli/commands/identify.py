@@ -115,12 +115,12 @@ def _worth_starting(campaign: Campaign) -> tuple[int | None, None, str | None]:
 
 def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
     """Build `PhasorSettings` from ``--lines`` and ``--delay``."""
-    from tpjb_ident.phasors.run_data import QUANTITIES, PhasorSettings
+    from tpjb_ident.phasors.run_data import VECTOR_QUANTITIES, PhasorSettings
 
     excited = () if lines is None else parse_values(lines, "speed", "--lines")
     times = {}
     for text in delays:
         quantity, _, time = text.partition("=")
-        refuse_unknown(quantity, QUANTITIES, "--delay")
+        refuse_unknown(quantity, VECTOR_QUANTITIES, "--delay")
         times[quantity] = parse_value(time, "time", f"--delay {quantity}")
     return PhasorSettings(excitation_lines=tuple(omega / (2 * math.pi) for omega in excited), delays=times)
