@@ -25,7 +25,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.phasors.line_fit import LineFitter, white_noise, window_median
 from tpjb_ident.phasors.lines import RecordTooShortError
-from tpjb_ident.phasors.run_data import Directed, RunPhasors, with_kept_beginning
+from tpjb_ident.phasors.run_data import Directed, RunPhasors, by_channel, with_kept_beginning
 from tpjb_ident.phasors.run_phasors import run_phasors
 
 #: Lines of a band that are looked at, the strongest of as many parts of it.
@@ -62,8 +62,8 @@ class RecordLines:
 def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel]) -> RecordLines:
     """One excitation line as identification has it."""
     values = phasors.mean, np.abs(phasors.residual[line]), phasors.scale
-    mean, floor, scatter = (_by_channel(window_median(rows), phasors, channels) for rows in values)
-    row = _by_channel(phasors.record[line], phasors, channels)
+    mean, floor, scatter = (by_channel(window_median(rows), phasors.channels, channels) for rows in values)
+    row = by_channel(phasors.record[line], phasors.channels, channels)
     omega = 2 * np.pi * phasors.lines.excitation[line].frequency
     return RecordLines(mean, floor, scatter, np.array([omega]), row[None])
 
@@ -73,7 +73,7 @@ def shaft_line(phasors: RunPhasors, channels: Sequence[Channel]) -> FloatArray:
     place = phasors.lines.place("1X")
     if place is None:
         return np.full(len(channels), np.nan)
-    return _by_channel(window_median(np.abs(phasors.z[:, place])), phasors, channels)
+    return by_channel(window_median(np.abs(phasors.z[:, place])), phasors.channels, channels)
 
 
 def shaft_force(phasors: RunPhasors) -> float:
@@ -94,13 +94,6 @@ def shaft_force(phasors: RunPhasors) -> float:
     if not max(forward, backward) > _CLEAR * parts.std(axis=0).max() / math.sqrt(len(force)):
         return math.nan
     return math.log(forward / max(backward, 1e-3 * forward))
-
-
-def _by_channel(values: np.ndarray, phasors: RunPhasors, channels: Sequence[Channel]) -> np.ndarray:
-    """Values of a run's phasors by channel, of the channels asked for; NaN of those that it has not."""
-    names = [channel.name for channel in phasors.channels]
-    places = np.array([names.index(c.name) if c.name in names else -1 for c in channels], dtype=int)
-    return np.append(values, np.nan)[places]
 
 
 def steady_level(values: FloatArray, rate: float, frequencies: Sequence[float]) -> RecordLines:

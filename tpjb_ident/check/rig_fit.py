@@ -28,6 +28,7 @@ from tpjb_ident.estimate.equation import (
 )
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.solve import Solution, Solver
+from tpjb_ident.phasors.run_data import by_channel
 from tpjb_ident.terms.axis import Axis
 from tpjb_ident.terms.corner import Corner
 from tpjb_ident.terms.delay import Delay
@@ -77,12 +78,11 @@ def _blocks(sensors: Sequence[Sensor], runs: Sequence[Observation]) -> Blocks:
     rows: list[dict[str, object]] = []
     points, names = [], []
     for observation in runs:
-        channels = {channel.name: k for k, channel in enumerate(observation.channels)}
-        places = np.array([channels.get(sensor.name, -1) for sensor in sensors])
-        floor = np.append(observation.lines.floor, np.nan)[places]
-        along = axes_of([observation.channels[k] if k >= 0 else None for k in places])
-        for omega, line in zip(observation.lines.omega, observation.lines.rows):
-            z = np.append(line, np.nan)[places]
+        channels = {channel.name: channel for channel in observation.channels}
+        along = axes_of([channels.get(sensor.name) for sensor in sensors])
+        floor = by_channel(observation.lines.floor, observation.channels, sensors)
+        phasors = by_channel(observation.lines.rows, observation.channels, sensors)
+        for omega, z in zip(observation.lines.omega, phasors):
             present = np.isfinite(z) & np.isfinite(floor)
             row = {"point": len(rows), "run": len(rows), "omega": omega, "present": present, "along": along}
             noise = np.diag(np.nan_to_num(floor) ** 2)

@@ -29,7 +29,7 @@ from tpjb_ident.identification.campaign_solution import (
     solved_with_clocks,
     unstated,
 )
-from tpjb_ident.identification.point import SOLVED, PointTask, finished_point, point_share
+from tpjb_ident.identification.point import SOLVED, finished_point, point_share
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.whole_record import mains_frequency
 from tpjb_ident.results.frequency_model import fits_over_frequency, with_frequency_outliers
@@ -152,11 +152,12 @@ def assemble(
     gathered = gather([digest.phasors for digest in digests], digests)
     report("estimating", 0, len(gathered))
     solved = solve_campaign(campaign, gathered, digests, workers, settings.correct, dry.stiffness)
-    task = PointTask(settings, checked, dry)
-    jobs = [(point_share(solved, data, p),) for p, data in enumerate(gathered)]
+    jobs = []
+    for p, data in enumerate(gathered):
+        jobs.append((point_share(solved, data, p, dry, check_conditions(checked, data.names)),))
     excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
     points = []
-    for point in workers.map(finished_point, jobs, task):
+    for point in workers.map(finished_point, jobs, settings):
         without = without_runs(point.point, excluded, several)
         points.append(replace(point, quality=merged(point.quality, without)))
         report("estimating", len(points), len(gathered))

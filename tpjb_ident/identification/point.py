@@ -6,7 +6,6 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import directions
-from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.conditions import Condition, holding, merged
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, method_of
 from tpjb_ident.estimators.r_matrix import phasor_table
@@ -29,7 +28,6 @@ from tpjb_ident.results.point_result import (
 )
 from tpjb_ident.runs.baseline import DryTest
 from tpjb_ident.runs.point_data import PointData
-from tpjb_ident.runs.run_jobs import check_conditions
 
 #: Name of the method that the solve stands for in the tables.
 SOLVED = "mm-eiv"
@@ -48,21 +46,15 @@ class PointShare:
     estimate: DynamicStiffness | None
     budget: dict[str, FloatArray]
     conditions: tuple[Condition, ...]
+    checks: tuple[Condition, ...]
     miss: ComplexArray
     film: FilmChange
 
 
-@dataclass(frozen=True)
-class PointTask:
-    """What all points of a campaign are finished with."""
-
-    settings: IdentifySettings
-    checked: Verdicts
-    dry: DryTest
-
-
-def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare:
-    """The part of a campaign's solution that belongs to point `p`."""
+def point_share(
+    solved: CampaignSolution, data: PointData, p: int, dry: DryTest, checks: tuple[Condition, ...]
+) -> PointShare:
+    """The part of a campaign's solution that belongs to point `p`, and what the `checks` of its runs say."""
     solution, blocks = solved.solution, solved.solution.blocks
     runs, m = len(data.runs), len(solution.rig)
     shift, factor = np.zeros((runs, m), complex), np.ones((runs, m), complex)
@@ -78,7 +70,8 @@ def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare
     D, F = vectors((z - shift[data.run_index]) / factor[data.run_index], data, solved.task)
     corrected = replace(data, D=D, F=F - np.einsum("nij,nj->ni", change[data.run_index], D))
     miss, film = solved.loads.misses[p], solved.film[p]
-    return PointShare(corrected, estimate, budget, _conditions(solved, p), miss, film)
+    conditions = *_conditions(solved, p), *dry.missing(data.omega)
+    return PointShare(corrected, estimate, budget, conditions, checks, miss, film)
 
 
 def _without_shaft(run: RunPhasors) -> RunPhasors:
@@ -131,9 +124,9 @@ def _estimate(
     return estimate, budget
 
 
-def finished_point(task: PointTask, share: PointShare) -> PointResult:
+def finished_point(settings: IdentifySettings, share: PointShare) -> PointResult:
     """The point with every method, its uncertainties and what is to be said of it."""
-    settings, data = task.settings, share.data
+    data = share.data
     by_method = all_methods(data, settings, share.estimate)
     if not settings.keep_weights:  # a verdict per window in place of its weights: 1 byte instead of 16
         for name, est in by_method.items():
@@ -150,9 +143,8 @@ def finished_point(task: PointTask, share: PointShare) -> PointResult:
         linearity.condition(),
         disagreement(by_method, settings.method),
         share.conditions,
-        task.dry.missing(data.omega),
         change_conditions(share.film, share.budget, best, size, settings.clearance),
-        check_conditions(task.checked, data.names),
+        share.checks,
     )
     return PointResult(
         **of_runs(data, [digest.temperatures for digest in data.digests]),

@@ -14,7 +14,7 @@ from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation,
 from tpjb_ident.estimators.least_trimmed import mm_fit, within_directions
 from tpjb_ident.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
 from tpjb_ident.phasors.frequency import shaft_order
-from tpjb_ident.phasors.run_data import Directed
+from tpjb_ident.phasors.run_data import Directed, by_channel
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 
@@ -85,13 +85,9 @@ def _residual_density(
     m = len(task.channels)
     rows: list[ComplexArray] = [np.zeros((0, m), complex)]
     for run, line in zip(data.runs, data.lines):
-        if line >= len(run.residual) or not len(run.residual[line]):
-            continue
-        places = {channel.name: k for k, channel in enumerate(run.channels)}
-        if any(sensor.name not in places for sensor in task.channels):
-            continue
-        bins = run.residual[line][:, [places[sensor.name] for sensor in task.channels]]
-        rows.append(np.sqrt(len(run.start) * run.length) * bins[np.isfinite(bins).all(axis=1)])
+        if line < len(run.residual):
+            bins = by_channel(run.residual[line], run.channels, task.channels)
+            rows.append(np.sqrt(len(run.start) * run.length) * bins[np.isfinite(bins).all(axis=1)])
     bins = np.concatenate(rows)
     if means is not None:
         bins = bins - motion_in(bins, np.ones(len(bins)), means.mean, film)
@@ -126,17 +122,16 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
     z = np.full((len(data.run_index), len(task.channels)), np.nan + 0j)
     described: list[dict[int, Channel]] = []
     for g, (run, line) in enumerate(zip(data.runs, data.lines)):
-        table = {(channel.name, channel.quantity): k for k, channel in enumerate(run.channels)}
+        named = {(channel.name, channel.quantity): channel for channel in run.channels}
+        phasors = by_channel(run.z[:, line], run.channels, task.channels)
         least = _LEAST_WINDOWS * np.isfinite(run.z[:, line]).mean(axis=0).max(initial=0.0)
         described.append({})
-        for j, sensor in enumerate(task.channels):
-            k = table.get((sensor.name, sensor.quantity))
-            finite = [] if k is None else run.z[np.isfinite(run.z[:, line, k]), line, k]
-            # phasors in more than a share of the windows, and not zeros throughout
-            if k is not None and len(finite) > least * len(run.z) and np.any(finite):
-                channel = described[g][j] = run.channels[k]
-                gain = warm_gain(channel, task.temperatures.get(run.run, np.nan))
-                z[data.run_index == g, j] = run.z[:, line, k] / gain
+        # in more than a share of the windows, and not zeros throughout
+        usable = (np.isfinite(phasors).mean(axis=0) > least) & np.nan_to_num(phasors).any(axis=0)
+        for j in np.flatnonzero(usable).tolist():
+            channel = described[g][j] = named[task.channels[j].name, task.channels[j].quantity]
+            gain = warm_gain(channel, task.temperatures.get(run.run, np.nan))
+            z[data.run_index == g, j] = phasors[:, j] / gain
     # channels that show nothing of what others of their quantity do
     z[:, ~alive(task.channels, np.abs(np.nan_to_num(z)).max(axis=0, initial=0.0))] = np.nan
     living = []

@@ -153,7 +153,7 @@ class _Advance:
     @property
     def slip(self) -> float:
         """Error of the frequency that stands clear of the steps' scatter [Hz], else zero."""
-        slip = np.median(self.steps)
+        slip = float(np.median(self.steps))
         spread = robust_deviation(self.steps - slip)
         return slip if abs(slip) > 4 * spread / np.sqrt(len(self.steps)) else 0.0
 

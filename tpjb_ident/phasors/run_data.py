@@ -154,6 +154,13 @@ class RunPhasors(Directed):
         return self.film_force(self.z[:, line])
 
 
+def by_channel(values: np.ndarray, channels: Sequence[Channel], wanted: Sequence[Channel]) -> np.ndarray:
+    """Values (.., n) of some channels in the order of those that are wanted, (.., m); NaN of those that are missing."""
+    places = {(channel.name, channel.quantity): k for k, channel in enumerate(channels)}
+    order = np.array([places.get((channel.name, channel.quantity), -1) for channel in wanted], dtype=int)
+    return np.concatenate([values, np.full((*values.shape[:-1], 1), np.nan)], axis=-1)[..., order]
+
+
 def complex_median(z: ComplexArray) -> ComplexArray:
     """Median of real and imaginary parts over the first axis; `z` (n, ...)."""
     return np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0)

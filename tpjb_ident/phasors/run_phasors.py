@@ -149,16 +149,15 @@ def extract(
             if k and (reader.rate, reader.length) != (readers[0].rate, readers[0].length):
                 firsts, samples = reader.first_samples(start), int(seconds * reader.rate + 1e-6)
             fast = (clocks or {}).get(reader.device.name, 0.0)
-            device = _DeviceFit(reader, samples, firsts, lines.at_speed(lines.speed, fast), speeds)
-            device.fit_all()
+            moved = lines.at_speed(lines.speed, fast)
+            (z, *figures), starts, shown = _device_windows(reader, samples, firsts, moved, speeds)
             # phases count by the lines' common frequencies
-            ahead = np.multiply.outer(device.start + 0.5 * seconds, fast * lines.frequencies[device.shown])
-            z, *figures = device.windows
+            ahead = np.multiply.outer(starts + 0.5 * seconds, fast * lines.frequencies[shown])
             chosen = np.array([c in reader.channels for c, _ in channels])
-            fit.z[np.ix_(np.arange(count), device.shown, chosen)] = z * np.exp(2j * np.pi * ahead)[:, :, None]
+            fit.z[np.ix_(np.arange(count), shown, chosen)] = z * np.exp(2j * np.pi * ahead)[:, :, None]
             for table, part in zip(fit[1:], figures):
                 table[:, chosen] = part
-            start = start if k else device.start
+            start = start if k else starts
     return RunPhasors(
         run.id,
         run.point,
@@ -173,62 +172,56 @@ def extract(
     )
 
 
-class _DeviceFit:
-    """Fit of one device's windows; those with times or a shaft speed of their own are fitted one by one."""
+def _device_windows(
+    reader: DeviceReader, length: int, firsts: IntArray, lines: LineSet, speeds: FloatArray
+) -> tuple[WindowFit, FloatArray, BoolArray]:
+    """Fit of one device's windows, chunk by chunk, their starts (n,) [s], and which lines its rate shows, (n_lines,).
 
-    def __init__(self, reader: DeviceReader, length: int, firsts: IntArray, lines: LineSet, speeds: FloatArray) -> None:
-        self.reader, self.length, self.firsts, self.lines, self.speeds = reader, length, firsts, lines, speeds
-        self.shown = lines.frequencies < HIGHEST * reader.rate
-        if not self.shown[: len(lines.excitation)].all() or length <= 2 * (2 * self.shown.sum() + 2):
-            names, run = ", ".join(c.name for c in reader.channels), reader.run
-            fault = f"{reader.rate:g} samples per second cannot show the excitation in windows of {length} samples"
-            raise refuse(run.file, f"channels {names}", fault, "Sample them faster, or record longer", run.id)
-        self.fitter = LineFitter(length, reader.rate, lines.frequencies[self.shown])
-        self.windows = WindowFit.empty(len(firsts), int(self.shown.sum()), len(reader.channels))
-        self.start = np.full(len(firsts), np.nan)
+    Those with times or a shaft speed of their own are fitted one by one. Those that are noisier than the run's usual
+    one are fitted anew: a chunk alone may hold nothing to compare.
+    """
+    shown = lines.frequencies < HIGHEST * reader.rate
+    if not shown[: len(lines.excitation)].all() or length <= 2 * (2 * shown.sum() + 2):
+        names, run = ", ".join(c.name for c in reader.channels), reader.run
+        fault = f"{reader.rate:g} samples per second cannot show the excitation in windows of {length} samples"
+        raise refuse(run.file, f"channels {names}", fault, "Sample them faster, or record longer", run.id)
+    fitter = LineFitter(length, reader.rate, lines.frequencies[shown])
+    windows = WindowFit.empty(len(firsts), int(shown.sum()), len(reader.channels))
+    starts = np.full(len(firsts), np.nan)
 
-    def fit_all(self) -> None:
-        """Fit all windows that the device recorded, chunk by chunk.
-
-        Windows that are noisier than the run's usual one are fitted anew: a chunk alone may hold nothing to compare.
-        """
-        step = max(1, CHUNK // self.length)
-        recorded = int(np.count_nonzero(self.firsts + self.length <= self.reader.length))
-        for first in range(0, recorded, step):
-            self._fit(first, min(first + step, recorded))
-        usual = usual_scale(self.windows.scale)
-        with np.errstate(invalid="ignore"):  # a window without phasors has no scale and stays as it is
-            loud = (self.windows.scale > SCALE_LIMIT * usual).any(axis=1)
-        for k in np.flatnonzero(loud).tolist() if recorded > step else ():
-            self._fit(k, k + 1, usual)
-
-    def _fit(self, first: int, stop: int, usual: FloatArray | None = None) -> None:
-        """Read and fit windows first..stop-1; `usual` (n_channels,) is the scale that windows of the run have."""
-        begin = self.firsts[first]
-        time, rows = self.reader.read(begin, self.firsts[stop - 1] + self.length)
+    def fit(first: int, stop: int, usual: FloatArray | None = None) -> None:
+        begin = firsts[first]
+        time, rows = reader.read(begin, firsts[stop - 1] + length)
         if time is None:
-            time = np.arange(begin, begin + rows.shape[1]) / self.reader.rate
-        at = (self.firsts[first:stop] - begin)[:, None] + np.arange(self.length)
+            time = np.arange(begin, begin + rows.shape[1]) / reader.rate
+        at = (firsts[first:stop] - begin)[:, None] + np.arange(length)
         time, rows = time[at], rows[:, at]
-        start = np.where(np.isfinite(time[:, 0]), time[:, 0], self.firsts[first:stop] / self.reader.rate)
-        fit = self.fitter.fit(rows, start, usual)
-        usual = usual_scale(fit.scale) if usual is None else usual
-        speeds, uneven = self.speeds[first:stop], self._is_uneven(time)
-        for i in np.flatnonzero(uneven | np.isfinite(speeds)).tolist():
-            timed = np.isfinite(time[i])
-            if timed.sum() > 2 * self.fitter.design.shape[1]:
-                lines = self.lines.at_speed(speeds[i]) if np.isfinite(speeds[i]) else self.lines
+        start = np.where(np.isfinite(time[:, 0]), time[:, 0], firsts[first:stop] / reader.rate)
+        part = fitter.fit(rows, start, usual)
+        usual = usual_scale(part.scale) if usual is None else usual
+        stray = np.abs(time - time[:, :1] - np.arange(length) / reader.rate).max(axis=1)
+        uneven = ~(stray <= MAX_JITTER / reader.rate)
+        for i in np.flatnonzero(uneven | np.isfinite(speeds[first:stop])).tolist():
+            timed, speed = np.isfinite(time[i]), speeds[first + i]
+            if timed.sum() > 2 * fitter.design.shape[1]:
+                moved = lines.at_speed(speed) if np.isfinite(speed) else lines
                 times = time[i, timed]
-                frequencies, stamps = lines.frequencies[self.shown], times if uneven[i] else None
-                fitter = LineFitter(len(times), self.reader.rate, frequencies, time=stamps)
-                fit.put(slice(i, i + 1), fitter.fit(rows[:, i : i + 1, timed], times[:1], usual))
-        self.windows.put(slice(first, stop), fit)
-        self.start[first:stop] = start
+                stamps = times if uneven[i] else None
+                single = LineFitter(len(times), reader.rate, moved.frequencies[shown], time=stamps)
+                part.put(slice(i, i + 1), single.fit(rows[:, i : i + 1, timed], times[:1], usual))
+        windows.put(slice(first, stop), part)
+        starts[first:stop] = start
 
-    def _is_uneven(self, time: FloatArray) -> BoolArray:
-        """Windows (n,) whose time stamps (n, length) stray from an even grid."""
-        grid = time[:, :1] + np.arange(self.length) / self.reader.rate
-        return ~(np.abs(time - grid).max(axis=1) <= MAX_JITTER / self.reader.rate)
+    step = max(1, CHUNK // length)
+    recorded = int(np.count_nonzero(firsts + length <= reader.length))
+    for first in range(0, recorded, step):
+        fit(first, min(first + step, recorded))
+    usual = usual_scale(windows.scale)
+    with np.errstate(invalid="ignore"):  # a window without phasors has no scale and stays as it is
+        loud = (windows.scale > SCALE_LIMIT * usual).any(axis=1)
+    for k in np.flatnonzero(loud).tolist() if recorded > step else ():
+        fit(k, k + 1, usual)
+    return windows, starts, shown
 
 
 #: Second thoughts about the frequencies, at most.
