@@ -25,8 +25,8 @@ from tpjb_ident.phasors.lines import (
 )
 from tpjb_ident.results.frequency_model import REFUSED, fit_over_frequency, fits_over_frequency
 from tpjb_ident.results.linearity import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
-from tpjb_ident.runs.baseline import DryTest
 from tpjb_ident.runs.point_data import PointData
+from tpjb_ident.runs.run_jobs import DryTest
 
 K = np.array([[2.0e8, 1e7], [-3e7, 4.0e8]])
 C = np.array([[4e5, 2e4], [-1e4, 6e5]])

@@ -13,7 +13,7 @@ from tests.rigs import closed_form as cf
 from tpjb_ident.estimate.equation import Sensor
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.run_data import PhasorSettings
-from tpjb_ident.runs.baseline import dry_test
+from tpjb_ident.runs.run_jobs import dry_test
 from tpjb_ident.runs.static_load import MAX_MISS, MAX_SIDEWAYS, StaticLoads, load_conditions, load_misses
 
 

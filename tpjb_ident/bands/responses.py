@@ -53,20 +53,15 @@ def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, e
     shows across that is noise.
     """
     if instrument == "periods":
-        return _over_periods(runs[0].phasors.z[:, bins[0]], runs[0].phasors.start)
+        rows, start = runs[0].phasors.z[:, bins[0]], runs[0].phasors.start
+        n, mean, time = len(rows), rows.mean(axis=0), start - start.mean()
+        remaining, spread = rows - mean, max(float(time @ time), 1e-300)
+        slope, size = time @ remaining / spread, np.array([1 / spread])
+        return LineResponse(mean[None], float(n), _outer(remaining), n - 1.0, slope[None], size, float(n))
     z = np.concatenate([run.phasors.z[0, bins] for run in runs])
     sources = [_sources(run, instrument) for run in runs]
     u, by_time = (np.concatenate([part[bins] for part in parts]) for parts in zip(*sources))
     return _regressed(z, u, by_time, nuisance(runs, bins, u, ends))
-
-
-def _over_periods(rows: ComplexArray, start: FloatArray) -> LineResponse:
-    """Mean of the periods' phasors (n, m) and how they move; `start` (n,) [s]."""
-    n, mean = len(rows), rows.mean(axis=0)
-    time = start - start.mean()
-    remaining, spread = rows - mean, max(float(time @ time), 1e-300)
-    slope = time @ remaining / spread
-    return LineResponse(mean[None], float(n), _outer(remaining), n - 1.0, slope[None], np.array([1 / spread]), float(n))
 
 
 def nuisance(runs: Sequence[RunSpectra], bins: IntArray, sources: ComplexArray, ends: bool) -> ComplexArray:

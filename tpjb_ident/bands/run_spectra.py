@@ -95,7 +95,7 @@ def find_period(clean: Samples, band: tuple[float, float], lines: tuple[Line, ..
     least = freedom[np.argmin(remainder)]
     more = np.maximum(freedom - least, 1.0)
     allowed = (least + more * fdtri(more, least, 1 - _CHANCE)) / (least + more)
-    k = int(np.argmax(remainder <= remainder.min() * allowed))
+    k = np.argmax(remainder <= remainder.min() * allowed)
     ratio = periods / periods[k]
     foreign = np.abs(ratio - np.round(ratio)) * periods[k] > _ONE_LAG * clean.rate / band[1]
     unclear = (freedom * np.log(remainder / remainder[k]) < math.log(_CLEAR))[foreign].any()

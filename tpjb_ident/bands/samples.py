@@ -22,7 +22,7 @@ from rigdata.problem import refuse
 from rigdata.run import Run
 from rigdata.vector import directions, inverse_directions
 from tpjb_ident.check.signals import is_spare
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.line_fit import BAD_LIMIT, even_design, robust_deviation
 from tpjb_ident.phasors.lines import HIGHEST, MAINS_DRIFT, SPEED_DRIFT, Line, LineSettings, strong_lines
 from tpjb_ident.phasors.run_data import Directed, device_readers
@@ -54,7 +54,7 @@ class Samples(Directed):
     channels: tuple[Channel, ...]  #: probes, cells, accelerometers, in this order
     rows: FloatArray  #: (m, n)
     command: FloatArray | None  #: (2, n): along X and Y, in units of its own
-    conditions: tuple[Condition, ...] = ()
+    conditions: Conditions = ()
 
     @property
     def length(self) -> int:
@@ -273,7 +273,7 @@ def _shown(samples: Samples, nominal: float, wander: float) -> float:
         spectra = zoom_fft(rows * window, ends, len(power), fs=samples.rate, endpoint=True)
         size = max(np.sum(rows**2) * np.sum(window**2), 1e-300)
         power += np.sum(np.abs(spectra) ** 2, axis=0) / size
-    k = int(np.argmax(power))
+    k = np.argmax(power)
     if not 0 < k < 2 * reach or power[k] < _SHOWN:
         return nominal
     return float(ends[0] + step * (k + vertex(power[k - 1 : k + 2])))

@@ -17,7 +17,7 @@ from tpjb_ident.check.rig_fit import rig_fit
 from tpjb_ident.check.run_gain import check_agreement, check_film, check_positions, check_shaft_lines, point_runs
 from tpjb_ident.check.set_points import check_excitation, check_rotation, check_speed, check_static_loads
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
-from tpjb_ident.conditions import SEVERITIES, Condition
+from tpjb_ident.conditions import SEVERITIES, Conditions
 from tpjb_ident.rounding import listed
 from tpjb_ident.terms.mains import MAINS_ON_LINE
 
@@ -64,7 +64,7 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
     return _sorted([*campaign.notes, *merged, *_leftovers(campaign)])
 
 
-def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[list[Observation], tuple[Condition, ...]]:
+def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[list[Observation], Conditions]:
     """Judge runs beside each other; what is found stands in the reports of the copies that are given back.
 
     And what contradicts the description of the rig in all runs: identification finds that by itself.

@@ -21,7 +21,7 @@ from rigdata.run import Run
 from rigdata.vector import directions
 from tpjb_ident.check.findings import Reporter, plane_of
 from tpjb_ident.check.signals import ALWAYS_NEEDED, check_clock, check_signal, needed
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Conditions
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.phasors.line_fit import LineFitter, white_noise, window_median
 from tpjb_ident.phasors.lines import RecordTooShortError
@@ -164,7 +164,7 @@ class Observation(Directed):
     #: (m,): size of what turns with the shaft, SI; empty where nothing tells it
     shaft_line: FloatArray = field(default_factory=lambda: np.empty(0))
     shaft_force: float = math.nan  #: of the 1X force, see `tpjb_ident.check.observation`
-    conditions: tuple[Condition, ...] = ()  #: of its phasors
+    conditions: Conditions = ()  #: of its phasors
 
     def of(self, quantity: str) -> list[Channel]:
         """Channels of `quantity`."""

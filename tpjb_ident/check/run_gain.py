@@ -142,7 +142,7 @@ def check_film(runs: PointRuns) -> None:
     names = [probe.name for probe in probes]
     if _film_like(stiffness) < 1 / _DEFINITE:
         sizes = np.linalg.norm(stiffness @ runs.probe_plane, axis=0)
-        larger, smaller = names[int(np.argmin(sizes))], names[int(np.argmax(sizes))]
+        larger, smaller = names[np.argmin(sizes)], names[np.argmax(sizes)]
         for observation in runs.observations:
             observation.report.ask("scales", float(sizes.max() / sizes.min()), *names, larger=larger, smaller=smaller)
         return
@@ -254,7 +254,7 @@ def deviating_runs(runs: PointRuns) -> dict[int, WrongGain | None]:
         oddness = [_oddness(runs, run, runs.without({*deviating, run})) for run in remaining]
         if max(oddness) < 1.0:
             break
-        deviating.add(remaining[int(np.argmax(oddness))])
+        deviating.add(remaining[np.argmax(oddness)])
     fellows = runs.without(deviating)
     return {run: gain_of_run(runs, run, fellows) for run in sorted(deviating)}
 

@@ -31,7 +31,7 @@ from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
 from rigdata.vector import plane_vector
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Conditions
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Rig:
     mass_uncertainty: float = 0.0
     mount: str = "cells"  #: "cells", "floating", or "unknown": no accelerometer tells
     #: by term: what its test said of sensors that are since taken as uncertain as it showed them
-    contradicted: Mapping[str, tuple[Condition, ...]] = field(default_factory=dict)
+    contradicted: Mapping[str, Conditions] = field(default_factory=dict)
     bare: RigStiffness = field(default_factory=RigStiffness)
     static: bool = True  #: whether the cells show the static load
     to_set_point: bool = True  #: whether H is that at the set points, not at the runs' own loads

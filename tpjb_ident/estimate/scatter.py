@@ -278,7 +278,7 @@ def _unusual(chi: FloatArray, spare: FloatArray, usable: BoolArray, before: Bool
         if usual.sum() < 2:
             break
         ratio = np.where(usual, chi / np.maximum(spare, 1.0), -1.0)
-        worst = int(np.argmax(ratio))
+        worst = np.argmax(ratio)
         remaining = usual.copy()
         remaining[worst] = False
         all_spare = spare[remaining].sum()

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.arrowhead import NUMBERS, Prior, Shape, Step, Sums, are_told, step
 from tpjb_ident.estimate.equation import (
     HOUSING_ROWS,
@@ -140,7 +140,7 @@ class Solution:
         compliances = (term.standing_on(self.fitted[term.name]) for term in self.terms)
         return next((compliance for compliance in compliances if compliance is not None), None)
 
-    def conditions(self) -> tuple[Condition, ...]:
+    def conditions(self) -> Conditions:
         """What the terms' tests say of the rig: it touches every point."""
         conditions = [condition for term in self.terms for condition in term.conditions(self.fitted[term.name])]
         text = "the runs together give no H, as where they are driven below their noise: it is the windows' alone"
@@ -285,7 +285,11 @@ class Solver:
         z = np.concatenate([blocks.z, np.zeros((len(blocks), HOUSING_ROWS))], axis=1) - state.shift
         z[:, : blocks.z.shape[1]] *= blocks.present
         white = np.linalg.solve(L, z[:, :, None])
-        state.u = np.asarray(np.linalg.solve(_regular(R[:, :UNKNOWNS]), Q1 @ white)[:, :, 0])
+        # ones on the diagonal where a block's readings tell nothing of an unknown
+        size = np.abs(np.einsum("nii->ni", R[:, :UNKNOWNS]))
+        untold = size <= _UNTOLD * size.max(axis=1, keepdims=True)
+        regular = R[:, :UNKNOWNS] + untold[:, :, None] * np.eye(UNKNOWNS)
+        state.u = np.asarray(np.linalg.solve(regular, Q1 @ white)[:, :, 0])
         film = film_columns(rig, blocks, state) * self.unit
         by_point = [term.columns(blocks, state) for term in self.by_point.terms]
         shared = [term.columns(blocks, state) for term in self.shared.terms]
@@ -403,13 +407,6 @@ class _Rows:
         spent = np.einsum("nca,nca->nc", along.J_h @ conditional, along.J_h)
         chi_square = np.einsum("nk,nk->n", self.r, self.r)
         return Residuals(chi_square, self.counted, leverage, along.chi_square, along.information, spent)
-
-
-def _regular(R: ComplexArray) -> ComplexArray:
-    """R (n, 4, 4) with ones on its diagonal where a block's readings tell nothing of an unknown."""
-    size = np.abs(np.einsum("nii->ni", R))
-    untold = size <= _UNTOLD * size.max(axis=1, keepdims=True)
-    return np.asarray(R + untold[:, :, None] * np.eye(UNKNOWNS), dtype=complex)
 
 
 def _real(rows: ComplexArray) -> FloatArray:

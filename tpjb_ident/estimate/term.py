@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Conditions
 from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, Sensor, State, film_change_rows
 
 if TYPE_CHECKING:
@@ -148,11 +148,11 @@ class Term:
         """Compliance of the springs under the housing (2, 2) [m/N], of the term that knows it."""
         return None
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """What to say where the records contradict what was stated."""
         return ()
 
-    def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> tuple[Condition, ...]:
+    def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> Conditions:
         """What to say of one point (its number), `h` (2, 2) [N/m]."""
         return ()
 

@@ -9,6 +9,11 @@ Kept as a reference with its traps guarded: complex input is refused (statsmodel
 errors), the system is scaled before (``conv="coefs"`` has an absolute tolerance and never ends in SI units), and
 reaching the iteration limit is reported (statsmodels says nothing). What cannot be guarded: Re and Im of a row get
 weights of their own, and the M-estimator has no breakdown against bad displacements. `mm` exists for that.
+
+The default method on windows alone is the campaign's own solve, for a single operating point. The windows of a
+direction become one block with the covariance of its noise. Noise of the displacements cannot pull H towards zero
+there, directions that differ by more than their repeats show as scatter, and one that stands apart from the others
+loses its weight: `tpjb_ident.estimate.solve`, without terms.
 """
 
 from collections.abc import Callable
@@ -19,10 +24,17 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
+from rigdata.operating_point import OperatingPoint
 from rigdata.units import to_si
-from tpjb_ident.conditions import Condition, holding, merged
+from tpjb_ident.conditions import Condition, Conditions, holding, merged
 from tpjb_ident.errors import ArgumentError, TpjbError
+from tpjb_ident.estimate.arrowhead import Shape
+from tpjb_ident.estimate.equation import Rig, Sensor, stacked
+from tpjb_ident.estimate.noise import unbiased_noise
+from tpjb_ident.estimate.scatter import Scatter
+from tpjb_ident.estimate.solve import Solver
 from tpjb_ident.estimate.statistics import bisquare_weight, huber_weight, reweighted
+from tpjb_ident.estimate.window_means import Readings, attenuation, window_means
 from tpjb_ident.estimators.least_trimmed import mm_fit, within_directions
 from tpjb_ident.estimators.r_matrix import (
     PhasorTable,
@@ -33,8 +45,54 @@ from tpjb_ident.estimators.r_matrix import (
     phasor_table,
     real_rows,
 )
-from tpjb_ident.estimators.solved_windows import solved_windows
 from tpjb_ident.estimators.stiffness import DynamicStiffness
+
+#: Fewer spare repeats than this cannot give a 4x4 complex covariance worth using.
+_MIN_SPARE_REPEATS = 8.0
+#: Rows of a table: displacement and force along X and Y, straight, without uncertainty.
+_AXES = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0]])
+_QUANTITIES = ("displacement", "displacement", "force", "force")
+_RIG = Rig(tuple(Sensor(quantity, quantity) for quantity in _QUANTITIES), mass=0.0, mount="unknown")
+
+
+def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray) -> TableFit | None:
+    """Solve from a start of H (2, 2) with window weights (n,); None where repeats are too few for a noise."""
+    z = np.concatenate([table.D, table.F], axis=1)
+    present = np.ones((table.n_directions, 4), dtype=bool)
+    # a table has no times: its windows tell of no drift, nor what of their scatter is motion
+    means = window_means(z, table.direction, np.zeros(len(z)), Readings([""] * 4, np.zeros((4, 4))), weights, present)
+    if means is None or means.spare < _MIN_SPARE_REPEATS:
+        return None
+    noise = unbiased_noise(means.noise, means.spare)
+    rows: list[dict[str, object]] = []  # a block a direction that has windows
+    for g in np.flatnonzero(means.count > 0):
+        row = {"run": g, "omega": 1.0, "z": means.mean[g], "noise": noise / means.count[g], "dof": means.spare}
+        rows.append(row | {"present": np.ones(4, dtype=bool), "along": _AXES})
+    names = [str(g) for g in range(len(means.count))]
+    blocks = stacked([OperatingPoint(0.0, excitation=1.0)], names, 4, rows)
+    # what scatter a good rig has is not asked: a table may be computed
+    shape = Shape(np.zeros(1, dtype=np.intp), scatter=replace(Scatter.none(1, len(blocks)), usual=0.0))
+    solution = Solver(_RIG, blocks, (), start[None], shape).run()
+    if not np.isfinite(solution.h).all():
+        return None
+    run_weights = np.zeros(table.n_directions)
+    run_weights[blocks.run] = solution.scatter.weights
+    return TableFit(
+        solution.h[0],
+        means.weights * run_weights[table.direction],
+        solution.records[0],
+        solution.freedom(0),
+        not_locked(means.wandering, table.n_directions),
+        float(solution.chi_square[0]),
+        attenuation(means.mean[:, :2], means.count, means.noise[:2, :2]),
+    )
+
+
+def not_locked(wandering: int, directions: int) -> Conditions:
+    """Say in how many directions the drive's phase wanders."""
+    text = f"drive phase wanders in {wandering} of {directions} directions; their windows were turned to one phase"
+    return holding((wandering, "drive-not-locked", text))
+
 
 #: Names of the norms and the statsmodels class behind each.
 NORMS = {
@@ -63,7 +121,7 @@ class RlmSolution:
     scale: float
     iterations: int
     covariance: FloatArray | float = np.nan  #: (p, p): H1, scaled; NaN where it is not asked for
-    conditions: tuple[Condition, ...] = ()
+    conditions: Conditions = ()
 
 
 class ComplexInputError(TpjbError, TypeError):
@@ -128,7 +186,7 @@ def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = Non
     h = np.zeros((2, 2), dtype=complex)
     covariance = np.zeros((8, 8))
     weights = np.ones((n, 2))
-    conditions: tuple[Condition, ...] = ()
+    conditions: Conditions = ()
     for axis in range(2):
         design, response = real_rows(D, F[:, axis])
         solution = solve_rlm(design, response, settings)
@@ -248,7 +306,7 @@ def estimate_table(
     return _in_units(table, omega, name, fit)
 
 
-def _obstacles(table: PhasorTable, method: str) -> tuple[Condition, ...]:
+def _obstacles(table: PhasorTable, method: str) -> Conditions:
     """Why a table gives no H, the first reason first."""
     few = len(table) < 2 or table.n_directions < 2
     count = f"{len(table)} usable windows in {table.n_directions} directions; H needs two directions at least"
@@ -342,7 +400,7 @@ def _in_units(table: PhasorTable, omega: float, name: str, fit: TableFit) -> Dyn
     )
 
 
-def fit_conditions(condition: float, weights: FloatArray, directions: int) -> tuple[Condition, ...]:
+def fit_conditions(condition: float, weights: FloatArray, directions: int) -> Conditions:
     """What the windows of a fit say of it: condition number of their displacements, weights, directions."""
     rejected = float((weights < REJECTED_WEIGHT).mean()) if len(weights) else 0.0
     number = f"condition number {condition:.3g} of the displacement directions > 30"

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.statistics import (
     bisquare_weight,
     efficiency_constant,
@@ -181,14 +181,14 @@ def _concentrated(
         spread = regression.scatter(rows, weights)
         exact = (np.einsum("...ii->...", spread).real <= nothing) & (told.min(axis=-1) > _UNDETERMINED)
         if exact.any():  # nothing is left in any component: that is the answer
-            return weights[int(np.argmax(exact))], True
+            return weights[np.argmax(exact)], True
         if step == 1:
             best = np.argsort(_log_det(spread), kind="stable")[:_KEPT]
             B, spread, rows, weights, told = B[best], spread[best], rows[best], weights[best], told[best]
         elif np.array_equal(B, previous):
             break  # every start keeps the same windows
         distance = told * distance2(rows, spread)
-    return weights[int(np.argmin(_log_det(spread)))], False
+    return weights[np.argmin(_log_det(spread))], False
 
 
 def _nearest(distance: FloatArray, h: int) -> FloatArray:
@@ -238,7 +238,7 @@ class RobustFit:
     scatter: ComplexArray  #: (q, q) complex
     weights: FloatArray  #: (n,), 0, 1: in
     iterations: int
-    conditions: tuple[Condition, ...]
+    conditions: Conditions
 
 
 def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1, tolerance: float = 1e-12) -> RobustFit:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Conditions
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.estimate.statistics import half_width
 from tpjb_ident.rounding import with_interval
@@ -70,7 +70,7 @@ class DynamicStiffness:
     dof: FloatArray
     method: str
     weights: FloatArray
-    status: tuple[Condition, ...] = ()
+    status: Conditions = ()
     condition: float = np.nan
     chi_square: float = np.nan
     spare_equations: int = 0

@@ -18,7 +18,7 @@ from scipy.special import chdtrc
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.campaign import Campaign
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.arrowhead import complex_matrix
 from tpjb_ident.estimate.equation import (
     Blocks,
@@ -157,7 +157,7 @@ _LOAD_ERROR = 2e-4
 _LEAST_SCATTER = 1e-3
 
 
-def unstated(campaign: Campaign) -> tuple[Condition, ...]:
+def unstated(campaign: Campaign) -> Conditions:
     """Say which probes and cells have no uncertainty in the manifest."""
     names = [s.name for s in sensors_of(campaign) if s.quantity in VECTOR_QUANTITIES[:2] and s.uncertainty is None]
     text = f"no uncertainty in the manifest for {', '.join(names)}: their systematic part is left out"

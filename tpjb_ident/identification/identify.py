@@ -12,7 +12,7 @@ from rigdata.vector import zero_uncertainty
 from tpjb_ident.bands.responses import BandPoint, band_groups, read_point
 from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.check.observation import observe
-from tpjb_ident.conditions import Condition, holding, merged
+from tpjb_ident.conditions import Conditions, holding, merged
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.estimate.arrowhead import real_numbers
 from tpjb_ident.estimate.equation import RigStiffness, Sensor, campaign_rig, sensors_of
@@ -37,9 +37,17 @@ from tpjb_ident.results.identification import BandLine, BandResult, Identificati
 from tpjb_ident.results.linearity import FilmChange, change_conditions
 from tpjb_ident.results.point_result import PointResult, differing_runs, of_runs, physics, with_probe_doubts
 from tpjb_ident.rounding import listed
-from tpjb_ident.runs.baseline import DryTest, dry_test
 from tpjb_ident.runs.point_data import ExcludedRun, FinishedRuns, excluded_runs, gather, without_runs
-from tpjb_ident.runs.run_jobs import Progress, RunStore, all_runs, campaign_verdicts, check_conditions, check_finished
+from tpjb_ident.runs.run_jobs import (
+    DryTest,
+    Progress,
+    RunStore,
+    all_runs,
+    campaign_verdicts,
+    check_conditions,
+    check_finished,
+    dry_test,
+)
 from tpjb_ident.runs.static_load import static_loads
 from tpjb_ident.runtime.executors import Workers
 from tpjb_ident.terms.registry import cell_stiffness
@@ -251,9 +259,7 @@ def _estimate(
     return replace(est, condition=float(np.median(solved.condition[lines]))), budget
 
 
-def _result(
-    solved: BandSolution, b: int, quality: tuple[Condition, ...], clearance: float | None
-) -> tuple[BandResult, list[int]]:
+def _result(solved: BandSolution, b: int, quality: Conditions, clearance: float | None) -> tuple[BandResult, list[int]]:
     """Lines, models and points of one band, and the numbers of its parts."""
     data, usable = solved.data.points[b], solved.usable_of(b)
     lines = tuple(_line(solved, data, int(k)) for k in usable)
@@ -279,7 +285,7 @@ def _line(solved: BandSolution, point: BandPoint, k: int) -> BandLine:
     return BandLine(best.omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
 
 
-def _point(solved: BandSolution, q: int, quality: tuple[Condition, ...], clearance: float | None) -> PointResult:
+def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float | None) -> PointResult:
     """One part of a band as a point: its lines alone tell its h; K-C-M only says how h changes within it."""
     lines = solved.parts[q]
     b = int(solved.data.band[lines[0]])
@@ -307,7 +313,7 @@ def _point(solved: BandSolution, q: int, quality: tuple[Condition, ...], clearan
     )
 
 
-def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> tuple[Condition, ...]:
+def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> Conditions:
     """What the lines of one band say, and its runs beside each other."""
     mine = solved.data.band == b
     driven, usable = np.flatnonzero(mine & solved.data.driven), solved.usable_of(b)

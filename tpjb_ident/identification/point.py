@@ -6,10 +6,9 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import directions
-from tpjb_ident.conditions import Condition, holding, merged
-from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, method_of
+from tpjb_ident.conditions import Conditions, holding, merged
+from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, method_of, not_locked
 from tpjb_ident.estimators.r_matrix import phasor_table
-from tpjb_ident.estimators.solved_windows import not_locked
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.campaign_solution import RUN_TERMS, CampaignSolution, estimate_of
 from tpjb_ident.identification.point_means import channel_windows, means_attenuation, vectors
@@ -26,8 +25,8 @@ from tpjb_ident.results.point_result import (
     of_runs,
     rejected_windows,
 )
-from tpjb_ident.runs.baseline import DryTest
 from tpjb_ident.runs.point_data import PointData
+from tpjb_ident.runs.run_jobs import DryTest
 
 #: Name of the method that the solve stands for in the tables.
 SOLVED = "mm-eiv"
@@ -45,15 +44,13 @@ class PointShare:
     data: PointData
     estimate: DynamicStiffness | None
     budget: dict[str, FloatArray]
-    conditions: tuple[Condition, ...]
-    checks: tuple[Condition, ...]
+    conditions: Conditions
+    checks: Conditions
     miss: ComplexArray
     film: FilmChange
 
 
-def point_share(
-    solved: CampaignSolution, data: PointData, p: int, dry: DryTest, checks: tuple[Condition, ...]
-) -> PointShare:
+def point_share(solved: CampaignSolution, data: PointData, p: int, dry: DryTest, checks: Conditions) -> PointShare:
     """The part of a campaign's solution that belongs to point `p`, and what the `checks` of its runs say."""
     solution, blocks = solved.solution, solved.solution.blocks
     runs, m = len(data.runs), len(solution.rig)
@@ -78,7 +75,7 @@ def _without_shaft(run: RunPhasors) -> RunPhasors:
     return replace(run, conditions=tuple(c for c in run.conditions if not c.endswith("X on excitation line")))
 
 
-def _conditions(solved: CampaignSolution, p: int) -> tuple[Condition, ...]:
+def _conditions(solved: CampaignSolution, p: int) -> Conditions:
     counted = solved.misfits[solved.solution.blocks_of(p) & (solved.solution.scatter.weights > 0)]
     # two runs fix H: what is left over is shared by all of them
     share = np.sqrt(np.sum(counted**2) / (len(counted) - 2)) if len(counted) > 2 else 0.0
@@ -180,7 +177,7 @@ def all_methods(
     return estimates
 
 
-def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[Condition, ...]:
+def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> Conditions:
     """Say which methods differ from the default beyond both intervals."""
     best = by_method[default]
     conditions = []
@@ -190,7 +187,7 @@ def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[
         gap = np.abs(estimate.vector - best.vector)
         room = np.hypot(estimate.half_width(systematic=False), best.half_width(systematic=False))
         if (gap > room).any():
-            worst = int(np.argmax(gap / room))
+            worst = np.argmax(gap / room)
             conditions.append(f"{name} ({gap[worst] / room[worst]:.1f} times the interval)")
     return holding((conditions, "methods-disagree", f"{', '.join(conditions)} away from {default}"))
 

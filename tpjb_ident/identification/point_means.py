@@ -8,7 +8,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.vector import directions
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import Sensor, alive
 from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation, motion_in, window_means
 from tpjb_ident.estimators.least_trimmed import mm_fit, within_directions
@@ -33,9 +33,9 @@ class PointMeans:
     channels: tuple[tuple[Channel | None, ...], ...]  #: (g, m): None where a run says nothing of a sensor
     condition: float
     residual: tuple[ComplexArray, float]  #: density of the noise (m, m) and its degrees of freedom
-    status: tuple[Condition, ...] = ()
+    status: Conditions = ()
     shaft: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (g,): NaN where it is not on the line
-    shaft_conditions: tuple[Condition, ...] = ()
+    shaft_conditions: Conditions = ()
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def _residual_density(
     return np.asarray(bins.T @ bins.conj() / max(freedom, 1.0), complex), freedom
 
 
-def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple[ComplexArray, tuple[Condition, ...]]:
+def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple[ComplexArray, Conditions]:
     """Unit phasor of what turns with the shaft in every run (g,), where the runs tell it from the motion."""
     none = np.full(len(data.runs), np.nan + 0j)
     first = data.runs[0].lines
@@ -163,7 +163,7 @@ def _window_times(data: PointData) -> FloatArray:
     return np.concatenate([run.start + 0.5 * run.length for run in data.runs])
 
 
-def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[Condition, ...]]:
+def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, Conditions]:
     """Weights (n,) of all given windows, H (2, 2) and the start's conditions."""
     weights = np.zeros(len(table.valid))
     none = np.full((2, 2), np.nan + 0j)

@@ -130,7 +130,7 @@ def _clean_stretch(values: FloatArray) -> FloatArray:
     usual = np.quantile(bend[np.isfinite(bend)], 0.99) if np.isfinite(bend).any() else 0.0
     bad[1:-1] |= bend > _GLITCH * usual
     edges = np.concatenate([[-1], np.flatnonzero(bad), [len(values)]])
-    longest = int(np.argmax(np.diff(edges)))
+    longest = np.argmax(np.diff(edges))
     return values[edges[longest] + 1 : edges[longest + 1]]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from rigdata.run import Run, pulse_times
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Condition, Conditions, holding
 from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.lines import NAMED_HARMONICS, SPEED_DRIFT, LineSet, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors, phasor_noise
@@ -40,7 +40,7 @@ class ShaftCourse:
         return np.interp(time, self.time, self.speed)
 
 
-def shaft_speed(run: Run) -> tuple[float, tuple[Condition, ...]]:
+def shaft_speed(run: Run) -> tuple[float, Conditions]:
     """Shaft speed of a run [Hz]: the tachometer's, or the set point where it gives nothing usable."""
     nominal = run.point.shaft_speed_hz
     record = run.speed(0, FIRST_LOOK)
@@ -123,7 +123,7 @@ class Tuning:
 
     lines: LineSet
     follow: ShaftCourse | None
-    conditions: tuple[Condition, ...]
+    conditions: Conditions
     settled: bool  #: whether the windows told the shaft's course: a drive far off its set point hides it
 
 

@@ -173,7 +173,10 @@ class LineFitter:
             is_good = ~gaps & (remainder <= BAD_LIMIT * scale[k])
             residual[k] = np.where(is_good, values[k] - self.design @ coefficients[k], 0.0)
         mean = coefficients @ self._level + offset[:, 0]
-        z = _phasors(coefficients.reshape(q, n, -1), self.frequencies, start)
+        # turned from the windows' own starts to that of the run
+        waves = coefficients[:, : 2 * len(self.frequencies)].reshape(q, n, -1)
+        turn = np.exp(-2j * np.pi * np.multiply.outer(start, self.frequencies))
+        z = np.ascontiguousarray(((waves[:, :, 0::2] + 1j * waves[:, :, 1::2]) * turn).transpose(1, 2, 0))
         figures = (np.ascontiguousarray(part.reshape(q, n).T) for part in (mean, scale, lost))
         return WindowFit(z, *figures), residual.reshape(q, n, -1)
 
@@ -249,14 +252,6 @@ def even_design(length: int, rate: float, frequencies: FloatArray, drift_order: 
         design[:, 2 * k], design[:, 2 * k + 1] = wave.real, -wave.imag
     design[:, 2 * len(frequencies) :] = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, length), drift_order)
     return design
-
-
-def _phasors(coefficients: FloatArray, frequencies: FloatArray, start: FloatArray) -> ComplexArray:
-    """From (q, n, n_columns) to phasors (n, n_lines, q), turned from the windows' own starts to that of the run."""
-    n = 2 * len(frequencies)
-    local = coefficients[:, :, 0:n:2] + 1j * coefficients[:, :, 1:n:2]
-    turn = np.exp(-2j * np.pi * np.multiply.outer(start, frequencies))
-    return np.ascontiguousarray((local * turn).transpose(1, 2, 0))
 
 
 def _level(design: FloatArray, frequencies: FloatArray, duration: float) -> FloatArray:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.errors import TpjbError
 
 #: Highest line that a record shows, over its sample rate.
@@ -52,7 +52,7 @@ class LineSet:
 
     excitation: tuple[Line, ...]
     nuisance: tuple[Line, ...]
-    conditions: tuple[Condition, ...] = ()
+    conditions: Conditions = ()
     speed: float = 0.0
     faint: tuple[Line, ...] = ()
 

@@ -21,7 +21,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
 from rigdata.run import Run
 from rigdata.vector import directions, plane_vector
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Conditions
 from tpjb_ident.phasors.line_fit import usual_scale
 from tpjb_ident.phasors.lines import LineSet, LineSettings, WindowSettings
 
@@ -113,7 +113,7 @@ class RunPhasors(Directed):
     scale: FloatArray  #: (n_windows, n_channels): robust standard deviation of the residual
     lost: FloatArray  #: (n_windows, n_channels): share of the samples left out
     housing_mass: float
-    conditions: tuple[Condition, ...] = ()
+    conditions: Conditions = ()
     shaft_phase: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (n_lines,) complex
     span: tuple[float, float] | None = None  #: s: part of the record with one excitation; None: all of it
     device: tuple[str, ...] = ()  #: (n_channels,): clock terms exist between devices only

@@ -89,7 +89,7 @@ def _cuts(groups: list[ComplexArray], first: int, stop: int) -> list[int]:
     joined = np.concatenate(parts, axis=1)
     places = range(_LEAST, stop - first - _LEAST + 1)
     remainders = [_scatter(joined[:k]) + _scatter(joined[k:]) for k in places]
-    best = places[int(np.argmin(remainders))]
+    best = places[np.argmin(remainders)]
     if min(remainders) > _LEFT * _scatter(joined):
         return []
     for part in parts:

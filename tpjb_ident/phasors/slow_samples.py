@@ -19,7 +19,7 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from rigdata.vector import directions
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.line_fit import robust_deviation
 
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
@@ -73,7 +73,7 @@ def spare_slopes(run: Run, along: FloatArray) -> dict[str, FloatArray]:
     return slopes
 
 
-def refused_runs(problems: Sequence[Problem]) -> tuple[Condition, ...]:
+def refused_runs(problems: Sequence[Problem]) -> Conditions:
     """A condition that names the runs which were left out, with the first reason of each; none where all are used."""
     reasons = {str(problem.run): problem.what for problem in reversed(problems)}
     listed = "; ".join(f"{run} ({reasons[run]})" for run in sorted(reasons))

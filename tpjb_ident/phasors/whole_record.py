@@ -29,7 +29,7 @@ from rigdata.campaign import Campaign
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError
 from rigdata.run import Run
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.phasors.frequency import exact_frequencies
 from tpjb_ident.phasors.line_fit import LineFitter, white_noise
 from tpjb_ident.phasors.lines import HIGHEST, LineSet
@@ -166,7 +166,7 @@ _LOBE = 4.0
 
 def unexpected_lines(
     records: tuple[WholeRecord, ...], result: RunPhasors, images: FloatArray
-) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
+) -> tuple[tuple[float, ...], Conditions]:
     """Frequencies of lines beside those of the windows [Hz], and what to say about the ones that nobody expects.
 
     `images` (m,): frequencies at which lines stand that are none [Hz].

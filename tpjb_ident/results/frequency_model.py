@@ -145,8 +145,10 @@ def fit_over_frequency(
     residual = y - design @ (x / scale)
     chi_square = float(np.einsum("na,nab,nb->", residual, weight, residual))
     random = gains @ covariance @ gains.transpose(0, 2, 1)
+    variances = np.einsum("npp->np", random)
     spare, noise_dof = 8 * len(chosen) - len(x), [float(np.median(e.dof)) for e in chosen]
     lengths = np.linalg.norm(residual, axis=1) / np.linalg.norm(y, axis=1)
+    spread = np.sum(variances**2 / np.array(noise_dof)[:, None], axis=0)  # Welch and Satterthwaite
     shared = np.zeros((1, len(chosen), 8))
     if changes is not None:
         shared = changes.reshape(len(changes), -1, 8)[:, usable]
@@ -154,7 +156,7 @@ def fit_over_frequency(
         model,
         x,
         random.sum(axis=0),
-        _effective_dof(np.einsum("npp->np", random), np.array(noise_dof)),
+        np.where(spread > 0, variances.sum(axis=0) ** 2 / np.where(spread > 0, spread, 1.0), np.inf),
         _systematic(gains, np.array([e.systematic for e in chosen]), shared),
         chi_square,
         spare,
@@ -175,13 +177,6 @@ def _systematic(gains: FloatArray, systematic: FloatArray, changes: FloatArray) 
     separate = systematic - np.einsum("qna,qnb->nab", changes, changes) / len(changes)
     single = (gains @ separate @ gains.transpose(0, 2, 1)).sum(axis=0)
     return together.T @ together / len(changes) + single
-
-
-def _effective_dof(variances: FloatArray, dof: FloatArray) -> FloatArray:
-    """Welch-Satterthwaite degrees of freedom (p,) of sums of variances (n, p) with `dof` (n,)."""
-    spread = np.sum(variances**2 / dof[:, None], axis=0)
-    total = variances.sum(axis=0) ** 2
-    return np.where(spread > 0, total / np.where(spread > 0, spread, 1.0), np.inf)
 
 
 @dataclass(frozen=True)

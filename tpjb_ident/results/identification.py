@@ -11,7 +11,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.columns import amount, place_of
-from tpjb_ident.conditions import Condition, sentences
+from tpjb_ident.conditions import Conditions, sentences
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.presentation import Presented
@@ -63,7 +63,7 @@ class Identification(Presented):
     method: str
     points: tuple[PointResult, ...]
     calibration_changes: FloatArray
-    conditions: tuple[Condition, ...] = ()
+    conditions: Conditions = ()
     bands: tuple[BandResult, ...] = ()
     calibration_names: tuple[str, ...] = ()
     cell_stiffness: tuple[float, float] | None = None
@@ -276,7 +276,7 @@ class BandResult:
     lines: tuple[BandLine, ...] = field(repr=False)
     models: dict[str, FrequencyModel] = field(repr=False)
     supported: str
-    quality: tuple[Condition, ...]
+    quality: Conditions
     runs: tuple[str, ...]
     period: float | None
     resolution: float

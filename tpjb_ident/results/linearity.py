@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Condition, Conditions, holding
 from tpjb_ident.estimate.term import ALLOWED_CHANGE, CHANGE_BY_ORBIT, worth_stating
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.phasors.run_data import FilmLines
@@ -48,7 +48,7 @@ class AmplitudeSlope:
     standard_error: float = np.nan
     runs: int = 0
 
-    def condition(self) -> tuple[Condition, ...]:
+    def condition(self) -> Conditions:
         """What to say about it in the point's quality, where it is more than noise."""
         limit = -float(stdtrit(max(self.runs - 2, 1), SIGNIFICANCE / 2)) * self.standard_error
         change, error = 100 * self.stiffening, 100 * self.standard_error
@@ -126,7 +126,7 @@ def change_conditions(
     est: DynamicStiffness,
     amplitude: float,
     clearance: float | None,
-) -> tuple[Condition, ...]:
+) -> Conditions:
     """What to say of a point, by what its `budget` leaves of the change.
 
     A large motion alone is no fault where the harmonics show that the film answers it as a linear one.

@@ -11,7 +11,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.vector import directions
 from tpjb_ident.columns import place_of
-from tpjb_ident.conditions import Condition, holding, merged
+from tpjb_ident.conditions import Conditions, holding, merged
 from tpjb_ident.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.phasors.run_data import RunPhasors
@@ -85,7 +85,7 @@ class PointResult:
     outlier_fraction: float
     coherence: float
     amplitude: float
-    quality: tuple[Condition, ...]
+    quality: Conditions
     rejected: tuple[WindowVerdict, ...]
     runs: tuple[str, ...]
     load_miss: ComplexArray | None = None
@@ -202,14 +202,14 @@ def _shift(z: ComplexArray, repeats: ComplexArray) -> float:
     return float(np.linalg.norm(z - mean) / max(float(np.linalg.norm(mean)), np.finfo(float).tiny))
 
 
-def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tuple[Condition, ...]:
+def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> Conditions:
     """Conditions that the point's figures give rise to."""
     low = np.isfinite(stiffness.h).all() and not coherence >= MIN_COHERENCE
     text = f"coherence {coherence:.3f} < {MIN_COHERENCE}"
     return (*holding((low, "low-coherence", text)), *_missing(data), *physics(stiffness, data.inertia))
 
 
-def _missing(data: PointData) -> tuple[Condition, ...]:
+def _missing(data: PointData) -> Conditions:
     """Windows of the excitation without phasors, pointed out when they are many or a whole run's."""
     used = {run.run for run, _ in data.counted(np.ones(len(data.D)))}
     empty = [run.run for run in data.runs if run.run not in used]
@@ -230,7 +230,7 @@ def _in_stretch(run: RunPhasors) -> BoolArray:
     return (run.start >= run.span[0] - 1e-9) & (run.start + run.length <= run.span[1] + 1e-9)
 
 
-def physics(stiffness: DynamicStiffness, inertia: float) -> tuple[Condition, ...]:
+def physics(stiffness: DynamicStiffness, inertia: float) -> Conditions:
     """Say whether `inertia` [kg] stays in the force, which nothing measures: on soft cells.
 
     And where damping, the symmetric part of Im h, is negative beyond doubt: no cross-coupled stiffness is in it.
@@ -246,7 +246,7 @@ def physics(stiffness: DynamicStiffness, inertia: float) -> tuple[Condition, ...
     return holding((inertia > 0, name, remains), (negative, "negative-damping", text))
 
 
-def directional_pattern(data: PointData, weights: FloatArray) -> tuple[Condition, ...]:
+def directional_pattern(data: PointData, weights: FloatArray) -> Conditions:
     """Point out rejected windows that gather in some directions: physics may do that, glitches do not; `weights` (n,).
 
     A binomial test per run: more rejected windows than chance gives once in a thousand, in a run
@@ -265,7 +265,7 @@ def directional_pattern(data: PointData, weights: FloatArray) -> tuple[Condition
     return holding((named, "directional-rejection", text))
 
 
-def differing_runs(share: float) -> tuple[Condition, ...]:
+def differing_runs(share: float) -> Conditions:
     """Say where runs have no H in common: `share` of the film's force by which they differ beyond load and noise."""
     text = f"the runs differ by {100 * share:.1f} % in force over displacement (limit {100 * _MAX_DISAGREEMENT:.0f} %)"
     return holding((share > _MAX_DISAGREEMENT, "runs-disagree", text))

@@ -18,7 +18,7 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.columns import amount, place_of
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.run_data import FilmLines, RunPhasors, film_lines, mains_lines
 from tpjb_ident.rounding import listed
 
@@ -80,7 +80,7 @@ class ExcludedRun:
         return alike and (any_excitation or self.point.excitation_hz == point.excitation_hz)
 
 
-def without_runs(point: OperatingPoint, excluded: Sequence[ExcludedRun], any_excitation: bool) -> tuple[Condition, ...]:
+def without_runs(point: OperatingPoint, excluded: Sequence[ExcludedRun], any_excitation: bool) -> Conditions:
     """What a point has to say of its runs that take no part."""
     runs = [run.run for run in excluded if run.belongs(point, any_excitation)]
     return holding((runs, "run-left-out", f"without {', '.join(runs)}, which cannot be used"))
@@ -88,7 +88,7 @@ def without_runs(point: OperatingPoint, excluded: Sequence[ExcludedRun], any_exc
 
 def excluded_runs(
     excluded: Sequence[ExcludedRun], of: int, points: Sequence[OperatingPoint], any_excitation: bool
-) -> tuple[Condition, ...]:
+) -> Conditions:
     """Which of the campaign's `of` dynamic runs take no part, and why; which operating points have no run left."""
     reasons = listed([f"{run.run} ({run.reason})" for run in excluded], _LISTED, "; ")
     lost = [run for run in excluded if not any(run.belongs(point, any_excitation) for point in points)]

@@ -10,6 +10,10 @@ numerical packages and the sources of the code that reads and fits. It is comput
 of a rerun (which is several times quicker than reading and fitting it); nothing is concluded from names, sizes or
 dates. A record that changes while it is read is not kept. Files are written whole or not at all, and one that cannot be
 read is no result. No pickles: a folder of results may come from anybody.
+
+The rig without its bearing is known from a dry shaker test. What hoses, seals and cables carry past the film is in
+the cells' force too. The campaign's `baseline` runs measure it, F = H_b D without oil; in the dynamic runs F = (H +
+H_b) D.
 """
 
 import hashlib
@@ -18,7 +22,7 @@ import shutil
 import zipfile
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +36,10 @@ from rigdata.run import Run
 from tpjb_ident.check.campaign import judged
 from tpjb_ident.check.findings import QUESTIONS, Finding, Reporter, Verdicts, reach, verdicts
 from tpjb_ident.check.observation import Observation, RecordLines, observe
-from tpjb_ident.conditions import Condition, holding, merged
+from tpjb_ident.conditions import Condition, Conditions, holding, merged
+from tpjb_ident.estimate.equation import RigStiffness
+from tpjb_ident.estimators.estimate import estimate_table
+from tpjb_ident.estimators.r_matrix import phasor_table
 from tpjb_ident.phasors.frequency import shaft_phases
 from tpjb_ident.phasors.lines import Line, LineSet, RecordTooShortError
 from tpjb_ident.phasors.run_data import (
@@ -43,7 +50,7 @@ from tpjb_ident.phasors.run_data import (
     with_kept_beginning,
 )
 from tpjb_ident.phasors.run_phasors import run_phasors
-from tpjb_ident.runs.point_data import ExcludedRun, FinishedRuns, RunDigest, digest, mean_temperatures, point_of
+from tpjb_ident.runs.point_data import ExcludedRun, FinishedRuns, RunDigest, digest, gather, mean_temperatures, point_of
 from tpjb_ident.runtime.executors import Workers
 from tpjb_ident.runtime.provenance import sha256, source_stamp
 from tpjb_ident.runtime.tables import write_atomic
@@ -292,7 +299,7 @@ def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, 
     return tuple(observations)
 
 
-def _without_dead(phasors: RunPhasors, observation: Observation) -> tuple[RunPhasors, tuple[Condition, ...]]:
+def _without_dead(phasors: RunPhasors, observation: Observation) -> tuple[RunPhasors, Conditions]:
     """The run without spare channels that the checks call dead; refused with a dead probe or cell.
 
     What is said of a dead accelerometer: the run may do without.
@@ -347,7 +354,7 @@ def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -
     return result
 
 
-def check_conditions(result: Verdicts, runs: Iterable[str]) -> tuple[Condition, ...]:
+def check_conditions(result: Verdicts, runs: Iterable[str]) -> Conditions:
     """What the checks say of one point."""
     members = list(runs)
     groups = ((_CONTRADICTED, result.shared), (_DOUBTFUL, result.doubtful), (_RUN_GAIN, result.run_gains))
@@ -361,3 +368,42 @@ def _sentence(problems: list[Problem]) -> str:
     first = f"{problems[0].run}: {different[0]}" if problems[0].run else different[0]
     more = f"; and {len(different) - 1} more (see tpjb check)" if len(different) > 1 else ""
     return f"{first}{more}. {problems[0].cure}"
+
+
+@dataclass(frozen=True, repr=False)
+class DryTest:
+    """What a campaign's dry shaker test says."""
+
+    stiffness: RigStiffness = field(default_factory=RigStiffness)
+    conditions: Conditions = ()  #: where no run gives an answer
+
+    def missing(self, omega: float) -> Conditions:
+        """Say where a campaign has baseline runs, but no answer of theirs at `omega` [rad/s]."""
+        if self.stiffness.known(np.array([omega]))[0]:
+            return ()
+        if not len(self.stiffness.omega):
+            return self.conditions
+        low, high = self.stiffness.omega[[0, -1]] / (2 * np.pi)
+        text = f"measured from {low:g} to {high:g} Hz: at this excitation the rig's own stiffness is still inside"
+        return (Condition("baseline-missing", text),)
+
+
+def dry_test(campaign: Campaign, settings: PhasorSettings, method: str) -> DryTest:
+    """Dry test of a campaign from its baseline runs."""
+    runs = campaign.of_kind("baseline")
+    if not runs:
+        return DryTest()
+    for run in runs:
+        errors = [f.problem for f in observe(run).report.findings if f.problem.severity == "error"]
+        if errors:  # clipped or dead: there is no dry test without its channels
+            raise RigDataError(errors)
+    points = gather([run_phasors(run, campaign.housing_mass, settings) for run in runs])
+    estimates = [estimate_table(phasor_table(p.D, p.F, p.run_index), p.omega, method) for p in points]
+    good = sorted((est for est in estimates if np.isfinite(est.covariance).all()), key=lambda est: est.omega)
+    bad = [f"{est.omega / (2 * np.pi):g} Hz" for est in estimates if not np.isfinite(est.covariance).all()]
+    text = f"the baseline runs at {', '.join(bad)} give no answer: two directions are needed"
+    conditions = holding((bad, "baseline-missing", text))
+    if not good:
+        return DryTest(conditions=conditions)
+    parts = (np.array([getattr(est, name) for est in good]) for name in ("omega", "h", "covariance"))
+    return DryTest(RigStiffness(*parts), conditions)

@@ -21,7 +21,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
 from tpjb_ident.check.set_points import without_static_part
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.equation import Sensor
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
@@ -63,7 +63,7 @@ class StaticLoads:
     zero: complex = 0j  #: N: what the cells read at no load
     zero_error: float = 0.0
 
-    def conditions(self, point: int) -> tuple[Condition, ...]:
+    def conditions(self, point: int) -> Conditions:
         """What to say of one point."""
         size, angle = abs(self.zero), np.degrees(np.angle(self.zero))
         text = f"over the loads of the campaign the cells' mean holds a constant of {size:.0f} N at {angle:.0f} deg "
@@ -127,7 +127,7 @@ def _common_ratio(ratios: ComplexArray) -> complex:
     return complex(ratios[np.abs(ratios - middles[place]) <= 4 * reach[place] + 1e-12].mean())
 
 
-def load_conditions(miss: ComplexArray, common: complex) -> tuple[Condition, ...]:
+def load_conditions(miss: ComplexArray, common: complex) -> Conditions:
     """Loads that are off by more than scatter, and what all runs share: a gain of the cells, or what no gain explains.
 
     `miss` (n,): of a point's runs.

@@ -6,7 +6,7 @@ A clock exists between devices only. Whatever phases do within one device, its c
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter
 
@@ -46,7 +46,7 @@ class Clock(Factor):
         turned = -1j * _UNIT * blocks.omega[:, None] * reading
         return turned[:, :, None] * self.sensors
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """Rates that stand clear of their errors."""
         clear = np.abs(self._total(fitted)) > _CLEAR * fitted.deviation
         rates = ", ".join(self.words(fitted))

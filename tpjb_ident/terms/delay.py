@@ -7,7 +7,7 @@ cells from accelerometers (a spring knows no phase); probes against cells only a
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, exceeding
 
@@ -36,7 +36,7 @@ class Delay(Factor):
         """-i omega, per ms."""
         return np.asarray(-1j * _MILLISECOND * blocks.omega)
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""
         if self.rig.out_of_step:
             late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)

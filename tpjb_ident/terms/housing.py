@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, State, film_force, housing_rows, vector
 from tpjb_ident.estimate.term import OUT_OF_STEP, Fitted, Parameter, Term
 
@@ -119,7 +119,7 @@ class Housing(Term):
             columns[:, m:, k] = np.einsum("nij,nj->ni", (rows[0] - rows[1]) / 2, state.u)
         return columns
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
         if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return ()
@@ -130,7 +130,7 @@ class Housing(Term):
             return tuple(condition for condition in conditions if condition != OUT_OF_STEP)
         return self.rig.contradicted.get(self.name) or conditions
 
-    def _shown(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def _shown(self, fitted: Fitted) -> Conditions:
         """What these numbers say of the accelerometers."""
         share = f"inertia is {100 * self._inertia:.2g} % of the force"
         if self._is_unexplained(fitted) and fitted.unexplained * self._inertia > HARMLESS:
@@ -144,7 +144,7 @@ class Housing(Term):
             return (Condition("accelerometers-contradict-cells", f"{text}; {share}"),)
         return _out_of_step(lag, fitted.deviation[-1], "probes", self._omega)
 
-    def _standing(self, fitted: Fitted, share: str) -> tuple[Condition, ...]:
+    def _standing(self, fitted: Fitted, share: str) -> Conditions:
         """Of accelerometers on a housing on springs; `share`: words for the inertia."""
         (xx, yy, xy, loss), error = fitted.value, fitted.deviation
         faults = []
@@ -262,14 +262,14 @@ def _otherwise(fitted: Fitted, least: float) -> str:
     if abs(turn) > limit:
         return f"they are turned by {np.degrees(np.arctan2(turn, 1 + np.trace(kappa) / 2)):.0f} deg against the probes"
     stretch, axes = np.linalg.eigh((kappa + kappa.T) / 2)
-    k = int(np.abs(stretch).argmax())
+    k = np.abs(stretch).argmax()
     if abs(stretch[k]) <= limit:
         return ""
     along = np.degrees(np.arctan2(axes[1, k], axes[0, k])) % 180
     return f"they show {1 + stretch[k]:.2f} times the motion along {along:.0f} deg that the probes show"
 
 
-def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> tuple[Condition, ...]:
+def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> Conditions:
     """Accelerometers against the sensors that tell the housing's motion: `phase` [rad] by which they lag."""
     if abs(phase) < _LOSS + 3 * error:
         return ()
