@@ -16,12 +16,12 @@ from rigdata.near_names import hint
 
 #: How grave a condition or a finding can be, the gravest first.
 SEVERITIES = get_args(problem.Severity)
+#: What is to be said of one thing, in order.
+Conditions = tuple["Condition", ...]
 #: Lines that may stand on the excitation beside those of the list: higher harmonics, and lines found in the record.
-_LINES = (
-    *(f"{n}X" for n in range(4, 11)),
-    *(f"{kind} {n}" for kind in ("mains", "harmonic") for n in range(2, 11)),
-    "found",
-)
+_LINES = [f"{n}X" for n in range(4, 11)]
+_LINES += [f"{kind} {n}" for kind in ("mains", "harmonic") for n in range(2, 11)]
+_LINES.append("found")
 
 
 class UnknownConditionError(LookupError):
@@ -71,17 +71,17 @@ class Condition(problem.Condition):
         return KINDS[str(self)].meaning
 
 
-def merged(*groups: tuple[Condition, ...]) -> tuple[Condition, ...]:
+def merged(*groups: Conditions) -> Conditions:
     """Conditions of several steps in order, each name once (the first detail counts)."""
     return tuple(dict.fromkeys(itertools.chain(*groups)))
 
 
-def holding(*rows: tuple[object, str, str]) -> tuple[Condition, ...]:
+def holding(*rows: tuple[object, str, str]) -> Conditions:
     """Conditions from rows of test, name and sentence: those whose test holds."""
     return tuple(Condition(name, detail) for test, name, detail in rows if test)
 
 
-def untrusted(conditions: Iterable[Condition]) -> tuple[Condition, ...]:
+def untrusted(conditions: Iterable[Condition]) -> Conditions:
     """Those that forbid trust in the number that they belong to: a command that has one ends with exit code 3."""
     return tuple(condition for condition in conditions if condition.severity == "error")
 

@@ -16,16 +16,14 @@ from tests.rigs import closed_form as cf
 from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandRig, band_plans, stiffness
 from tests.studies.band_coverage import true_parameters
-from tpjb_ident.bands.classic import classic_line
-from tpjb_ident.bands.period import find_period, resampled
-from tpjb_ident.bands.responses import line_response, one_phase_set
-from tpjb_ident.bands.run_spectra import RunSpectra
+from tpjb_ident.bands.responses import classic_line, line_response, one_phase_set
+from tpjb_ident.bands.run_spectra import RunSpectra, find_period, resampled
 from tpjb_ident.bands.samples import Samples
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors
-from tpjb_ident.results.band_result import frf_frame, models_frame
+from tpjb_ident.results.identification import frf_frame, models_frame
 from tpjb_ident.terms.distortion import band_change
 
 H = np.array([[1.6e8 + 6e7j, 1.5e7 + 2e6j], [-1.2e7 - 3e6j, 2.4e8 + 9e7j]])

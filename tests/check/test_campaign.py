@@ -22,11 +22,18 @@ from tests.good_campaigns import PLAN, directions, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
 from tests.seeds import first_quick
 from tpjb_ident.check.campaign import check_campaign
-from tpjb_ident.check.findings import Finding, Reporter, merge, reach
-from tpjb_ident.check.lines import excitation_line, steady_level
-from tpjb_ident.check.observation import _at_rest
+from tpjb_ident.check.findings import (
+    Finding,
+    Reporter,
+    definiteness,
+    explanation,
+    indefiniteness,
+    merge,
+    reach,
+    repairs,
+)
+from tpjb_ident.check.observation import _at_rest, excitation_line, steady_level
 from tpjb_ident.check.signals import check_signal, is_spare
-from tpjb_ident.check.wiring import definiteness, explanation, indefiniteness, repairs
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.line_fit import LineFitter

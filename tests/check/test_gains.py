@@ -12,9 +12,8 @@ from tests.good_campaigns import DAMPING, PLAN, RUN, STIFFNESS, stiff_rig, writt
 from tests.rigs.held_run import HeldReader, channels, run_of
 from tests.seeds import seeds
 from tpjb_ident.check.campaign import check_campaign
-from tpjb_ident.check.lines import excitation_line
-from tpjb_ident.check.response import PointRuns
-from tpjb_ident.check.run_gain import deviating_runs, dynamic_difference, gain_of_run
+from tpjb_ident.check.observation import excitation_line
+from tpjb_ident.check.run_gain import PointRuns, deviating_runs, dynamic_difference, gain_of_run
 from tpjb_ident.phasors.run_phasors import run_phasors
 
 OMEGA = 2 * math.pi * 25.0

@@ -11,8 +11,7 @@ from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from tests.rigs.held_run import HeldReader, run_of
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.lines import RecordLines, band_lines
-from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.observation import Observation, RecordLines, band_lines
 from tpjb_ident.check.rig_fit import rig_fit
 
 MASS = 90.0

@@ -8,8 +8,7 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tests.phasors.phasor_cases import complex_normal
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
-from tpjb_ident.estimate.sensors import CORNERS
+from tpjb_ident.estimate.equation import CORNERS, Blocks, Rig, Sensor
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.load_turn import PLAUSIBLE
@@ -224,7 +223,7 @@ def solved(rig: Rig, blocks: Blocks, truth: np.ndarray, *more, without=(), seed:
 def terms_of(rig: Rig, blocks: Blocks, without=()) -> list:
     """All terms that apply; a clock where sensors name devices."""
     used = [term for term in TERMS if term not in without]
-    if len({sensor.device for sensor in rig.sensors}) == 1:
+    if len({sensor.clock for sensor in rig.sensors}) == 1:
         used = [term for term in used if term is not Clock]
     return [term(rig, blocks) for term in used]
 

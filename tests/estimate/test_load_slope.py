@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tests.phasors.phasor_cases import H, place
-from tpjb_ident.estimate.load_slope import slopes_over_load
-from tpjb_ident.estimate.noise import UNKNOWN_EXPONENT
+from tpjb_ident.estimate.noise import UNKNOWN_EXPONENT, slopes_over_load
 
 EXPONENTS = np.array([[0.7, -0.4], [1.3, 0.9]]), np.array([[0.2, 0.5], [-0.3, 1.1]])
 

@@ -8,7 +8,7 @@ import pytest
 from tests.estimate.block_cases import Case, away, deviations, film_slope, made, numbers, solved, terms_of
 from tests.phasors.phasor_cases import complex_normal
 from tests.seeds import first_quick, seeds
-from tpjb_ident.estimate.blocks import RigStiffness
+from tpjb_ident.estimate.equation import RigStiffness
 from tpjb_ident.estimate.solve import Solver
 
 EXACT = Case(noise=0.0)

@@ -5,9 +5,16 @@ import pytest
 
 from tests.phasors.phasor_cases import FILM_H as H
 from tests.phasors.phasor_cases import OMEGA
-from tpjb_ident.estimators.estimate import METHODS, SOLVERS, estimate_dynamic_stiffness
+from tpjb_ident.estimators.estimate import (
+    METHODS,
+    NORMS,
+    SOLVERS,
+    RlmSettings,
+    estimate_dynamic_stiffness,
+    rlm_fit,
+    solve_rlm,
+)
 from tpjb_ident.estimators.r_matrix import r_matrix, real_rows
-from tpjb_ident.estimators.rlm import NORMS, RlmSettings, rlm_fit, solve_rlm
 
 
 def sample(seed: int, directions: int = 6, windows: int = 10, noise: float = 0.02, bad: float = 0.0):

@@ -13,8 +13,8 @@ from tpjb_ident.estimate.statistics import (
     trimming_limits,
     trimming_weight,
 )
+from tpjb_ident.estimators.estimate import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
 from tpjb_ident.estimators.r_matrix import real_rows
-from tpjb_ident.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
 
 
 def test_bisquare_constant_is_the_published_one():

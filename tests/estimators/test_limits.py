@@ -12,13 +12,21 @@ from scipy.stats import t as student_t
 from rigdata.operating_point import OperatingPoint
 from tests.phasors import phasor_cases
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import RigStiffness
-from tpjb_ident.phasors.lines import Line, LineSet, LineSettings, known_lines
-from tpjb_ident.phasors.windows import WindowSettings, line_design, plan_windows, variance_inflation
+from tpjb_ident.estimate.equation import RigStiffness
+from tpjb_ident.phasors.lines import (
+    Line,
+    LineSet,
+    LineSettings,
+    WindowSettings,
+    known_lines,
+    line_design,
+    plan_windows,
+    variance_inflation,
+)
 from tpjb_ident.results.frequency_model import REFUSED, fit_over_frequency, fits_over_frequency
 from tpjb_ident.results.linearity import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
-from tpjb_ident.runs.baseline import DryTest
 from tpjb_ident.runs.point_data import PointData
+from tpjb_ident.runs.run_jobs import DryTest
 
 K = np.array([[2.0e8, 1e7], [-3e7, 4.0e8]])
 C = np.array([[4e5, 2e4], [-1e4, 6e5]])

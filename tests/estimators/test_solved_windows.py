@@ -7,8 +7,8 @@ import pytest
 
 from tests.phasors.phasor_cases import NOISE, H, complex_normal, hermitian, windows
 from tpjb_ident.estimate.window_means import attenuation
+from tpjb_ident.estimators.estimate import solved_windows
 from tpjb_ident.estimators.r_matrix import complex_to_real_covariance, phasor_table
-from tpjb_ident.estimators.solved_windows import solved_windows
 
 
 def solved(table, weights=None):

@@ -9,8 +9,7 @@ from tests.phasors.phasor_cases import H, complex_normal, windows
 from tests.seeds import first_quick
 from tpjb_ident.estimate.window_means import LOCKED, aligned
 from tpjb_ident.estimators.estimate import estimate_table
-from tpjb_ident.estimators.least_trimmed import Regression, evenly_chosen, robust_start
-from tpjb_ident.estimators.mm import mm_fit
+from tpjb_ident.estimators.least_trimmed import Regression, evenly_chosen, mm_fit, robust_start
 from tpjb_ident.estimators.r_matrix import complex_to_real_covariance, displacement_condition
 
 

@@ -6,9 +6,14 @@ import pytest
 from tests.phasors.phasor_cases import H, complex_normal
 from tests.seeds import first_quick
 from tpjb_ident.estimate.window_means import aligned
-from tpjb_ident.estimators.estimate import METHODS, estimate_dynamic_stiffness, estimate_table, instrumental_fit
+from tpjb_ident.estimators.estimate import (
+    METHODS,
+    estimate_dynamic_stiffness,
+    estimate_table,
+    instrumental_fit,
+    solved_windows,
+)
 from tpjb_ident.estimators.r_matrix import phasor_table, real_rows
-from tpjb_ident.estimators.solved_windows import solved_windows
 
 OMEGA = 160.0
 

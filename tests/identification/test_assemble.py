@@ -13,7 +13,7 @@ from tests.phasors.phasor_cases import OMEGA, WINDOWS, run_phasors
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.identification.identify import assemble
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.runs.finished_runs import ExcludedRun, FinishedRuns, digest
+from tpjb_ident.runs.point_data import ExcludedRun, FinishedRuns, digest
 
 LOADS = (3000.0, 8000.0)
 CHANNELS = [
@@ -184,9 +184,7 @@ def test_a_point_gathers_what_its_runs_say(runs):
     assert p.runs == tuple(run.run for run in moved)
     assert p.static_load_measured == pytest.approx(LOADS[0], rel=0.01)
     assert p.coherence > 0.999
-    largest = max(
-        np.linalg.svd(np.stack([z.real, z.imag]))[1][0] for z in (m.displacement.phasors[0, 0] for m in moved)
-    )
+    largest = max(np.linalg.svd(np.stack([z.real, z.imag]))[1][0] for z in (m.displacement[0, 0] for m in moved))
     assert p.amplitude == pytest.approx(largest, rel=1e-2)
     assert p.outlier_fraction == len(p.rejected) / (5 * WINDOWS)
     assert not p.inertia_corrected

@@ -5,7 +5,7 @@ import pytest
 
 from tests.estimate.block_cases import Case, drawn_turning, made, solved
 from tests.phasors.phasor_cases import FILM_H
-from tpjb_ident.estimate.blocks import vector
+from tpjb_ident.estimate.equation import vector
 from tpjb_ident.identification.campaign_solution import at_set_point
 from tpjb_ident.terms.mains import Pickup, fit_mains
 

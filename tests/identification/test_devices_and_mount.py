@@ -13,8 +13,8 @@ from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandRig, band_plans
 from tests.seeds import first_quick, seeds
 from tpjb_ident.conditions import untrusted
-from tpjb_ident.estimate.sensors import found_mount
-from tpjb_ident.identification.clocks import with_found_devices
+from tpjb_ident.estimate.equation import found_mount
+from tpjb_ident.identification.campaign_solution import with_found_devices
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.terms.registry import learnt_rig
 
@@ -42,7 +42,7 @@ def test_without_accelerometers_the_static_load_tells_it(ratio, mount):
 
 
 def devices(sensors):
-    return {sensor.quantity: sensor.device for sensor in sensors}
+    return {sensor.quantity: sensor.clock for sensor in sensors}
 
 
 @pytest.mark.parametrize("ppm", [100.0, -300.0])
@@ -77,7 +77,7 @@ def test_a_beat_of_one_device_is_no_clock(seed):
 
 
 def test_stated_clocks_are_as_stated():
-    rig, blocks, _ = made(replace(CASE, rates={"force": 1e-4}, stated={"displacement": {"device": "a"}}))
+    rig, blocks, _ = made(replace(CASE, rates={"force": 1e-4}, stated={"displacement": {"clock": "a"}}))
     assert with_found_devices(rig.sensors, blocks, START) == (rig.sensors, {})
 
 

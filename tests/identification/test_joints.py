@@ -13,7 +13,7 @@ from tests.phasors.phasor_cases import place as at
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimators.estimate import instrumental_fit
 from tpjb_ident.estimators.r_matrix import phasor_table
-from tpjb_ident.phasors.shaft import FIRST_LOOK, MAX_DEPARTURE, shaft_speed
+from tpjb_ident.phasors.frequency import FIRST_LOOK, MAX_DEPARTURE, shaft_speed
 from tpjb_ident.runs.point_data import finite_mean, group, point_data
 
 NORMAL = 1.959963984540054  # of 95 %
@@ -93,26 +93,24 @@ def test_runs_are_grouped_by_their_set_points_in_order():
 def test_windows_of_a_point_follow_their_runs():
     rng = np.random.default_rng(1)
 
-    def run(name, n, accelerated):
-        blocks = [complex_normal(rng, n, 2, 2) for _ in range(3)]
-        means = [rng.standard_normal((n, 2)) for _ in range(2)]
+    def run(name, n):
+        blocks = [complex_normal(rng, n, 2, 2) for _ in range(2)]
+        means = {quantity: rng.standard_normal((n, 2)) for quantity in ("displacement", "force")}
         return SimpleNamespace(
             run=name, lines=SimpleNamespace(driven=(25.0, 25.0)),
-            displacement=SimpleNamespace(phasors=blocks[0], mean=means[0]),
-            cell_force=SimpleNamespace(mean=means[1]), oil_force=lambda line: blocks[1][:, line],
-            acceleration=SimpleNamespace(phasors=blocks[2]) if accelerated else None,
+            displacement=blocks[0], oil_force=lambda line: blocks[1][:, line], means=means.get,
         )  # fmt: skip
 
-    a, b = run("a", 3, True), run("b", 2, False)
+    a, b = run("a", 3), run("b", 2)
     data = point_data(at(), [(a, 1), (b, 0)])
-    np.testing.assert_array_equal(data.D, np.concatenate([a.displacement.phasors[:, 1], b.displacement.phasors[:, 0]]))
+    np.testing.assert_array_equal(data.D, np.concatenate([a.displacement[:, 1], b.displacement[:, 0]]))
     np.testing.assert_array_equal(data.F, np.concatenate([a.oil_force(1), b.oil_force(0)]))
     np.testing.assert_array_equal(data.run_index, [0, 0, 0, 1, 1])
     assert data.lines == (1, 0)
     assert data.omega == at().excitation
-    a.displacement.mean[1, 0] = np.nan
-    np.testing.assert_allclose(data.mean_positions[0], a.displacement.mean[[0, 2]].mean(axis=0))
-    np.testing.assert_allclose(data.mean_loads, [r.cell_force.mean.mean(axis=0) for r in (a, b)])
+    a.means("displacement")[1, 0] = np.nan
+    np.testing.assert_allclose(data.mean_positions[0], a.means("displacement")[[0, 2]].mean(axis=0))
+    np.testing.assert_allclose(data.mean_loads, [r.means("force").mean(axis=0) @ [1, 1j] for r in (a, b)])
     assert np.isnan(finite_mean(np.full((2, 2), np.nan))).tolist() == [True, True]
 
 

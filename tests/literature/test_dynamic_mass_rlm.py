@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from statsmodels.robust.scale import HuberScale
 
-from tpjb_ident.estimators.rlm import RlmSettings, solve_rlm
+from tpjb_ident.estimators.estimate import RlmSettings, solve_rlm
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "mass_rlm.json").read_text(encoding="utf-8"))
 

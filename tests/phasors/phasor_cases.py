@@ -4,17 +4,17 @@ import math
 
 import numpy as np
 
-from rigdata.calibration import Channel
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.estimators.r_matrix import phasor_table
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.phasors.lines import known_lines
-from tpjb_ident.phasors.run_data import QUANTITIES, RunPhasors
+from tpjb_ident.phasors.run_data import RunPhasors
 
 H = np.array([[2.0 + 0.7j, 0.3 - 0.2j], [-0.4 + 0.1j, 1.5 + 0.9j]])
 
 
-def vector_channels(quantities: tuple[str, ...] = QUANTITIES) -> tuple[Channel, ...]:
+def vector_channels(quantities: tuple[str, ...] = VECTOR_QUANTITIES) -> tuple[Channel, ...]:
     """Channels along X and Y of some quantities: what stands for vectors that were never channels."""
     names = [(quantity, axis) for quantity in quantities for axis in (0, 1)]
     return tuple(Channel(f"{quantity} {'xy'[axis]}", quantity, axis=axis * np.pi / 2) for quantity, axis in names)

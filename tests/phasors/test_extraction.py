@@ -12,14 +12,13 @@ from rigdata.problem import RigDataError
 from rigdata.run import Run
 from tests.rigs import held_run
 from tests.rigs.held_run import HeldReader, channels, columns
-from tpjb_ident.phasors import extraction
+from tpjb_ident.phasors import run_phasors
 from tpjb_ident.phasors.compensation import compensated
-from tpjb_ident.phasors.extraction import MAX_JITTER, extract
+from tpjb_ident.phasors.frequency import ShaftCourse
 from tpjb_ident.phasors.line_fit import LineFitter
-from tpjb_ident.phasors.lines import known_lines
+from tpjb_ident.phasors.lines import WindowSettings, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings
-from tpjb_ident.phasors.shaft import ShaftCourse
-from tpjb_ident.phasors.windows import WindowSettings
+from tpjb_ident.phasors.run_phasors import MAX_JITTER, extract
 
 RATE = 1000.0
 #: No whole number of cycles in a second, so that a wrong origin of time shows.
@@ -94,24 +93,24 @@ def taken(run, follow=None):
 
 def exact(result, quantity="displacement", but=(), tolerance=1e-9):
     """Whether windows have the excitation's own phasor."""
-    block = result.displacement if quantity == "displacement" else result.cell_force
-    windows = np.delete(np.arange(len(block.phasors)), list(but))
-    off = block.phasors[windows, 0] - Z[quantity]
+    block = result.plane(quantity, result.z)
+    windows = np.delete(np.arange(len(block)), list(but))
+    off = block[windows, 0] - Z[quantity]
     np.testing.assert_allclose(off / np.abs(Z[quantity]).max(), 0.0, atol=tolerance)
 
 
 @pytest.mark.parametrize("chunk", [1, 400, 1000, 2**15])
 def test_windows_are_the_same_in_chunks_of_any_length(monkeypatch, chunk):
-    monkeypatch.setattr(extraction, "CHUNK", chunk)
+    monkeypatch.setattr(run_phasors, "CHUNK", chunk)
     found = taken(held())
     exact(found)
     exact(found, "force")
     np.testing.assert_allclose(found.start, 0.4 * np.arange(10))
-    np.testing.assert_allclose(found.cell_force.mean, 700.0, rtol=1e-9)
+    np.testing.assert_allclose(found.means("force"), 700.0, rtol=1e-9)
     np.testing.assert_array_equal(found.lost, 0.0)
-    assert (found.length, found.run, found.direction, found.acceleration) == (0.4, "r", 0.3, None)
+    assert (found.length, found.run, found.direction, found.pick("acceleration")) == (0.4, "r", 0.3, [])
     more = taken(held(quantities=("displacement", "force", "acceleration")))
-    np.testing.assert_allclose(more.acceleration.phasors[:, 0], np.tile([0.02, 0.01j], (10, 1)), atol=1e-10)
+    np.testing.assert_allclose(more.plane("acceleration", more.z)[:, 0], np.tile([0.02, 0.01j], (10, 1)), atol=1e-10)
 
 
 def test_a_channel_recorded_late_is_put_back():
@@ -122,8 +121,8 @@ def test_a_channel_recorded_late_is_put_back():
     exact(found)
     plain = taken(held(late=late))
     turned = np.exp(-2j * math.pi * DRIVEN * late) * Z["force"]
-    np.testing.assert_allclose(plain.cell_force.phasors[:, 0], np.tile(turned, (10, 1)), rtol=1e-9)
-    np.testing.assert_allclose(found.cell_force.mean, plain.cell_force.mean)
+    np.testing.assert_allclose(plain.plane("force", plain.z)[:, 0], np.tile(turned, (10, 1)), rtol=1e-9)
+    np.testing.assert_allclose(found.means("force"), plain.means("force"))
 
 
 def test_a_clock_may_start_anywhere_and_stray_within_a_window():
@@ -140,7 +139,7 @@ def test_a_clock_may_start_anywhere_and_stray_within_a_window():
     for share, own in ((0.9, False), (1.1, True)):
         little = even.copy()
         little[801:1200] += share * MAX_JITTER / RATE
-        error = np.abs(taken(held(stamps=little)).displacement.phasors[2, 0] - Z["displacement"]).max()
+        error = np.abs(taken(held(stamps=little)).displacement[2, 0] - Z["displacement"]).max()
         late = 2 * math.pi * DRIVEN * share * MAX_JITTER / RATE * np.abs(Z["displacement"]).max()
         assert error == pytest.approx(0.0 if own else late, abs=0.02 * late)
 
@@ -152,7 +151,7 @@ def test_stamps_that_are_missing_leave_their_samples_out():
     stamps[1210:1225] = np.arange(1210, 1225) / RATE
     found = taken(held(stamps=stamps))
     exact(found, but=(2, 3))
-    np.testing.assert_allclose(found.displacement.phasors[2, 0], Z["displacement"], atol=1e-12)
+    np.testing.assert_allclose(found.displacement[2, 0], Z["displacement"], atol=1e-12)
     np.testing.assert_allclose(found.start, 0.4 * np.arange(10))
 
 
@@ -165,13 +164,13 @@ def test_a_shaft_that_creeps_is_followed_window_by_window():
     followed = taken(run, ShaftCourse(middles, speeds))
     exact(followed)
     plain = taken(run)
-    assert np.abs(plain.displacement.phasors[-1, 0] - Z["displacement"]).max() > 0.02e-6
+    assert np.abs(plain.displacement[-1, 0] - Z["displacement"]).max() > 0.02e-6
     # where the speed is not known the run's own is taken; as in the first window
     holes = np.where(np.arange(10) == 9, np.nan, speeds)
     some = taken(run, ShaftCourse(middles, holes))
     exact(some, but=(9,))
-    np.testing.assert_allclose(some.displacement.phasors[9], plain.displacement.phasors[9], atol=1e-15)
-    np.testing.assert_allclose(some.displacement.phasors[0], plain.displacement.phasors[0], atol=1e-14)
+    np.testing.assert_allclose(some.displacement[9], plain.displacement[9], atol=1e-15)
+    np.testing.assert_allclose(some.displacement[0], plain.displacement[0], atol=1e-14)
 
 
 def test_following_keeps_to_windows_of_their_own_clock():
@@ -184,7 +183,7 @@ def test_following_keeps_to_windows_of_their_own_clock():
 def test_a_long_disturbance_is_told_by_the_other_windows(monkeypatch):
     """A fifth of one window moves by itself, at the excitation's own frequency: with chunks of one window too."""
     for chunk in (400, 2**15):
-        monkeypatch.setattr(extraction, "CHUNK", chunk)
+        monkeypatch.setattr(run_phasors, "CHUNK", chunk)
         run = held()
         probes_in_memory = [run.reader.data[name] for name in ("DX", "DY")]
         noise = 2e-8 * np.random.default_rng(3).standard_normal((4000, 2)).T
@@ -194,8 +193,8 @@ def test_a_long_disturbance_is_told_by_the_other_windows(monkeypatch):
             values[1300:1380] += wave
         found = taken(run)
         exact(found, tolerance=0.02)
-        assert found.displacement.lost[3] > 0.15
-        assert found.displacement.lost[[0, 1, 2, 4, 5, 6, 7, 8, 9]].max() < 0.05
+        assert found.lost[3, :2].max() > 0.15
+        assert found.lost[[0, 1, 2, 4, 5, 6, 7, 8, 9], :2].max() < 0.05
 
 
 FREQUENCIES = np.array([25.3, 22.0])

@@ -8,12 +8,10 @@ import pytest
 from rigdata.campaign import load_campaign
 from tests.identification.test_identify import rig
 from tests.rigs.held_run import POINT, held_run
-from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.line_fit import BLOCK, LineFitter, even_design
-from tpjb_ident.phasors.lines import known_lines
-from tpjb_ident.phasors.reading_cache import SHORT
-from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.phasors.windows import WindowSettings, line_design
+from tpjb_ident.phasors.lines import WindowSettings, known_lines, line_design
+from tpjb_ident.phasors.run_data import SHORT, PhasorSettings
+from tpjb_ident.phasors.run_phasors import extract, run_phasors
 
 FREQUENCIES = np.array([25.0, 22.0, 44.0, 50.0])
 
@@ -56,8 +54,8 @@ def test_a_long_run_is_read_once_and_says_the_same():
     samples = sum(len(names) * (stop - start) for names, start, stop in long.reader.asked)
     assert samples < 6 * (long.length + SHORT + 2**15)
     plain = extract(long, 30.0, settings, known_lines((25.0,), 22.0, long.sample_rate))
-    size = np.abs(plain.displacement.phasors[:, 0]).max()
-    np.testing.assert_allclose(once.displacement.phasors[:, 0], plain.displacement.phasors[:, 0], atol=2e-4 * size)
+    size = np.abs(plain.displacement[:, 0]).max()
+    np.testing.assert_allclose(once.displacement[:, 0], plain.displacement[:, 0], atol=2e-4 * size)
     assert once.lines.frequencies[1] == pytest.approx(22.0, abs=1e-4)
 
 

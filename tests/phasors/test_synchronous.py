@@ -11,7 +11,7 @@ from tests.rigs.closed_form import Rig, write_rig
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.phasors.shaft import shaft_order
+from tpjb_ident.phasors.frequency import shaft_order
 
 SIX = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
 TURNING = Rig(locked=True, runout=0.075, load_scatter=0.0, seconds=2.0, frequencies=(22.0,), directions=SIX)

@@ -8,7 +8,6 @@ import pytest
 
 from rigdata.operating_point import OperatingPoint
 from tests.phasors.phasor_cases import complex_normal, vector_channels
-from tpjb_ident.phasors.found_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
 from tpjb_ident.phasors.frequency import (
     MAX_RETUNED,
     MAX_SLIP,
@@ -21,7 +20,7 @@ from tpjb_ident.phasors.frequency import (
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
-from tpjb_ident.phasors.whole_record import fitted_whole
+from tpjb_ident.phasors.whole_record import MAX_LINES, MIN_SHARE, REACH, fitted_whole, unexpected_lines
 
 RATE, LENGTH, WINDOWS = 1000.0, 0.4, 12
 START = LENGTH * np.arange(WINDOWS)

@@ -11,17 +11,17 @@ from tests.phasors import phasor_cases
 from tests.phasors.phasor_cases import H
 from tpjb_ident.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.identification.point import disagreement
-from tpjb_ident.results.quality import amplitude, coherence, directional_pattern, flags, rejected_windows
+from tpjb_ident.results.point_result import amplitude, coherence, directional_pattern, flags, rejected_windows
 from tpjb_ident.runs.point_data import PointData
 
 
 def run(name, direction=0.5, n=4, lost=None, acceleration="yes", mass=30.0):
     lost_d, lost_f = lost or (np.zeros(n), np.zeros(n))
     mean = np.tile([3.0, -4.0], (n, 1))
+    places = {"displacement": [0], "force": [1], "acceleration": [2] if acceleration else []}
     return SimpleNamespace(
-        run=name, direction=direction, start=10.0 + 0.5 * np.arange(n), acceleration=acceleration, conditions=(),
-        housing_mass=mass, length=0.5, span=None,
-        displacement=SimpleNamespace(lost=lost_d, mean=mean), cell_force=SimpleNamespace(lost=lost_f, mean=2 * mean),
+        run=name, direction=direction, start=10.0 + 0.5 * np.arange(n), conditions=(), housing_mass=mass, length=0.5,
+        span=None, pick=places.get, lost=np.stack([lost_d, lost_f], axis=1), means=lambda quantity: mean,
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from rigdata.campaign import load_campaign
 from tests.rigs import closed_form
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.identify import identify
-from tpjb_ident.results.frequency_outliers import frequency_outlier
+from tpjb_ident.results.frequency_model import frequency_outlier
 
 K, C = 1e6 * np.array([[80.0, 6.0], [-5.0, 250.0]]), 1e5 * np.array([[6.5, 0.1], [0.1, 11.0]])
 

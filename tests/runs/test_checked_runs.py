@@ -16,10 +16,9 @@ from tpjb_ident.check.findings import Reporter, verdicts
 from tpjb_ident.check.observation import observe
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.phasors.reading_cache import beginning_of, with_kept_beginning
-from tpjb_ident.phasors.run_data import PhasorSettings
+from tpjb_ident.phasors.run_data import PhasorSettings, beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_phasors import run_phasors
-from tpjb_ident.runs.run_store import packed, unpacked
+from tpjb_ident.runs.run_jobs import packed, unpacked
 
 QUICK = Rig(frequencies=(25.0,), directions=(0.0, 30.0, 60.0, 90.0, 120.0, 150.0), seconds=1.5)
 HDF5 = Acquisition(rate=1000.0, uncertainty=EXACT)

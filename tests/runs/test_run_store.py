@@ -19,10 +19,10 @@ from tests.command_line import ended
 from tests.good_campaigns import directions, written
 from tests.identification.test_identify import rig
 from tpjb_ident.cli.commands.identify import KEPT
-from tpjb_ident.phasors.run_phasors import PhasorSettings
+from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs import run_jobs
+from tpjb_ident.runs.run_jobs import RunStore, fingerprint
 from tpjb_ident.runs.run_jobs import all_runs as gathered_runs
-from tpjb_ident.runs.run_store import RunStore, fingerprint
 from tpjb_ident.runtime.executors import local_workers
 
 TABLES = ("coefficients", "estimators", "windows", "frequency_fits", "budget")
@@ -79,8 +79,7 @@ def same(first, second) -> bool:
     """Whether all that was read of the runs is alike, bit for bit."""
     for (a, of_a), (b, of_b) in zip(first, second, strict=True):
         blocks = [(a.start, b.start), (of_a.mains, of_b.mains)]
-        for quantity in ("displacement", "cell_force", "acceleration"):
-            blocks += [(getattr(getattr(x, quantity), name) for x in (a, b)) for name in ("phasors", "mean", "lost")]
+        blocks += [(getattr(a, name), getattr(b, name)) for name in ("z", "mean", "scale", "lost", "record")]
         for x, y in blocks:
             if (x is None) != (y is None) or (x is not None and not np.array_equal(x, y, equal_nan=True)):
                 return False

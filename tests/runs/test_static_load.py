@@ -10,17 +10,17 @@ from rigdata import load_campaign
 from rigdata.problem import RigDataError
 from tests.phasors.phasor_cases import place
 from tests.rigs import closed_form as cf
-from tpjb_ident.estimate.blocks import Sensor
+from tpjb_ident.estimate.equation import Sensor
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.run_data import PhasorSettings
-from tpjb_ident.runs.baseline import dry_test
+from tpjb_ident.runs.run_jobs import dry_test
 from tpjb_ident.runs.static_load import MAX_MISS, MAX_SIDEWAYS, StaticLoads, load_conditions, load_misses
 
 
 def loaded(ratios, load=5000.0, direction=-90.0):
     """A point whose cells read these multiples of the set point, as complex numbers (size, direction)."""
     force = load * np.exp(1j * math.radians(direction)) * np.asarray(ratios, dtype=complex)
-    return SimpleNamespace(point=place(load, direction), mean_loads=np.stack([force.real, force.imag], axis=1))
+    return SimpleNamespace(point=place(load, direction), mean_loads=force)
 
 
 def test_a_ratio_is_size_and_angle_whatever_the_direction():
@@ -94,7 +94,7 @@ def test_cells_that_cannot_be_right_correct_nothing_but_are_told(common):
 
 
 def test_runs_without_a_load_have_no_miss():
-    idle = SimpleNamespace(point=place(0.0), mean_loads=np.ones((3, 2)))
+    idle = SimpleNamespace(point=place(0.0), mean_loads=np.full(3, 1 + 1j))
     (none,), common = load_misses([idle])
     assert common == 1.0
     np.testing.assert_array_equal(none.real, np.zeros(3))
@@ -142,7 +142,11 @@ def test_loads_that_are_off_by_more_than_scatter_are_named_with_their_figure(siz
 )  # fmt: skip
 def test_cells_are_as_uncertain_as_all_set_points_differ_from_them(common, gain, turn):
     """Cells or actuators: one of them is wrong, and the records do not tell which."""
-    sensors = Sensor("X1A", "displacement", 0.005), Sensor("L1H", "force", 0.003), Sensor("L1V", "force", 0.2)
+    sensors = (
+        Sensor("X1A", "displacement", uncertainty=0.005),
+        Sensor("L1H", "force", uncertainty=0.003),
+        Sensor("L1V", "force", uncertainty=0.2),
+    )
     probe, cell, stated = StaticLoads([], complex(common)).doubted(sensors)
     assert probe == sensors[0]
     assert cell.uncertainty == pytest.approx(gain)

@@ -17,7 +17,7 @@ from tests.runtime.test_executors import dies_once
 from tpjb_ident.cli.commands.identify import KEPT
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.runs.run_store import RunStore
+from tpjb_ident.runs.run_jobs import RunStore
 from tpjb_ident.runtime import executors
 from tpjb_ident.runtime.executors import ClusterError, LostJobsError, dask_workers, local_workers
 

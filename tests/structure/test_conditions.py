@@ -11,7 +11,7 @@ from rigdata.units import UnitError
 from tests.structure.sources import imports_and_calls, statements, texts, trees
 from tpjb_ident.conditions import KINDS, Condition, UnknownConditionError, merged, sentences, untrusted
 from tpjb_ident.errors import TpjbError
-from tpjb_ident.estimators.rlm import ComplexInputError
+from tpjb_ident.estimators.estimate import ComplexInputError
 
 
 def stated_names(source):

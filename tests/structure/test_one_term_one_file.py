@@ -10,8 +10,7 @@ from rigdata.arrays import ComplexArray
 from tests.estimate.block_cases import Case, away, made, solved
 from tests.seeds import seeds
 from tests.structure.sources import imports_and_calls, texts, trees
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State
+from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.term import Additive, Parameter, Term
 from tpjb_ident.terms.registry import TERMS
 
@@ -21,12 +20,12 @@ ROOMS = ("tpjb_ident/estimate/", "tpjb_ident/identification/", "tpjb_ident/phaso
 #: against one another with the film left free, by the terms that are the sensors' own.
 CLASSES = {
     "tpjb_ident/check/rig_fit.py": {"Axis", "Corner", "Delay", "Gain", "Housing", "Tilt"},
-    "tpjb_ident/identification/clocks.py": {"Clock"},
-    "tpjb_ident/identification/band_solution.py": {"RunGain"},
+    "tpjb_ident/identification/campaign_solution.py": {"Clock"},
+    "tpjb_ident/identification/band_blocks.py": {"RunGain"},
 }
 #: What differs from run to run is of the random part.
 NAMES = {
-    "tpjb_ident/identification/estimates.py": {"load direction", "load miss"},
+    "tpjb_ident/identification/campaign_solution.py": {"load direction", "load miss"},
 }
 #: Columns of the blocks that have the name of a term.
 COLUMNS = {field.name for field in dataclasses.fields(Blocks)}

@@ -22,7 +22,7 @@ from tests.rigs.band_rig import BandPlan, BandRig, band_plans, stiffness
 from tests.studies.results import report, study_parser, table
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.identification.identify import identify
-from tpjb_ident.results.band_result import BandResult
+from tpjb_ident.results.identification import BandResult
 
 #: Noise of probes, cells and accelerometers, in units of `rig.NOISE`: usual, and with 5 to 20 % on the displacements.
 USUAL, LOUD = (5.0, 5.0, 1.0), (15.0, 8.0, 3.0)

@@ -9,9 +9,9 @@ import pytest
 
 from tests.phasors.phasor_cases import FILM_H as H
 from tests.phasors.phasor_cases import complex_normal
-from tpjb_ident.estimate.shape import complex_matrix
-from tpjb_ident.phasors.line_means import mains_lines
+from tpjb_ident.estimate.arrowhead import complex_matrix
 from tpjb_ident.phasors.lines import LineSettings, known_lines
+from tpjb_ident.phasors.run_data import mains_lines
 from tpjb_ident.terms import mains
 from tpjb_ident.terms.mains import (
     _LOCKED,
@@ -57,8 +57,7 @@ def run_with_lines(excitation, z, seed=1):
     phasors = complex_normal(np.random.default_rng(seed), 5, len(lines.frequencies), 2)
     if "mains" in names:
         phasors[:, 1 + names.index("mains")] = z
-    displacement = SimpleNamespace(phasors=phasors)
-    return SimpleNamespace(lines=lines, displacement=displacement, oil_force=lambda line: 1e8 * phasors[:, line])
+    return SimpleNamespace(lines=lines, displacement=phasors, oil_force=lambda line: 1e8 * phasors[:, line])
 
 
 def test_the_mains_line_of_a_run_is_its_typical_phasor():

@@ -180,9 +180,9 @@ def test_a_clock_s_rate_is_told_by_how_phases_turn_within_the_records(rate, seed
     case = Case(
         rates={"force": rate, "acceleration": rate},
         stated={
-            "force": {"device": "second"},
-            "acceleration": {"device": "second"},
-            "displacement": {"device": "first"},
+            "force": {"clock": "second"},
+            "acceleration": {"clock": "second"},
+            "displacement": {"clock": "first"},
         },
     )
     rig, blocks, truth = made(case, seed)
@@ -198,7 +198,7 @@ def test_a_clock_s_rate_is_told_by_how_phases_turn_within_the_records(rate, seed
 
 
 def test_clocks_that_agree_are_not_named():
-    case = Case(stated={"force": {"device": "b"}, "acceleration": {"device": "b"}, "displacement": {"device": "a"}})
+    case = Case(stated={"force": {"clock": "b"}, "acceleration": {"clock": "b"}, "displacement": {"clock": "a"}})
     solution = solved(*made(case))
     (term,) = [t for t in solution.terms if t.name == "clock"]
     assert term.conditions(of(solution, "clock")) == ()

@@ -22,7 +22,7 @@ from scipy.signal import fftconvolve
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.bands.run_spectra import RunSpectra
-from tpjb_ident.estimate.shape import MODELS, power_columns
+from tpjb_ident.estimate.arrowhead import MODELS, complex_matrix, power_columns
 from tpjb_ident.estimate.term import ALLOWED_CHANGE, CHANGE_BY_ORBIT
 
 #: Undriven lines that tell, at least, and how much of what falls on driven lines must fall on them.
@@ -118,7 +118,7 @@ def _curvature(sums: FloatArray, power: FloatArray, noise: FloatArray) -> tuple[
     `noise` (n,): of the powers, which are besides as uncertain as they are large.
     """
     size = np.maximum(sums.max(axis=0), np.finfo(float).tiny)
-    unit = max(float(np.abs(power).max()), 1e-300)
+    unit = max(np.abs(power).max(), 1e-300)
     fitted = np.full(len(power), unit)
     for _ in range(_ROUNDS):
         expected = np.maximum((fitted + noise) / unit, 1e-3)
@@ -149,8 +149,8 @@ class _Film:
 
     def unexplained(self, D: ComplexArray, F: ComplexArray, frequencies: FloatArray) -> ComplexArray:
         """Force beyond h D at some frequencies [Hz], negative ones too, (n_windows, n_bins, 2) [N]."""
-        h = _columns(2 * np.pi * frequencies, self.middle) @ self.numbers
-        return np.asarray(F - np.einsum("kij,wkj->wki", h, D))
+        columns = power_columns(2 * np.pi * frequencies / self.middle, MODELS["K-C-M"])
+        return F - np.einsum("kij,wkj->wki", complex_matrix(columns @ self.numbers), D)
 
     def excess(self, runs: Sequence[RunSpectra], places: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Square of every run's unexplained force at some bins along X and Y without its noise, and that noise.
@@ -171,7 +171,7 @@ class _Film:
         for run in runs:
             if order in run.turned:
                 turned, motion = run.turned[order], run.D.mean(axis=0)[self.driven]
-                D, F = turned.displacement.phasors, turned.oil_force(slice(None))
+                D, F = turned.displacement, turned.oil_force(slice(None))
                 force = self.unexplained(D, F, run.frequencies - order * run.shaft)[0, self.driven]
                 coherent = motion @ np.linalg.lstsq(motion, force, rcond=_ACROSS)[0]
                 noise = np.sum(np.abs(force - coherent) ** 2) * 2 / max(len(force) - 2, 1)
@@ -182,16 +182,10 @@ class _Film:
 def _film(runs: Sequence[RunSpectra], driven: BoolArray) -> _Film:
     """The film of some runs by their driven lines (n_bins,)."""
     omega = 2 * np.pi * runs[0].frequencies[driven]
-    middle = float(np.median(omega))
-    columns = _columns(omega, middle)
+    middle = np.median(omega)
+    columns = complex_matrix(power_columns(omega / middle, MODELS["K-C-M"]).transpose(0, 2, 1))
     D, F = (np.array([getattr(run, name).mean(axis=0)[driven] for run in runs]) for name in "DF")
-    design = np.einsum("kijq,rkj->rkiq", columns, D).reshape(-1, columns.shape[3])
+    design = np.einsum("kqij,rkj->rkiq", columns, D).reshape(-1, columns.shape[1])
     rows = np.concatenate([design.real, design.imag])
     numbers = np.linalg.lstsq(rows, np.concatenate([F.real.ravel(), F.imag.ravel()]), rcond=None)[0]
     return _Film(driven, numbers, middle, float(np.mean(np.sum(np.abs(F) ** 2, axis=2))))
-
-
-def _columns(omega: FloatArray, middle: float) -> ComplexArray:
-    """Change of h (n, 2, 2, 12) by the numbers of K-C-M."""
-    columns = power_columns(omega / middle, MODELS["K-C-M"])
-    return np.asarray((columns[:, :4] + 1j * columns[:, 4:]).reshape(len(omega), 2, 2, 12))

@@ -7,14 +7,21 @@ doi:10.1016/j.ymssp.2009.08.003). The instrument is the command. Without one it 
 taken to be the force's, as H1 does.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.bands.run_spectra import RunSpectra
+from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
+from tpjb_ident.bands.run_spectra import OPEN_ENDS, RunSpectra, run_spectra
+from tpjb_ident.errors import BadInputError
 from tpjb_ident.estimate.noise import unbiased_noise
+from tpjb_ident.phasors.run_data import PhasorSettings
+from tpjb_ident.runs.point_data import ExcludedRun, RunsOfPoint
 
 #: A direction of the command with less than this share of its power is at rest.
 _AT_REST = 1e-3
@@ -46,20 +53,15 @@ def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, e
     shows across that is noise.
     """
     if instrument == "periods":
-        return _over_periods(runs[0].phasors.z[:, bins[0]], runs[0].phasors.start)
+        rows, start = runs[0].phasors.z[:, bins[0]], runs[0].phasors.start
+        n, mean, time = len(rows), rows.mean(axis=0), start - start.mean()
+        remaining, spread = rows - mean, max(float(time @ time), 1e-300)
+        slope, size = time @ remaining / spread, np.array([1 / spread])
+        return LineResponse(mean[None], float(n), _outer(remaining), n - 1.0, slope[None], size, float(n))
     z = np.concatenate([run.phasors.z[0, bins] for run in runs])
     sources = [_sources(run, instrument) for run in runs]
     u, by_time = (np.concatenate([part[bins] for part in parts]) for parts in zip(*sources))
     return _regressed(z, u, by_time, nuisance(runs, bins, u, ends))
-
-
-def _over_periods(rows: ComplexArray, start: FloatArray) -> LineResponse:
-    """Mean of the periods' phasors (n, m) and how they move; `start` (n,) [s]."""
-    n, mean = len(rows), rows.mean(axis=0)
-    time = start - start.mean()
-    remaining, spread = rows - mean, max(float(time @ time), 1e-300)
-    slope = time @ remaining / spread
-    return LineResponse(mean[None], float(n), _outer(remaining), n - 1.0, slope[None], np.array([1 / spread]), float(n))
 
 
 def nuisance(runs: Sequence[RunSpectra], bins: IntArray, sources: ComplexArray, ends: bool) -> ComplexArray:
@@ -68,8 +70,8 @@ def nuisance(runs: Sequence[RunSpectra], bins: IntArray, sources: ComplexArray, 
     And what the `ends` of each run's record leak into them: straight lines.
     """
     place = runs[0].frequencies[bins] - runs[0].frequencies[bins].mean()
-    place /= max(float(np.abs(place).max()), 1e-300)
-    sloped = np.asarray(np.tile(place, len(runs))[:, None] * sources)
+    place /= max(np.abs(place).max(), 1e-300)
+    sloped = np.tile(place, len(runs))[:, None] * sources
     if not ends:
         return sloped
     return np.concatenate([sloped, np.kron(np.eye(len(runs)), np.vander(place, 2, increasing=True))], axis=1)
@@ -80,18 +82,13 @@ def _sources(run: RunSpectra, instrument: str) -> tuple[ComplexArray, ComplexArr
     assert run.by_time is not None
     parts = run, run.by_time
     if instrument == "command":
-        along = _driven(run)
-        first, by_time = (part.command[0] @ along for part in parts if part.command is not None)
+        commands = [part.command[0] for part in parts if part.command is not None]
+        # in directions in which the command acts: what rests would be noise alone
+        power, along = np.linalg.eigh((commands[0].T @ commands[0].conj()).real)
+        first, by_time = (command @ along[:, power > _AT_REST * power[-1]] for command in commands)
     else:
         first, by_time = (part.D[0] for part in parts)
     return first, by_time
-
-
-def _driven(run: RunSpectra) -> FloatArray:
-    """Directions (2, k) in which the command acts: what rests would be noise alone."""
-    assert run.command is not None
-    power, along = np.linalg.eigh((run.command[0].T @ run.command[0].conj()).real)
-    return np.asarray(along[:, power > _AT_REST * power[-1]])
 
 
 def one_phase_set(runs: Sequence[RunSpectra]) -> bool:
@@ -118,7 +115,7 @@ def _regressed(z: ComplexArray, u: ComplexArray, by_time: ComplexArray, besides:
     """
     basis = np.linalg.qr(besides)[0]
     q, triangle = np.linalg.qr(orthogonal(u, basis))
-    independent = np.abs(np.diag(triangle)) > _NOTHING * max(float(np.abs(triangle).max()), 1e-300)
+    independent = np.abs(np.diag(triangle)) > _NOTHING * max(np.abs(triangle).max(), 1e-300)
     q, triangle, by_time = q[:, independent], triangle[np.ix_(independent, independent)], by_time[:, independent]
     fitted = np.concatenate([basis, q], axis=1)
     remaining = orthogonal(z, fitted)
@@ -131,22 +128,179 @@ def _regressed(z: ComplexArray, u: ComplexArray, by_time: ComplexArray, besides:
 
 def orthogonal(rows: ComplexArray, basis: ComplexArray) -> ComplexArray:
     """Rows (b, m) without their part in orthonormal columns (b, j)."""
-    return np.asarray(rows - basis @ (basis.conj().T @ rows))
+    return rows - basis @ (basis.conj().T @ rows)
 
 
 def _outer(rows: ComplexArray) -> ComplexArray:
-    return np.asarray(rows.T @ rows.conj())
+    return rows.T @ rows.conj()
 
 
 def pooled_noise(responses: list[LineResponse]) -> tuple[list[ComplexArray], FloatArray]:
     """Noise of a row at every line of one run with its neighbours (m, m), and its degrees of freedom (n,)."""
     residual = np.array([r.residual for r in responses])
     freedom = np.array([r.freedom for r in responses])
-    reach = int(np.ceil(0.5 * _FREEDOM / max(float(freedom.mean()), 1e-9)))
+    reach = int(np.ceil(0.5 * _FREEDOM / max(freedom.mean(), 1e-9)))
     noises, totals = [], []
     for k in range(len(freedom)):
         near = slice(max(k - reach, 0), k + reach + 1)
-        total = max(float(freedom[near].sum()), 1.0)
+        total = max(freedom[near].sum(), 1.0)
         noises.append(unbiased_noise(residual[near].sum(axis=0) / total, total))
         totals.append(total)
     return noises, np.array(totals)
+
+
+#: Condition number of the motions' power from which they are along one line.
+_ONE_LINE = 1e12
+
+
+@dataclass(frozen=True)
+class ClassicLine:
+    """One line by the methods of analysers."""
+
+    h: dict[str, ComplexArray]  #: (2, 2) by method, N/m; none where the rows do not tell it
+    coherence: FloatArray  #: (2,): of the force along X and Y with the displacements
+    n_rows: int
+
+
+def classic_line(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> ClassicLine:
+    """H1, H2, Hv and coherence over all rows of a line: periods, or bins."""
+    rows = np.concatenate([np.concatenate([s.D[:, bins], s.F[:, bins]], axis=2).reshape(-1, 4) for s in spectra])
+    used = 0  # columns that slope and leakage take
+    if spectra[0].period is None:
+        basis = np.linalg.qr(nuisance(spectra, bins, rows[:, :2], ends))[0]
+        rows, used = orthogonal(rows, basis), basis.shape[1]
+    S, n, freedom = rows.T @ rows.conj(), len(rows), len(rows) - used - 2
+    size = np.sqrt(np.diag(S).real)
+    if freedom < 1 or not (size > 0).all() or not np.linalg.cond(S[:2, :2] / np.outer(size, size)[:2, :2]) < _ONE_LINE:
+        return ClassicLine({}, np.full(2, np.nan), n)
+    h1, h2 = S[2:, :2] @ np.linalg.inv(S[:2, :2]), S[2:, 2:] @ np.linalg.inv(S[:2, 2:])
+    signal = np.linalg.eigh(S / np.outer(size, size))[1][:, 2:] * size[:, None]
+    noise = (freedom + 2) / freedom * np.diag(S[2:, 2:] - h1 @ S[:2, 2:]).real
+    h = {"h1": h1, "h2": h2, "hv": signal[2:] @ np.linalg.inv(signal[:2])}
+    return ClassicLine(h, np.clip(1 - noise / size[2:] ** 2, 0.0, 1.0), n)
+
+
+#: Lines over a band where a record resolves more, and bins that a line takes at least.
+_LINES, _BINS = 60, 12
+#: Bins of a line that must be left when those of shaft and mains are gone.
+_LEAST_BINS = 8
+#: Lines that a band must give.
+_LEAST_LINES = 4
+
+
+@dataclass(frozen=True)
+class BandPoint(RunsOfPoint):
+    """Runs at one operating point, excited alike and transformed."""
+
+    kind: str
+    spectra: list[RunSpectra]
+    bins: tuple[IntArray, ...]  #: of every line: one of a period, or some neighbouring ones of a whole record
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Of the lines, (n_lines,) [Hz]."""
+        return np.array([self.spectra[0].frequencies[bins].mean() for bins in self.bins])
+
+    @property
+    def resolution(self) -> float:
+        """Width of a line [Hz]."""
+        return max(map(len, self.bins), default=1) / self.spectra[0].phasors.length
+
+    @property
+    def method(self) -> str:
+        """What tells noise from motion: the periods, the command, or nothing."""
+        if self.spectra[0].period is not None:
+            return "periods"
+        return "iv" if all(s.command is not None for s in self.spectra) else "hv"
+
+    @property
+    def members(self) -> list[list[int]]:
+        """Runs that are taken together: each by itself, all of them where nothing tells noise from motion."""
+        places = list(range(len(self.spectra)))
+        return [places] if self.method == "hv" else [[place] for place in places]
+
+    @property
+    def open(self) -> bool:
+        """Whether the records may begin and end in motion."""
+        return self.kind in OPEN_ENDS
+
+    @cached_property
+    def classic(self) -> list[ClassicLine]:
+        """Every line by the methods of analysers."""
+        return [classic_line(self.spectra, bins, self.open) for bins in self.bins]
+
+
+def read_point(
+    runs: Sequence[Run], housing_mass: float, settings: PhasorSettings, fast: Mapping[str, float]
+) -> tuple[BandPoint | None, list[ExcludedRun]]:
+    """Transform the runs of a point, and name those that cannot be used; None where there is no other.
+
+    `fast`: rates of the channels' clocks by name, relative.
+    """
+    spectra: list[RunSpectra] = []
+    unusable = []
+    first, band = runs[0], _common_band(runs)
+    seconds = min(run.length / run.sample_rate for run in runs)
+    for run in runs:
+        try:
+            spectra.append(run_spectra(run, housing_mass, band, seconds, settings, fast))
+        except RigDataError as error:
+            unusable.append(ExcludedRun(run.id, run.point, error))
+    if not spectra:
+        return None, unusable
+    _refuse_unlike(spectra)
+    point = replace(first.point, excitation=0.0)
+    phasors = tuple(s.phasors for s in spectra)
+    return BandPoint(point, phasors, first.excitation_kind, spectra, bins_of_lines(spectra)), unusable
+
+
+def _common_band(runs: Sequence[Run]) -> tuple[float, float]:
+    """What the bands of some runs have in common [Hz]."""
+    bands = np.array([run.band for run in runs if run.band is not None])
+    low, high = float(bands[:, 0].max()), float(bands[:, 1].min())
+    first = runs[0]
+    if not low < high:
+        text = f"runs at {first.point} have no common excitation_band"
+        raise RigDataError(Problem("error", first.file, "excitation_band", text, "Check the bands", first.id))
+    return low, high
+
+
+def _refuse_unlike(spectra: Sequence[RunSpectra]) -> None:
+    """Runs of one point have the same bins."""
+    first = spectra[0]
+    for spectrum in spectra[1:]:
+        is_same = len(spectrum.frequencies) == len(first.frequencies)
+        if not is_same or np.abs(spectrum.frequencies / first.frequencies - 1).max() > 1e-3:
+            sentences = [
+                f"{s.phasors.run} {'none' if s.period is None else f'{s.period:.4g} s'}" for s in (first, spectrum)
+            ]
+            raise BadInputError(
+                f"runs at {first.phasors.point} repeat with different periods ({', '.join(sentences)}); "
+                "excite the runs of one point with one period, or list them as different kinds of excitation"
+            )
+
+
+def band_groups(runs: Sequence[Run]) -> list[list[Run]]:
+    """Group broadband runs by operating point and kind of excitation, sorted."""
+    groups: dict[tuple[object, ...], list[Run]] = {}
+    for run in runs:
+        groups.setdefault((*run.point.static_key, run.excitation_kind), []).append(run)
+    return [groups[key] for key in sorted(groups, key=repr)]
+
+
+def bins_of_lines(spectra: Sequence[RunSpectra]) -> tuple[IntArray, ...]:
+    """Bins of the lines of runs that have the same bins."""
+    free = ~np.any([s.disturbed for s in spectra], axis=0)
+    if spectra[0].period is not None:
+        return tuple(np.flatnonzero(free)[:, None])
+    n = len(free)
+    count = n // max(_BINS, math.ceil(n / _LINES))
+    if count < _LEAST_LINES:
+        have = spectra[0].phasors.length
+        need = have * _LEAST_LINES * _BINS / max(n, 1)
+        raise BadInputError(
+            f"run {spectra[0].phasors.run}: {have:.3g} s resolve {n} bins of its band, {_LEAST_LINES * _BINS} are "
+            f"needed; record {need:.3g} s or excite a wider band"
+        )
+    lines = [part[free[part]] for part in np.array_split(np.arange(n), count)]
+    return tuple(part for part in lines if len(part) >= _LEAST_BINS)

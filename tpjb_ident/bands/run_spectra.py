@@ -1,29 +1,184 @@
-"""One broadband run as phasors: of every period of a periodic excitation, or of the whole record."""
+"""One broadband run as phasors: of every period of a periodic excitation, or of the whole record.
+
+A periodic excitation needs no window and measures its own noise. Its generator has a clock of its own, so that a period
+need not hold a whole number of samples; the record is then resampled, all channels alike, to one that does.
+
+What a period leaves is what the record changes from any stretch to its repeats. Beats of few tones all but repeat
+sooner, and multiples leave no more: the period is the smallest that leaves no more than the best does but by chance (F
+test of nested models). Every other that is no multiple must be less likely by far, else noise hides which it is. Noise
+repeats by chance: a period's lines must stand above the bins beside them (F test along the band, joined by Fisher's sum
+of logarithms), at a chance that all lags looked at share.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import map_coordinates, spline_filter1d, uniform_filter1d
+from scipy.signal import find_peaks
+from scipy.special import betainc, fdtri, gammaincc
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.problem import refuse
 from rigdata.run import Run
-from tpjb_ident.bands.disturbing_lines import (
+from tpjb_ident.bands.samples import (
     LEFT_OUT,
     LEFT_OUT_OF_PERIOD,
+    Samples,
     bins_taken,
     find_disturbances,
+    interpolated,
+    read_samples,
     without_disturbances,
 )
-from tpjb_ident.bands.period import driven_part, find_period, resampled
-from tpjb_ident.bands.samples import Samples, read_samples
 from tpjb_ident.phasors.compensation import compensated, filled_channels
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.runs.point_data import mean_temperatures
+
+#: Periods that a record must hold.
+_MIN_PERIODS = 3
+#: Chance that a record without period shows one, and that its noise hides a period behind a multiple of it.
+_CHANCE = 1e-3
+#: Likelihood over that of any other lag that is no multiple, and part of a cycle at the band's top within which two
+#: lags are one.
+_CLEAR, _ONE_LAG = 20.0, 1 / 4
+#: Part of a cycle at the top of the band by which lags are first moved, and of the last multiple's in the end.
+_FIRST_MOVE, _LAST_MOVE = 1 / 8, 1 / 64
+#: Points of a cycle at the top of the band from which splines leave nothing of note [share].
+_POINTS, _UNSEEN = 32, 1e-5
+#: Share of the bins' degrees of freedom that two windows leave to a difference of variances.
+_WINDOWED = 0.4
+#: Bins on either side of a line that tell the noise there, and so many at least for one line or some together.
+_BESIDE = 4
+#: Phase [rad] by which the top of the band may run off over the record before it is resampled.
+_MAX_SLIP = 0.01
+#: Power within a band, over a cycle of its lowest frequency and of what is usual, below which nothing drives.
+_QUIET = 0.05
+
+
+def driven_part(clean: Samples, band: tuple[float, float]) -> slice:
+    """Samples from where the drive of a band begins to where it ends, of a record without shaft and mains."""
+    frequency = np.fft.rfftfreq(2 * clean.length, 1 / clean.rate)
+    rows = _filtered(clean.signals(), (frequency > band[0]) & (frequency < band[1]))
+    power = uniform_filter1d(np.sum(rows**2, axis=0), int(clean.rate / band[0]))
+    driven = np.flatnonzero(power >= _QUIET * np.quantile(power, 0.9))
+    return slice(int(driven[0]), int(driven[-1]) + 1)
+
+
+def find_period(clean: Samples, band: tuple[float, float], lines: tuple[Line, ...], most: float) -> float | None:
+    """Smallest period in samples of what excites the band, None where it does not repeat.
+
+    `lines` of shaft and mains are taken off; `most` is the share of the power that may not repeat.
+    """
+    n, step = clean.length, clean.rate / clean.length
+    frequency = np.asarray(0.5 * step * np.arange(n + 1), dtype=float)
+    inside = (
+        (frequency > band[0] - 2 * step) & (frequency < band[1] + 2 * step) & ~bins_taken(frequency, lines, 1 / step)
+    )
+    window = np.hanning(n)  # under which the lines of an excitation end with the band
+    rows = _filtered(clean.signals() * window, inside)
+    first = int(clean.rate / band[0])
+    finer = math.ceil(_POINTS * band[1] / clean.rate)
+    pairs = (rows * window, rows * window), (rows**2, window[None] ** 2)
+    alike, power = (_correlation(*pair, finer) for pair in pairs)
+    part = alike[::finer][first : n // _MIN_PERIODS + 1]
+    lags = find_peaks(part, height=0.0)[0] + first
+    if not len(lags):
+        return None
+    periods, remainder = _combed((alike, power), lags, clean.rate / band[1], finer)
+    freedom = _WINDOWED * inside.sum() * (1 - periods / n)
+    least = freedom[np.argmin(remainder)]
+    more = np.maximum(freedom - least, 1.0)
+    allowed = (least + more * fdtri(more, least, 1 - _CHANCE)) / (least + more)
+    k = np.argmax(remainder <= remainder.min() * allowed)
+    ratio = periods / periods[k]
+    foreign = np.abs(ratio - np.round(ratio)) * periods[k] > _ONE_LAG * clean.rate / band[1]
+    unclear = (freedom * np.log(remainder / remainder[k]) < math.log(_CLEAR))[foreign].any()
+    if unclear or remainder[k] > most or _chance_of_noise(clean, float(periods[k]), band, lines) > _CHANCE / len(part):
+        return None
+    return float(periods[k])
+
+
+def _filtered(rows: FloatArray, inside: BoolArray) -> FloatArray:
+    """Rows (k, n) of the frequencies to keep alone, (n + 1,) of them."""
+    n = rows.shape[1]
+    return np.fft.irfft(np.where(inside, np.fft.rfft(rows, 2 * n, axis=1), 0.0), axis=1)[:, :n]
+
+
+def _correlation(first: FloatArray, second: FloatArray, finer: int) -> FloatArray:
+    """Sum over rows (k, n) of their products at lags of both signs alike, `finer` of them a sample, (finer n,)."""
+    n = first.shape[1]
+    spectra = [np.fft.rfft(rows, 2 * n, axis=1) for rows in (first, second)]
+    product = np.sum(spectra[0] * spectra[1].conj(), axis=0).real
+    return np.fft.irfft(product, 2 * n * finer)[: n * finer]
+
+
+def _combed(
+    pair: tuple[FloatArray, FloatArray], lags: IntArray, cycle: float, finer: int
+) -> tuple[FloatArray, FloatArray]:
+    """Periods near lags (k,) which leave least, and the share that they leave at all their multiples together, (k,).
+
+    `pair` (finer n,): correlation over the lag, and power of the stretches that overlap; `cycle` [samples] of the
+    band's top. Ever more multiples tell by ever finer moves.
+    """
+    splines = [spline_filter1d(values) for values in pair]
+    n = len(pair[0]) // finer
+    periods, remainder = lags.astype(float), np.ones(len(lags))
+    move, active = _FIRST_MOVE * cycle, np.arange(len(lags))
+    while len(active):
+        near = periods[active, None] + move * np.array([-1.0, 0.0, 1.0])
+        multiples = np.arange(1, int(max(min(_FIRST_MOVE * cycle / move, n / near.min()), 1)) + 1)
+        at = near[:, :, None] * multiples
+        # beyond the record nothing overlaps
+        product, power = (
+            map_coordinates(s, [finer * at], mode="constant", prefilter=False).sum(axis=2) for s in splines
+        )
+        low, middle, high = (1 - product / power).T
+        bend = np.maximum(low - 2 * middle + high, 1e-300)
+        periods[active] += move * np.clip(0.5 * (low - high) / bend, -1.0, 1.0)
+        remainder[active] = np.maximum(middle, _UNSEEN)
+        move /= 2
+        active = active[move * n > _LAST_MOVE * cycle * periods[active]]
+    return periods, remainder
+
+
+def _chance_of_noise(clean: Samples, period: float, band: tuple[float, float], lines: tuple[Line, ...]) -> float:
+    """Chance with which noise stands as high at the lines of a period, above the bins beside them."""
+    periodic = resampled(clean, period, band[1])
+    count = periodic.length // round(period)
+    step = periodic.rate / max(periodic.length, 1)
+    if count < _MIN_PERIODS:
+        return 1.0
+    power = np.sum(np.abs(np.fft.rfft(periodic.signals(), axis=1)) ** 2, axis=0)
+    bins = np.arange(len(power))
+    frequency = np.asarray(step * bins, dtype=float)
+    inside = (frequency > band[0] - 0.5 * step) & (frequency < band[1] + 0.5 * step)
+    away = np.abs((bins + count // 2) % count - count // 2)
+    at_lines = inside & (away == 0) & ~bins_taken(frequency, lines, 1 / (count * step), LEFT_OUT_OF_PERIOD)
+    between = inside & (away > 0) & (away <= _BESIDE)
+    block = (bins + count // 2) // (count * math.ceil(_BESIDE / min(count - 1, 2 * _BESIDE)))
+    sums = [np.bincount(block, weights) for weights in (at_lines, between, at_lines * power, between * power)]
+    held, spare, high, noise = np.array(sums)[:, (sums[0] > 0) & (sums[1] > 0)]
+    chances = betainc(spare, held, noise / np.maximum(noise + high, 1e-300))
+    return float(gammaincc(max(len(chances), 1e-9), -np.log(np.maximum(chances, 1e-300)).sum()))
+
+
+def resampled(samples: Samples, period: float, top: float) -> Samples:
+    """The record cut to whole periods of a whole number of samples each."""
+    q = round(period)
+    count = int((samples.length + 1e-6 * period) // period)
+    slip = 2 * np.pi * top / samples.rate * abs(period - q) * count
+    if slip <= _MAX_SLIP:
+        count = samples.length // q
+        return samples.mapped(lambda rows: rows[:, : count * q])
+    at = np.asarray(np.arange(count * q) * (period / q), dtype=float)
+    return samples.mapped(lambda rows: interpolated(rows, at), samples.rate * q / period)
+
 
 #: Share of the power that a period may leave where none is stated.
 _LEFT = 0.5
@@ -41,7 +196,7 @@ def is_broadband(run: Run) -> bool:
     return run.excitation_kind != "sine"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RunSpectra:
     """Phasors of one run over the band: every period's, or those of the whole record's bins."""
 
@@ -54,12 +209,10 @@ class RunSpectra:
     clean_rms: float = 0.0  #: m: of the motion without disturbing lines
     peak: float = 0.0  #: m: largest motion
     one_sided: float = 0.0  #: 1 where what drives goes to one side only, 0 where to both alike
-    by_time: RunSpectra | None = field(default=None, repr=False)  #: of the record times the time from its middle [s]
-    wide: RunSpectra | None = field(
-        default=None, repr=False
-    )  #: of a period, and beyond the band, where the film answers
+    by_time: RunSpectra | None = None  #: of the record times the time from its middle [s]
+    wide: RunSpectra | None = None  #: of a period, and beyond the band, where the film answers
     #: by order n the phasors (1, n_bins, ..) of the record turned n times as fast as the shaft: at f, what is at f - nX
-    turned: dict[int, RunPhasors] = field(default_factory=dict, repr=False)
+    turned: dict[int, RunPhasors] = field(default_factory=dict)
 
     @property
     def frequencies(self) -> FloatArray:
@@ -69,7 +222,7 @@ class RunSpectra:
     @cached_property
     def D(self) -> ComplexArray:
         """Displacement, (n_windows, n_bins, 2) [m]."""
-        return self.phasors.displacement.phasors
+        return self.phasors.displacement
 
     @cached_property
     def F(self) -> ComplexArray:
@@ -90,10 +243,10 @@ class RunSpectra:
         sizes = [np.linalg.norm(drive.mean(axis=0), axis=1) for drive in drives]
         share = np.max([size / max(size.max(), 1e-300) for size in sizes], axis=0)
         if self.command is None:
-            return np.asarray(share >= _DRIVEN)
+            return share >= _DRIVEN
         falling = np.sort(share)[::-1]
         ends = np.flatnonzero((falling[1:] < _DRIVEN) & (falling[:-1] > _STEP * falling[1:]))
-        return np.asarray(share >= max(falling[ends[0]] if len(ends) else 0.0, _NOTHING))
+        return share >= max(falling[ends[0]] if len(ends) else 0.0, _NOTHING)
 
     @property
     def amplitude(self) -> float:
@@ -167,7 +320,7 @@ def _motion(samples: Samples) -> tuple[float, float, float]:
     size = np.linalg.norm(motion, axis=0)
     drive = motion if samples.command is None else samples.command
     along = np.linalg.eigh(drive @ drive.T)[1][:, -1] @ drive
-    one_sided = abs(float(np.mean(along**3))) / max(float(np.mean(np.abs(along) ** 3)), 1e-300)
+    one_sided = abs(np.mean(along**3)) / max(np.mean(np.abs(along) ** 3), 1e-300)
     return float(np.sqrt(np.mean(size**2))), float(size.max()), one_sided
 
 
@@ -203,7 +356,7 @@ def _bins(rows: FloatArray, length: int, places: IntArray) -> ComplexArray:
     """Phasors (n_windows, n_bins, m) of rows (m, n) in stretches of `length` samples."""
     folded = rows.reshape(len(rows), -1, length)
     spectra = np.fft.rfft(folded, axis=2)[:, :, places] * (2.0 / length)
-    return np.asarray(spectra.transpose(1, 2, 0))
+    return spectra.transpose(1, 2, 0)
 
 
 def _phasors(run: Run, samples: Samples, z: ComplexArray, places: IntArray, mean: FloatArray) -> RunPhasors:

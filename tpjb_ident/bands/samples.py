@@ -2,6 +2,10 @@
 
 A device of another rate is read at the times of the first one; single readings that their neighbours contradict are
 bridged, as missing ones are.
+
+Lines that turn with the shaft or come from the mains are fitted over the whole record, taken off, their bins left out.
+The amplitude of each may change slowly over the record, as a polynomial of time; so a frequency that is a little off,
+or creeps, is taken along. A periodic excitation is fitted together with them, period by period, and stays as it is.
 """
 
 from __future__ import annotations
@@ -10,18 +14,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import zoom_fft
 
 from rigdata.arrays import BoolArray, FloatArray
-from rigdata.calibration import Channel
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
 from rigdata.vector import directions, inverse_directions
 from tpjb_ident.check.signals import is_spare
-from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.phasors.bad_samples import BAD_LIMIT, robust_deviation
-from tpjb_ident.phasors.channel_times import device_readers
-from tpjb_ident.phasors.lines import HIGHEST
-from tpjb_ident.phasors.run_data import QUANTITIES
+from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.phasors.line_fit import BAD_LIMIT, even_design, robust_deviation
+from tpjb_ident.phasors.lines import HIGHEST, MAINS_DRIFT, SPEED_DRIFT, Line, LineSettings, strong_lines
+from tpjb_ident.phasors.run_data import Directed, device_readers
+from tpjb_ident.phasors.whole_record import vertex
 
 #: Share of a channel's samples that may be missing in stretches, bridged by straight lines,
 _MAX_LOST = 0.01
@@ -42,27 +47,23 @@ _PASSES = 3
 
 
 @dataclass(frozen=True)
-class Samples:
+class Samples(Directed):
     """One run in memory, SI."""
 
     rate: float
     channels: tuple[Channel, ...]  #: probes, cells, accelerometers, in this order
     rows: FloatArray  #: (m, n)
     command: FloatArray | None  #: (2, n): along X and Y, in units of its own
-    conditions: tuple[Condition, ...] = ()
+    conditions: Conditions = ()
 
     @property
     def length(self) -> int:
         """Samples per channel."""
         return int(self.rows.shape[1])
 
-    def places(self, quantity: str) -> list[int]:
-        """Rows of a quantity's channels."""
-        return [j for j, channel in enumerate(self.channels) if channel.quantity == quantity]
-
     def vector(self, quantity: str) -> FloatArray:
         """X and Y of a quantity, (2, n)."""
-        places = self.places(quantity)
+        places = self.pick(quantity)
         return inverse_directions(tuple(float(self.channels[j].axis or 0.0) for j in places)) @ self.rows[places]
 
     def signals(self) -> FloatArray:
@@ -70,7 +71,7 @@ class Samples:
 
         The command comes alone where there is one: what was meant to move the shaft tells the period best.
         """
-        groups = [self.rows[self.places(q)] for q in ("displacement", "force")]
+        groups = [self.rows[self.pick(q)] for q in ("displacement", "force")]
         if self.command is not None:
             groups = [self.command]
         centred = [rows - rows.mean(axis=1, keepdims=True) for rows in groups]
@@ -92,7 +93,9 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
     rate = run.sample_rate
     n = min(run.length, round(seconds * rate))
     recorded = _on_first_grid(run, n, highest)
-    inside = np.all([_has_neighbours(values, at) for _, values, at in recorded], axis=0)
+    inside = np.ones(n, dtype=bool)
+    for _, values, at in recorded:  # as far as the kernel reaches; of its own times every one
+        inside &= _is_own(values, at) | (at >= _TAPS) & (at <= len(values) - 1 - _TAPS)
     channels, rows, lost, command = [], [], 0.0, np.zeros((2, n))
     single = len(run.of("command")) == 1
     for channel, values, at in recorded:
@@ -108,7 +111,7 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
             continue
         channels.append(channel)
         rows.append(_at(_bridged(run, channel, values), at * (1 + fast.get(channel.name, 0.0))))
-        lost = max(lost, float((~np.isfinite(values)).mean()))
+        lost = max(lost, (~np.isfinite(values)).mean())
     bridged = holding((lost > _TOLD_LOST, "samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"))
     driven = command[:, inside] if command.any() else None
     return Samples(rate, tuple(channels), np.array(rows)[:, inside], driven, bridged)
@@ -130,7 +133,7 @@ def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, Floa
             _refuse_unlike(run, reader.channels[0].name, reader.rate, highest)
         at = places if is_alike else (places / run.sample_rate + begins[0] - begins[-1]) * reader.rate
         recorded += [(channel, values, at) for channel, values in zip(reader.channels, rows)]
-    return sorted(recorded, key=lambda record: (*QUANTITIES, "command").index(record[0].quantity))
+    return sorted(recorded, key=lambda record: (*VECTOR_QUANTITIES, "command").index(record[0].quantity))
 
 
 def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
@@ -144,11 +147,6 @@ def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
         raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
     return float(np.median(off)) / rate
-
-
-def _has_neighbours(values: FloatArray, at: FloatArray) -> BoolArray:
-    """Which places (n,) have readings on either side, as far as the kernel reaches; of its own times every one."""
-    return np.asarray(_is_own(values, at) | (at >= _TAPS) & (at <= len(values) - 1 - _TAPS))
 
 
 def _is_own(values: FloatArray, at: FloatArray) -> bool:
@@ -232,3 +230,80 @@ def interpolated(rows: FloatArray, at: FloatArray) -> FloatArray:
         window = np.i0(_KAISER * np.sqrt(np.maximum(1 - (distance / _TAPS) ** 2, 0.0))) / norm
         out += rows[:, np.clip(base + tap, 0, last)] * (np.sinc(distance) * window)
     return out
+
+
+#: Highest harmonics of shaft and mains that are looked for.
+_SHAFT_HARMONICS, _MAINS_HARMONICS = 8, 5
+#: Highest power of time in a line's amplitude.
+_CREEP = 3
+#: Power of a line, over that of noise of the record's size, from which its frequency is believed.
+_SHOWN = 20.0
+#: Part of a line's power that the excitation's period must leave: one that it holds stays where it is.
+_NOTHING = 1e-6
+#: Bins next to a line that are left out, in whole-record bins.
+LEFT_OUT = 4.0
+#: The same of a period, in its own bins: lines between its bins are told from it by all its repeats.
+LEFT_OUT_OF_PERIOD = 0.6
+
+
+def find_disturbances(samples: Samples, speed: float, mains: float, top: float) -> tuple[Line, ...]:
+    """Shaft harmonics and mains up to above the band, at the frequencies at which the record shows them."""
+    reach = min(HIGHEST * samples.rate, 1.5 * top)
+    shaft = _shown(samples, speed, SPEED_DRIFT) if samples.length / samples.rate * speed > 2 else 0.0
+    supply = _shown(samples, mains, MAINS_DRIFT) if mains > 0 else 0.0
+    settings = LineSettings(supply, _SHAFT_HARMONICS, _MAINS_HARMONICS)
+    resolved: list[Line] = []
+    for line in strong_lines((), shaft, settings):
+        is_resolved = all(abs(line.frequency - near.frequency) > samples.rate / samples.length for near in resolved)
+        if line.frequency < reach and is_resolved:
+            resolved.append(line)
+    return tuple(resolved)
+
+
+def _shown(samples: Samples, nominal: float, wander: float) -> float:
+    """Frequency of the highest peak near `nominal` [Hz], where one stands clear of what is around it."""
+    n, window = samples.length, np.hanning(samples.length)
+    step = 0.25 * samples.rate / n
+    reach = int(wander / step) + 1
+    ends = [nominal - reach * step, nominal + reach * step]
+    power = np.zeros(2 * reach + 1)
+    for quantity in ("displacement", "force"):
+        rows = samples.rows[samples.pick(quantity)]
+        rows = rows - rows.mean(axis=1, keepdims=True)
+        spectra = zoom_fft(rows * window, ends, len(power), fs=samples.rate, endpoint=True)
+        size = max(np.sum(rows**2) * np.sum(window**2), 1e-300)
+        power += np.sum(np.abs(spectra) ** 2, axis=0) / size
+    k = np.argmax(power)
+    if not 0 < k < 2 * reach or power[k] < _SHOWN:
+        return nominal
+    return float(ends[0] + step * (k + vertex(power[k - 1 : k + 2])))
+
+
+def without_disturbances(samples: Samples, lines: tuple[Line, ...], period: int | None = None) -> Samples:
+    """The record without the lines and without its mean."""
+    stack = samples.rows - samples.rows.mean(axis=1, keepdims=True)
+    if not lines:
+        return replace(samples, rows=stack)
+    n = samples.length
+    waves = even_design(n, samples.rate, np.array([line.frequency for line in lines]))[:, : 2 * len(lines)]
+    creep = np.polynomial.legendre.legvander(np.linspace(-1, 1, n), _CREEP)
+    columns = (creep[:, :, None] * waves[:, None, :]).reshape(n, -1).T
+    basis, target = (_without_periodic(rows, period) for rows in (columns, stack))
+    gram = basis @ basis.T + _NOTHING * n * np.eye(len(basis))
+    return replace(samples, rows=stack - np.linalg.solve(gram, basis @ target.T).T @ columns)
+
+
+def _without_periodic(rows: FloatArray, period: int | None) -> FloatArray:
+    """What changes (k, n) from period to period."""
+    if period is None:
+        return rows
+    folded = rows.reshape(len(rows), -1, period)
+    return (folded - folded.mean(axis=1, keepdims=True)).reshape(len(rows), -1)
+
+
+def bins_taken(frequencies: FloatArray, lines: tuple[Line, ...], seconds: float, width: float = LEFT_OUT) -> BoolArray:
+    """Bins that a line may have spoiled, (n,)."""
+    disturbed = np.zeros(len(frequencies), dtype=bool)
+    for line in lines:
+        disturbed |= np.abs(frequencies - line.frequency) <= max(width / seconds, line.wander)
+    return disturbed

@@ -13,12 +13,11 @@ from tpjb_ident.arguments import as_campaign
 from tpjb_ident.check.findings import is_shared, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.check.response import check_film, point_runs
 from tpjb_ident.check.rig_fit import rig_fit
-from tpjb_ident.check.run_gain import check_agreement, check_positions, check_shaft_lines
+from tpjb_ident.check.run_gain import check_agreement, check_film, check_positions, check_shaft_lines, point_runs
 from tpjb_ident.check.set_points import check_excitation, check_rotation, check_speed, check_static_loads
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
-from tpjb_ident.conditions import SEVERITIES, Condition
+from tpjb_ident.conditions import SEVERITIES, Conditions
 from tpjb_ident.rounding import listed
 from tpjb_ident.terms.mains import MAINS_ON_LINE
 
@@ -59,11 +58,13 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
     observations, conditions = judged(campaign, observations)
     findings = [f for observation in observations for f in observation.report.findings]
     merged = merge(findings, campaign.path.name, campaign.runs)
-    merged += [_problem(condition, campaign.path.name) for condition in conditions]
+    for condition in conditions:
+        severity: Severity = "error" if condition.severity == "error" else "warning"
+        merged.append(Problem(severity, campaign.path.name, str(condition), condition.detail, condition.meaning))
     return _sorted([*campaign.notes, *merged, *_leftovers(campaign)])
 
 
-def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[list[Observation], tuple[Condition, ...]]:
+def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[list[Observation], Conditions]:
     """Judge runs beside each other; what is found stands in the reports of the copies that are given back.
 
     And what contradicts the description of the rig in all runs: identification finds that by itself.
@@ -96,11 +97,6 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     _check_duplicates(observations)
     fit = rig_fit(campaign, dynamic, static)
     return observations, () if fit is None else fit.conditions()
-
-
-def _problem(condition: Condition, file: str) -> Problem:
-    severity: Severity = "error" if condition.severity == "error" else "warning"
-    return Problem(severity, file, str(condition), condition.detail, condition.meaning)
 
 
 def _spread_doubts(observations: Sequence[Observation]) -> None:

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.observation import NO_NOISE, Observation
-from tpjb_ident.phasors.run_data import QUANTITIES
 from tpjb_ident.phasors.slow_samples import is_spare
 
 #: A running shaft's vibration, run-out and noise together, from low to high, that no probe shows [m].
@@ -59,7 +59,8 @@ def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:
         check_travel(observation, is_sine)
         if is_sine:
             length = [
-                float(np.linalg.norm(observation.line(q))) if observation.shows(q) else np.nan for q in QUANTITIES
+                float(np.linalg.norm(observation.line(q))) if observation.shows(q) else np.nan
+                for q in VECTOR_QUANTITIES
             ]
             film, static = np.linalg.norm(observation.film_force(mass)), np.linalg.norm(observation.mean("force"))
             sizes = Sizes(observation.run, length[0], length[1], float(film), length[2], float(static))

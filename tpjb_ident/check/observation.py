@@ -1,4 +1,9 @@
-"""What one pass over a run's samples leaves for the checks that compare runs, of whatever kind."""
+"""What one pass over a run's samples leaves for the checks that compare runs, of whatever kind.
+
+Of its excitation by the phasors of identification; of a band strong lines.
+"""
+
+from __future__ import annotations
 
 import hashlib
 import math
@@ -10,27 +15,123 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
+from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
-from rigdata.vector import directions, plane_vector
-from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.lines import (
-    RecordLines,
-    band_lines,
-    excitation_line,
-    shaft_force,
-    shaft_line,
-    steady_level,
-)
+from rigdata.vector import directions
+from tpjb_ident.check.findings import Reporter, plane_of
 from tpjb_ident.check.signals import ALWAYS_NEEDED, check_clock, check_signal, needed
-from tpjb_ident.check.wiring import plane_of
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Conditions
 from tpjb_ident.errors import TpjbError
-from tpjb_ident.phasors.bad_samples import white_noise
-from tpjb_ident.phasors.reading_cache import with_kept_beginning
-from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.line_fit import LineFitter, white_noise, window_median
+from tpjb_ident.phasors.lines import RecordTooShortError
+from tpjb_ident.phasors.run_data import Directed, RunPhasors, by_channel, with_kept_beginning
 from tpjb_ident.phasors.run_phasors import run_phasors
-from tpjb_ident.phasors.windows import RecordTooShortError
+
+#: Lines of a band that are looked at, the strongest of as many parts of it.
+_BAND_LINES = 8
+#: Bins to either side of a disturbing line that are left alone.
+_CLEAR_OF = 5
+#: Noise is looked at from this many times the band's top on.
+_ABOVE = 1.3
+#: A part of the 1X force counts from this many standard errors of its windows.
+_CLEAR = 8.0
+
+
+@dataclass(frozen=True)
+class RecordLines:
+    """What a run's m channels show; NaN where they do not."""
+
+    mean: FloatArray  #: (m,)
+    floor: FloatArray  #: (m,): amplitude that noise alone makes of a line
+    scatter: FloatArray  #: (m,): standard deviation of what is left
+    omega: FloatArray = field(default_factory=lambda: np.empty(0))  #: (k,), rad/s: lines of the excitation
+    rows: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex))  #: (k, m): phasors there
+
+    @staticmethod
+    def none(channels: int) -> RecordLines:
+        """Of channels that show nothing."""
+        return RecordLines(*np.full((3, channels), np.nan))
+
+    @property
+    def phasor(self) -> ComplexArray:
+        """The first line, (m,)."""
+        return self.rows[0] if len(self.rows) else np.full(len(self.mean), np.nan + 0j)
+
+
+def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel]) -> RecordLines:
+    """One excitation line as identification has it."""
+    values = phasors.mean, np.abs(phasors.residual[line]), phasors.scale
+    mean, floor, scatter = (by_channel(window_median(rows), phasors.channels, channels) for rows in values)
+    row = by_channel(phasors.record[line], phasors.channels, channels)
+    omega = 2 * np.pi * phasors.lines.excitation[line].frequency
+    return RecordLines(mean, floor, scatter, np.array([omega]), row[None])
+
+
+def shaft_line(phasors: RunPhasors, channels: Sequence[Channel]) -> FloatArray:
+    """Size of what turns with the shaft in every channel (m,); NaN where it is not told from the excitation."""
+    place = phasors.lines.place("1X")
+    if place is None:
+        return np.full(len(channels), np.nan)
+    return by_channel(window_median(np.abs(phasors.z[:, place])), phasors.channels, channels)
+
+
+def shaft_force(phasors: RunPhasors) -> float:
+    """Logarithm of the 1X force's counter-clockwise part over its clockwise one; NaN where neither is clear.
+
+    What is out of balance turns with the shaft, and so does the force that the film passes on. The cells are asked,
+    not the probes: run-out, which differs from probe to probe, can turn an orbit of a micrometre round.
+    """
+    place = phasors.lines.place("1X")
+    if place is None:
+        return math.nan
+    force = phasors.plane("force", phasors.z[:, place])
+    force = force[np.isfinite(force).all(axis=1)]
+    if len(force) < 2:
+        return math.nan
+    parts = np.abs(force[:, :1] + np.array([1j, -1j]) * force[:, 1:])
+    forward, backward = parts.mean(axis=0)
+    if not max(forward, backward) > _CLEAR * parts.std(axis=0).max() / math.sqrt(len(force)):
+        return math.nan
+    return math.log(forward / max(backward, 1e-3 * forward))
+
+
+def steady_level(values: FloatArray, rate: float, frequencies: Sequence[float]) -> RecordLines:
+    """Mean and scatter of a run without an excitation line, others taken off; `values` (n, m)."""
+    positive = np.array([f for f in frequencies if f > 0])
+    fit = LineFitter(len(values), rate, positive).fit(np.ascontiguousarray(values.T)[:, None], np.zeros(1))
+    return RecordLines(fit.mean[0], np.full(values.shape[1], np.nan), fit.scale[0])
+
+
+def band_lines(run: Run, level: RecordLines, values: FloatArray, force: Sequence[int]) -> RecordLines:
+    """The level of a run with strong lines of its excitation over a band, and what noise makes of a line.
+
+    What channels owe one another (two planes of probes, cells and accelerometers) holds at every line, so a few that
+    stand clear of the noise, away from shaft and mains, serve the checks as the one line of a sine does.
+
+    `values` (n, m), `force`: places of the cells.
+    """
+    finite = np.isfinite(values)
+    if run.band is None or not len(force) or not finite.any(axis=0).all():
+        return level
+    window = np.hanning(len(values))
+    centred = np.where(finite, values - np.nanmedian(values, axis=0), 0.0)
+    spectrum = np.fft.rfft(centred * window[:, None], axis=0) * (2 / window.sum())
+    frequency = np.fft.rfftfreq(len(values), 1 / run.sample_rate)
+    free = np.ones(len(frequency), dtype=bool)
+    for line in filter(None, (run.point.shaft_speed_hz, *MAINS_FREQUENCIES)):
+        nearest = line * np.maximum(np.round(frequency / line), 1)
+        free &= np.abs(frequency - nearest) > _CLEAR_OF * frequency[1]
+    inside = np.flatnonzero(free & (frequency >= run.band[0]) & (frequency <= run.band[1]))
+    above = free & (frequency > _ABOVE * run.band[1]) & (frequency < 0.45 * run.sample_rate)
+    if len(inside) < _BAND_LINES or above.sum() < _BAND_LINES:
+        return level
+    power = np.sum(np.abs(spectrum[:, force]) ** 2, axis=1)
+    chosen = [part[np.argmax(power[part])] for part in np.array_split(inside, _BAND_LINES)]
+    floor = np.median(np.abs(spectrum[above]), axis=0)
+    omega = np.asarray(2 * np.pi * frequency[chosen], dtype=float)
+    return RecordLines(level.mean, floor, level.scatter, omega, spectrum[chosen])
+
 
 #: Samples read at a time; signs and lines are judged on the first block [samples].
 _BLOCK = 2**19
@@ -46,28 +147,24 @@ _NO_INERTIA = 1e-3
 _ON_CELLS = 0.1
 
 
-@dataclass(frozen=True)
-class Observation:
+@dataclass(frozen=True, repr=False)
+class Observation(Directed):
     """One run, seen once: m vector channels that show something, none where it cannot be read."""
 
     run: Run
-    report: Reporter = field(repr=False)
+    report: Reporter
     channels: tuple[Channel, ...] = ()
-    lines: RecordLines = field(default_factory=lambda: RecordLines.none(0), repr=False)
+    lines: RecordLines = field(default_factory=lambda: RecordLines.none(0))
     #: (3, m): 2 %, 50 % and 98 % quantiles of `channels`, SI
-    spread: FloatArray = field(default_factory=lambda: np.empty((3, 0)), repr=False)
+    spread: FloatArray = field(default_factory=lambda: np.empty((3, 0)))
     #: (n, m): thinned to a few thousand, SI; kept of clearance runs only
-    samples: FloatArray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
+    samples: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     digest: str = ""
     speed: float = math.nan
     #: (m,): size of what turns with the shaft, SI; empty where nothing tells it
-    shaft_line: FloatArray = field(default_factory=lambda: np.empty(0), repr=False)
-    shaft_force: float = math.nan  #: of the 1X force, see `tpjb_ident.check.lines`
-    conditions: tuple[Condition, ...] = ()  #: of its phasors
-
-    def pick(self, quantity: str) -> list[int]:
-        """Places of the channels of `quantity` in `channels`."""
-        return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
+    shaft_line: FloatArray = field(default_factory=lambda: np.empty(0))
+    shaft_force: float = math.nan  #: of the 1X force, see `tpjb_ident.check.observation`
+    conditions: Conditions = ()  #: of its phasors
 
     def of(self, quantity: str) -> list[Channel]:
         """Channels of `quantity`."""
@@ -79,19 +176,15 @@ class Observation:
 
     def mean(self, quantity: str) -> FloatArray:
         """X, Y of a quantity's mean (2,); NaN where its channels do not tell it."""
-        return self._vector(quantity, np.asarray(self.lines.mean, complex)).real
+        return self.plane(quantity, self.lines.mean).real
 
     def line(self, quantity: str) -> ComplexArray:
         """X, Y of a quantity at the excitation line (2,); NaN where its channels do not tell it."""
-        return self._vector(quantity, self.lines.phasor)
-
-    def _vector(self, quantity: str, values: ComplexArray) -> ComplexArray:
-        along = directions([channel.axis or 0.0 for channel in self.of(quantity)])
-        return plane_vector(along, values[self.pick(quantity)])
+        return self.plane(quantity, self.lines.phasor)
 
     def film_force(self, mass: float) -> ComplexArray:
         """Force phasor of the film on the housing, F_cell + m_h a_h (2,) [N]; of the cells alone where a is unknown."""
-        return np.asarray(self.line("force") + np.nan_to_num(mass * self.line("acceleration")))
+        return self.line("force") + np.nan_to_num(mass * self.line("acceleration"))
 
     def shows(self, quantity: str) -> bool:
         """Whether a channel of a quantity shows the excitation line above its noise."""
@@ -204,9 +297,9 @@ def _at_rest(phasors: RunPhasors, mass: float) -> frozenset[str]:
     force = line[:, cells] @ plane_of([phasors.channels[k] for k in cells]).T
     along = directions([phasors.channels[k].axis or 0.0 for k in accelerometers])
     push = np.median(np.abs(force @ along.T), axis=0)
-    missed = _NO_INERTIA * float(np.median(np.linalg.norm(force, axis=1)))
+    missed = _NO_INERTIA * np.median(np.linalg.norm(force, axis=1))
     size = mass * np.median(np.abs(line[:, accelerometers]), axis=0)
-    inertia = float(np.max(size / np.maximum(push, max(missed, 1e-300))))
+    inertia = np.max(size / np.maximum(push, max(missed, 1e-300)))
     # a housing that hangs free moves without a push
     still = (0.0 < inertia < _ON_CELLS) & (inertia * push < missed)
     return frozenset(phasors.channels[k].name for k, rests in zip(accelerometers, still) if rests)
@@ -224,7 +317,7 @@ def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: R
         scatter = float(lines.scatter[index])
         noise = scatter if run.kind in {"dynamic", "locus"} and np.isfinite(lines.mean).any() else white_noise(column)
         steps = np.diff(np.unique(column[:4000]))
-        if not noise <= max(0.7 * float(np.min(steps, initial=np.inf)), 1e-7 * float(np.ptp(column))):
+        if not noise <= max(0.7 * np.min(steps, initial=np.inf), 1e-7 * np.ptp(column)):
             return False
     return bool(main) or run.kind != "dynamic"
 

@@ -11,14 +11,24 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
-from tpjb_ident.check.findings import far
+from tpjb_ident.check.findings import explanation, far, repairs
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.wiring import explanation, repairs
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, film_force, stacked, vector
+from tpjb_ident.estimate.arrowhead import free_force
+from tpjb_ident.estimate.equation import (
+    Blocks,
+    Rig,
+    Sensor,
+    alive,
+    axes_of,
+    campaign_rig,
+    film_force,
+    sensors_of,
+    stacked,
+    vector,
+)
 from tpjb_ident.estimate.scatter import Scatter
-from tpjb_ident.estimate.sensors import alive, axes_of, campaign_rig, sensors_of
-from tpjb_ident.estimate.shape import free_force
 from tpjb_ident.estimate.solve import Solution, Solver
+from tpjb_ident.phasors.run_data import by_channel
 from tpjb_ident.terms.axis import Axis
 from tpjb_ident.terms.corner import Corner
 from tpjb_ident.terms.delay import Delay
@@ -68,12 +78,11 @@ def _blocks(sensors: Sequence[Sensor], runs: Sequence[Observation]) -> Blocks:
     rows: list[dict[str, object]] = []
     points, names = [], []
     for observation in runs:
-        channels = {channel.name: k for k, channel in enumerate(observation.channels)}
-        places = np.array([channels.get(sensor.name, -1) for sensor in sensors])
-        floor = np.append(observation.lines.floor, np.nan)[places]
-        along = axes_of([observation.channels[k] if k >= 0 else None for k in places])
-        for omega, line in zip(observation.lines.omega, observation.lines.rows):
-            z = np.append(line, np.nan)[places]
+        channels = {channel.name: channel for channel in observation.channels}
+        along = axes_of([channels.get(sensor.name) for sensor in sensors])
+        floor = by_channel(observation.lines.floor, observation.channels, sensors)
+        phasors = by_channel(observation.lines.rows, observation.channels, sensors)
+        for omega, z in zip(observation.lines.omega, phasors):
             present = np.isfinite(z) & np.isfinite(floor)
             row = {"point": len(rows), "run": len(rows), "omega": omega, "present": present, "along": along}
             noise = np.diag(np.nan_to_num(floor) ** 2)
@@ -112,4 +121,4 @@ def _report(observation: Observation, shown: ComplexArray, expected: ComplexArra
 def _off(shown: ComplexArray, expected: ComplexArray) -> FloatArray:
     """Distance of vectors (.., 2) from what is expected, as a share of that."""
     distance = np.linalg.norm(shown - expected, axis=-1)
-    return np.asarray(distance / np.maximum(np.linalg.norm(expected, axis=-1), 1e-300))
+    return distance / np.maximum(np.linalg.norm(expected, axis=-1), 1e-300)

@@ -7,9 +7,8 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import ROTATIONS, OperatingPoint
-from tpjb_ident.check.findings import far
+from tpjb_ident.check.findings import explanation, far, pointing, repairs
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.wiring import explanation, pointing, repairs
 from tpjb_ident.phasors.run_data import complex_median
 
 #: Condition of phasors that names the lines beside the stated ones.
@@ -65,7 +64,7 @@ def without_static_part(ratios: ComplexArray) -> bool:
     if not len(ratios):
         return False
     mean = abs(complex(ratios.mean()))
-    error = float(np.sqrt(np.mean(np.abs(ratios - ratios.mean()) ** 2) / max(len(ratios) - 1, 1)))
+    error = np.sqrt(np.mean(np.abs(ratios - ratios.mean()) ** 2) / max(len(ratios) - 1, 1))
     return bool(mean < _NO_STATIC[0] or (mean < _NO_STATIC[1] and mean < 4 * error))
 
 
@@ -124,7 +123,7 @@ def check_excitation(runs: Sequence[Observation], mass: float) -> None:
     directed = []
     for run, strength in measured:
         present = strengths[run.run.point]
-        least = 0.1 * float(np.median(present)) if len(present) > 3 else 0.0
+        least = 0.1 * np.median(present) if len(present) > 3 else 0.0
         if strength < least or not run.shows("force"):
             others = "".join(f"; there are {c.detail}" for c in run.conditions if c == _UNEXPECTED)
             run.report.ask("no excitation", stated=run.run.point.excitation_hz, others=others)

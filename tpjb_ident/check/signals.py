@@ -91,13 +91,13 @@ def check_clock(report: Reporter, time: FloatArray) -> None:
     steps = np.diff(time) * rate
     gaps = np.flatnonzero(steps > 1.9)  # a late sample of a jittering clock is no gap: there the next step is short
     if len(gaps):
-        longest, lost = int(gaps[np.argmax(steps[gaps])]), float(np.sum(steps[gaps] - 1))
+        longest, lost = int(gaps[np.argmax(steps[gaps])]), np.sum(steps[gaps] - 1)
         words = {"gaps": len(gaps), "longest": steps[longest] / rate, "sample": longest}
         report.ask("gap", lost / len(steps), lost=lost, **words)
     usual = steps[steps < 1.5]
     if len(usual) < len(steps) / 2:
         return
     scatter, resolution = float(np.std(usual)), float(np.min(steps[steps > 0], initial=1.0))
-    is_rounded = resolution > 0.3 and float(np.max(np.abs(usual - 1))) <= resolution
+    is_rounded = resolution > 0.3 and np.max(np.abs(usual - 1)) <= resolution
     cause = "the time column is rounded" if is_rounded else "the clock jitters"
     report.ask("jitter", min(scatter, 0.2) if is_rounded else scatter, cause=cause, scatter=scatter)

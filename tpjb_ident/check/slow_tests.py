@@ -9,9 +9,8 @@ import numpy as np
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.vector import directions
-from tpjb_ident.check.findings import far
+from tpjb_ident.check.findings import explanation, far, indefiniteness, plane_of, pointing, repairs
 from tpjb_ident.check.observation import NO_NOISE, Observation
-from tpjb_ident.check.wiring import explanation, indefiniteness, plane_of, pointing, repairs
 from tpjb_ident.clearance.sweep import sweep_samples
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.slow_samples import live_run
@@ -117,7 +116,7 @@ def _check_sweep(observation: Observation) -> None:
     answer = np.array([1.0, 1.0j]) @ np.linalg.lstsq(design, readings, rcond=None)[0][:2]
     axes = np.array([channel.axis or 0.0 for channel in observation.of("displacement")])
     turns = np.degrees(np.angle(answer * np.exp(-1j * axes)))
-    common, names = float(np.median(turns)), observation.names("displacement")
+    common, names = np.median(turns), observation.names("displacement")
     if abs(common) > _TURNED:
         observation.report.ask("turned", abs(common), *names, angle=common)
         return
@@ -129,7 +128,7 @@ def _gain(force: FloatArray, shaft: FloatArray) -> FloatArray | None:
     """Displacement by force (2, 2) [m/N] of some points (n, 2); None where the load does not go around."""
     about = force - force.mean(axis=0)
     solution, _, _, sizes = np.linalg.lstsq(about, shaft - shaft.mean(axis=0), rcond=None)
-    return None if sizes[-1] < _GOES_AROUND * sizes[0] else np.asarray(solution.T)
+    return None if sizes[-1] < _GOES_AROUND * sizes[0] else solution.T
 
 
 def _is_pushed(observation: Observation, gain: FloatArray) -> bool:
@@ -159,7 +158,7 @@ def check_locus(runs: Sequence[Observation]) -> None:
         for run in group:
             _is_pushed(run, gain)
         off = places - loads @ gain.T
-        size = float(np.median(np.linalg.norm(places - places.mean(axis=0), axis=1)))
+        size = np.median(np.linalg.norm(places - places.mean(axis=0), axis=1))
         distances = np.linalg.norm(off - off.mean(axis=0), axis=1)
         for k in np.flatnonzero(far(distances, _ASIDE * size, _MANY, count=6)):
             group[k].report.ask("place", off=1e6 * distances[k])

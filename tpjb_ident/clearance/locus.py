@@ -19,9 +19,9 @@ from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, holding, sentences
 from tpjb_ident.estimate.statistics import student_widening
+from tpjb_ident.phasors.lines import line_design
 from tpjb_ident.phasors.slow_noise import DRIFT_RATE, NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples
-from tpjb_ident.phasors.windows import line_design
 from tpjb_ident.pivot.blocks import time_bins
 from tpjb_ident.pivot.dry_record import refusal
 from tpjb_ident.pivot.refusals import usable_runs

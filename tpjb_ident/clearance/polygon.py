@@ -35,7 +35,7 @@ from rigdata.vector import directions
 from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
-from tpjb_ident.phasors.bad_samples import robust_deviation
+from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.pivot.curve import PivotCurve
 

@@ -15,15 +15,8 @@ from scipy.ndimage import uniform_filter1d
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.campaign import Run
 from rigdata.vector import directions, wrapped
-from tpjb_ident.phasors.bad_samples import robust_deviation, white_noise
-from tpjb_ident.phasors.slow_samples import (
-    REMEDY,
-    contradictions,
-    level_error,
-    piece_means,
-    slow_samples,
-    spare_slopes,
-)
+from tpjb_ident.phasors.line_fit import robust_deviation, white_noise
+from tpjb_ident.phasors.slow_samples import REMEDY, contradictions, level_error, piece_means, slow_samples, spare_slopes
 from tpjb_ident.pivot.dry_record import pad_axes, refusal
 
 _BLOCK = 0.1  # [s]; five mains periods

@@ -59,7 +59,7 @@ def identified(c: Command, campaign: Campaign) -> Identification:
 
 def write_identification(c: Command, result: Identification) -> None:
     """Write coefficients, estimators, windows and the models over frequency; h over the band where one was excited."""
-    from tpjb_ident.results.band_result import frf_frame, models_frame
+    from tpjb_ident.results.identification import frf_frame, models_frame
 
     if result.bands:
         c.table("frf", frf_frame(result.bands))

@@ -14,15 +14,22 @@ is kept as its two factors.
 A parameter of which the records tell little (posterior deviation above 0.8 of the prior's) is considered, not
 estimated: its value stays, its prior passes into the covariance. Estimated, it would be moved by what the model of the
 others leaves out.
+
+A point's numbers may hang on those of its group. K-C, h = K + i omega C, and K-C-M, h = K - omega^2 M + i omega C,
+hold for all lines of a load together; a part of a band shares one departure from such a model. Sines, lines of a
+multi-sine and of a transform take part alike.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.estimate.scatter import Scatter
+from tpjb_ident.estimate.term import Fitted
 
 #: Posterior over prior deviation above which a parameter is considered.
 CONSIDERED = 0.8
@@ -46,7 +53,7 @@ class Prior:
     def estimated(self, posterior: FloatArray) -> BoolArray:
         """Which are estimated, by their posterior variance if all were."""
         is_learnt = np.sqrt(np.abs(posterior) * self.precision) < CONSIDERED
-        return np.asarray((is_learnt | self.always) & ~self.never)
+        return (is_learnt | self.always) & ~self.never
 
 
 @dataclass
@@ -91,33 +98,33 @@ def are_told(A: FloatArray) -> BoolArray:
     """Whether the equations of points (P, 8, 8) determine their numbers, (P,)."""
     size = np.sqrt(np.maximum(np.einsum("paa->pa", A), 1e-300))
     scaled = A / (size[:, :, None] * size[:, None, :])
-    return np.asarray(np.linalg.eigvalsh(scaled)[:, 0] > _TOLD)
+    return np.linalg.eigvalsh(scaled)[:, 0] > _TOLD
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Own:
     """Parameters of every point alone, and what one standard deviation of their priors does."""
 
     change: FloatArray  #: (P, L): of their values in the step
     deviation: FloatArray  #: (P, L): posterior
     estimated: BoolArray  #: (P, L)
-    direct: FloatArray = field(repr=False)  #: (P, k, L): to the point's numbers of H
-    shared: FloatArray = field(repr=False)  #: (P, q, L): to the shared parameters, and through them to all points
+    direct: FloatArray  #: (P, k, L): to the point's numbers of H
+    shared: FloatArray  #: (P, q, L): to the shared parameters, and through them to all points
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Step:
     """One step of the solve, and the covariances that go with it; k numbers of H a point."""
 
     h: FloatArray  #: (P, k)
     theta: FloatArray  #: (q,)
     by_point: Own
-    records: FloatArray = field(repr=False)  #: (P, k, k): that the records leave, the learning of parameters included
-    K: FloatArray = field(repr=False)  #: (P, k, q)
-    S: FloatArray = field(repr=False)  #: (q, q)
-    S_inverse: FloatArray = field(repr=False)  #: (q, q): zero in rows and columns of considered parameters
-    estimated: BoolArray = field(repr=False)  #: (q,)
-    precision: FloatArray = field(repr=False)  #: (q,): Lambda
+    records: FloatArray  #: (P, k, k): that the records leave, the learning of parameters included
+    K: FloatArray  #: (P, k, q)
+    S: FloatArray  #: (q, q)
+    S_inverse: FloatArray  #: (q, q): zero in rows and columns of considered parameters
+    estimated: BoolArray  #: (q,)
+    precision: FloatArray  #: (q,): Lambda
 
     def factors(self) -> FloatArray:
         """One standard deviation of every shared parameter's prior, as it moves all points together, (q, P, k)."""
@@ -190,7 +197,7 @@ def step(sums: Sums, shared: Prior, by_point: Prior) -> Step:
 def _by_prior(is_learnt: BoolArray, learnt: FloatArray, passed: FloatArray, root: FloatArray) -> FloatArray:
     """Changes (P, .., L) by one standard deviation of estimated and considered priors; `root` (P, L) of precision."""
     scale = root[:, None, :]
-    return np.asarray(np.where(is_learnt[:, None, :], learnt * scale, passed / scale))
+    return np.where(is_learnt[:, None, :], learnt * scale, passed / scale)
 
 
 def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -201,10 +208,10 @@ def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray
     n = A.shape[1]
     white = np.linalg.solve(_root(A), np.concatenate([E, np.broadcast_to(np.eye(n), A.shape)], axis=2))
     E_white, back = np.split(white, [E.shape[2]], axis=2)
-    A_inverse = np.asarray(back.transpose(0, 2, 1) @ back, dtype=float)
+    A_inverse = back.transpose(0, 2, 1) @ back
     flat = E_white.reshape(len(A) * n, E.shape[2])
-    K = np.asarray(-back.transpose(0, 2, 1) @ E_white, dtype=float)
-    return A_inverse, K, np.asarray(G - flat.T @ flat, dtype=float)
+    K = -back.transpose(0, 2, 1) @ E_white
+    return A_inverse, K, G - flat.T @ flat
 
 
 def _root(A: FloatArray) -> FloatArray:
@@ -213,7 +220,7 @@ def _root(A: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.cholesky(A), dtype=float)
     except np.linalg.LinAlgError:
         ridge = _TOLD * np.einsum("paa->pa", A)[:, :, None] * np.eye(A.shape[1])
-        return np.asarray(np.linalg.cholesky(A + ridge), dtype=float)
+        return np.linalg.cholesky(A + ridge)
 
 
 def _records(
@@ -233,3 +240,90 @@ def _records(
 def _variances(A_inverse: FloatArray, K: FloatArray, S_inverse: FloatArray) -> FloatArray:
     """Variances of the points' numbers, (P, n)."""
     return np.einsum("paa->pa", A_inverse) + np.einsum("pak,pak->pa", K @ S_inverse, K)
+
+
+#: Matrices of a model over frequency, four numbers each.
+MODELS = {"K-C": 2, "K-C-M": 3}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """H = start + columns x for P points in G groups, x the k numbers of a group."""
+
+    group: IntArray  #: (P,): group of every point
+    columns: FloatArray | None = None  #: (P, 8, k); None: x is h itself
+    count: int = 0  #: groups at least: the last may have no point
+    scatter: Scatter | None = None  #: to begin with; None: none, and blocks are judged
+    held: Mapping[str, Fitted] = field(default_factory=dict)  #: terms by name, as another solve left them
+
+    @property
+    def groups(self) -> int:
+        """Number of groups."""
+        return max(self.count, int(self.group.max(initial=-1)) + 1)
+
+    @property
+    def numbers(self) -> int:
+        """Unknowns of a group."""
+        return NUMBERS if self.columns is None else self.columns.shape[2]
+
+    def mapped(self, J_h: FloatArray, point: IntArray) -> FloatArray:
+        """Columns of the group's numbers (n, rows, k) from those of h (n, rows, 8); `point` (n,)."""
+        return J_h if self.columns is None else J_h @ self.columns[point]
+
+    def change(self, x: FloatArray) -> ComplexArray:
+        """Change of h (P, 2, 2) by the groups' numbers (G, k)."""
+        parts = x[self.group]
+        numbers = parts if self.columns is None else np.einsum("pak,pk->pa", self.columns, parts)
+        return complex_matrix(numbers)
+
+
+def complex_matrix(numbers: FloatArray) -> ComplexArray:
+    """H (.., 2, 2) of its eight numbers (.., 8)."""
+    h = numbers[..., :4] + 1j * numbers[..., 4:]
+    return np.asarray(h.reshape(*numbers.shape[:-1], 2, 2), complex)
+
+
+def real_numbers(h: ComplexArray) -> FloatArray:
+    """The eight numbers (.., 8) of H (.., 2, 2)."""
+    flat = h.reshape(*h.shape[:-2], 4)
+    return np.concatenate([flat.real, flat.imag], axis=-1)
+
+
+def power_columns(w: FloatArray, count: int) -> FloatArray:
+    """Change of the eight numbers of h = K + i w C + (i w)^2 M + .. by the entries of each matrix, (n, 8, 4 count)."""
+    powers = (1j * w)[:, None] ** np.arange(count)
+    parts = np.stack([powers.real, powers.imag], axis=1)
+    return np.einsum("npk,ab->npakb", parts, np.eye(4)).reshape(len(w), NUMBERS, 4 * count)
+
+
+def remainder(columns: FloatArray, values: FloatArray, root: FloatArray, used: BoolArray | slice) -> FloatArray:
+    """What a model, fitted to some of n points, leaves of c sets of numbers of all of them, (n, 8, c).
+
+    `columns` (n, 8, k), `values` (n, 8, c), both weighed by `root` (n, 8, 8), `used` (n,).
+    """
+    design, rows = root @ columns, root @ values
+    return rows - design @ least_squares(design[used], rows[used])
+
+
+def least_squares(columns: FloatArray, rows: FloatArray) -> FloatArray:
+    """Numbers (k, ..) by which columns (n, 8, k) come nearest to rows (n, 8, ..)."""
+    k, several = columns.shape[2], rows.shape[2:]
+    return np.asarray(np.linalg.lstsq(columns.reshape(-1, k), rows.reshape(-1, *several), rcond=None)[0])
+
+
+def free_force(D: ComplexArray, F: ComplexArray) -> tuple[Shape, ComplexArray]:
+    """A force (4 numbers) of the film for every point by itself, and H to start from: the rig is told of no film.
+
+    `D`, `F` (P, 2): what the points' only runs show [m], [N]; NaN where they show nothing.
+    """
+    usable = np.isfinite(np.concatenate([D, F], axis=1)).all(axis=1)
+    shown = np.where(usable[:, None], D, 1.0)
+    size = np.maximum(np.linalg.norm(shown, axis=1), 1e-300)[:, None]
+    across = shown.conj() / size
+    start = np.where(usable[:, None, None], F[:, :, None] * (across / size)[:, None, :], np.nan)
+    columns = np.zeros((len(D), NUMBERS, 4))
+    for k in range(NUMBERS // 2):
+        i, part = k // 2, across[:, k % 2]
+        columns[:, k, i], columns[:, k, 2 + i] = part.real, -part.imag
+        columns[:, 4 + k, i], columns[:, 4 + k, 2 + i] = part.imag, part.real
+    return Shape(np.arange(len(D)), columns), start

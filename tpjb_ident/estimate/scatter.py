@@ -2,8 +2,17 @@
 
 Blocks carry a bisquare weight on the campaign's scale, in points where enough good runs remain: one bad run of five is
 found because the other points say what is usual. The scatter of the force from run to run has four components
-(`force_scatter`), found by moments and pooled over all points, taken as alike as far as the runs do not tell them
+found by moments and pooled over all points, taken as alike as far as the runs do not tell them
 apart; a point whose runs differ clearly more than the others' has scatter of its own.
+
+A bearing that is stiffer in one run than in another shows a force in phase with the motion and along the spring force,
+one with more damping a force a quarter of a turn ahead along the damping force. A load that is turned shows across
+them, in proportion to the motion, however soft the bearing is along it. As one scatter, what is right on average would
+be too little for stiffness and too much for damping.
+
+The covariance N of a block is circular: it holds the mean of the four. What they differ from it by is real, and is made
+up for in the block's real rows: with the patterns p of the components, their covariance is I + sum (s^2 - mean) p p^T,
+and its inverse root brings them back to unit variance.
 """
 
 from __future__ import annotations
@@ -13,9 +22,79 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtr, fdtrc, fdtri
 
-from rigdata.arrays import BoolArray, FloatArray, IntArray
-from tpjb_ident.estimate.blocks import totals
-from tpjb_ident.estimate.force_scatter import COMPONENTS
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.estimate.equation import totals
+
+#: In phase with the motion along the spring force and across it, ahead of it along the damping force and across it.
+COMPONENTS = 4
+#: Which components move stiffness and mass of a point, and which its damping.
+PHASES = slice(0, 2), slice(2, 4)
+#: Which act across the spring force, or the damping force.
+ACROSS = slice(1, 4, 2)
+#: A scatter across the force is at most so many times its size: where stiffness and mass cancel there is none along.
+_LARGEST = 10.0
+#: A component has at least this share of the mean scatter: keeps rows of computed records solvable.
+_LEAST = 0.02
+
+
+@dataclass(frozen=True)
+class AlongForce:
+    """What the force equations of blocks say of every component."""
+
+    chi_square: FloatArray  #: (n, 4)
+    information: FloatArray  #: (n, 4): what a scatter of variance one adds to it
+    J_h: FloatArray  #: (n, 4, numbers): their rows
+
+
+@dataclass(frozen=True)
+class ForceScatter:
+    """Directions of the components in the real rows of blocks, n of them with k rows."""
+
+    basis: FloatArray  #: (n, k, 4): orthonormal
+    patterns: FloatArray  #: (n, 4, 4): of the components, of relative size one, in the basis
+    root: FloatArray  #: (n, 4, 4): inverse root of the rows' covariance in the basis
+    size: FloatArray  #: (n, 4): of a scatter of one, over the film's force
+
+    @staticmethod
+    def of(patterns: ComplexArray, motion: ComplexArray, h: ComplexArray, variance: FloatArray) -> ForceScatter:
+        """Components of complex patterns (n, k / 2, 2) of the size of the film's force along X and Y.
+
+        `motion` (n, 2) [m], `h` (n, 2, 2) [N/m], `variance` (n, 4).
+        """
+        force = np.einsum("nij,nj->ni", h, motion)
+        usual = np.linalg.norm(h, axis=(1, 2)) * np.linalg.norm(motion, axis=1) / np.sqrt(2)
+        size = np.ones((len(force), COMPONENTS))
+        ratio = usual / np.maximum(np.linalg.norm(force, axis=1), 1e-300)
+        size[:, ACROSS] = np.minimum(ratio, _LARGEST)[:, None]
+        phase = np.exp(0.5j * np.angle(np.sum(motion**2, axis=1)))[:, None]
+        spring, damper = (_directions(part) for part in ((force / phase).real, (force / phase).imag))
+        columns = patterns @ np.concatenate([spring, 1j * damper], axis=2) * phase[:, None]
+        basis, triangle = np.linalg.qr(np.concatenate([columns.real, columns.imag], axis=1))
+        mean = variance.mean(axis=1, keepdims=True)
+        excess = np.maximum(variance * size**2, _LEAST * mean) - mean
+        covariance = np.eye(COMPONENTS) + (triangle * excess[:, None, :]) @ triangle.transpose(0, 2, 1)
+        root = np.linalg.inv(np.linalg.cholesky(covariance))
+        return ForceScatter(basis, np.asarray(triangle, dtype=float), root, size)
+
+    def white(self, rows: FloatArray) -> FloatArray:
+        """Rows (n, k, ..) brought to unit variance."""
+        move = (self.root - np.eye(COMPONENTS)) @ (self.basis.transpose(0, 2, 1) @ rows)
+        return rows + self.basis @ move
+
+    def along(self, r: FloatArray, J_h: FloatArray) -> AlongForce:
+        """What white rows r (n, k) and their columns J_h (n, k, numbers) have along the components."""
+        white = self.root @ self.patterns
+        length = np.maximum(np.linalg.norm(white, axis=1), 1e-300)
+        rows = (white / length[:, None]).transpose(0, 2, 1) @ self.basis.transpose(0, 2, 1)
+        return AlongForce((rows @ r[:, :, None])[:, :, 0] ** 2, (self.size * length) ** 2, rows @ J_h)
+
+
+def _directions(vectors: FloatArray) -> FloatArray:
+    """Unit vectors along and across vectors (n, 2) as columns, (n, 2, 2)."""
+    size = np.linalg.norm(vectors, axis=1)
+    unit = np.where(size[:, None] > 0, vectors / np.maximum(size, 1e-300)[:, None], [1.0, 0.0])
+    return np.stack([unit, np.stack([-unit[:, 1], unit[:, 0]], axis=1)], axis=2)
+
 
 #: Real force equations of a block.
 FORCE_ROWS = 4.0
@@ -80,7 +159,7 @@ class Scatter:
         """Degrees of freedom of the mean of some components of a point, Welch and Satterthwaite."""
         if self.separate[point]:
             return max(float(self.separate_spare[point]), 1.0)
-        share = self.variance[point, components] / max(float(self.variance[point, components].sum()), 1e-300)
+        share = self.variance[point, components] / max(self.variance[point, components].sum(), 1e-300)
         degrees = np.maximum(np.minimum(self.spare[components] + _ALIKE, self.spare.sum()), 1.0)
         return float(1 / max(float(np.sum(share**2 / degrees)), 1e-12))
 
@@ -143,21 +222,21 @@ class Scatter:
         moment = np.maximum(0.0, self.pooled + excess / np.maximum(weight, 1e-300))
         moment = _alike(moment, freedom)
         # what a good rig has is added where few runs tell: a mean of both would shrink what they show
-        usual = _USUAL_FREEDOM / (_USUAL_FREEDOM + float(freedom.sum())) * self.usual
+        usual = _USUAL_FREEDOM / (_USUAL_FREEDOM + freedom.sum()) * self.usual
         return moment + usual, freedom
 
     def _weights(self, group: IntArray, fit: Residuals, judged: BoolArray) -> FloatArray:
         freedom = fit.rows * (1 - np.minimum(fit.leverage, _MAX_LEVERAGE))
         distance = fit.chi_square / np.maximum(freedom, 1.0)
-        usual = max(1.0, float(np.median(distance[judged]))) if judged.any() else 1.0
+        usual = max(1.0, np.median(distance[judged])) if judged.any() else 1.0
         points = int(group.max(initial=0)) + 1
         runs = totals(group, np.ones(len(group)), points)
-        freedom_of_others = 2 * float(np.maximum(runs - 2, 0.0).sum())
+        freedom_of_others = 2 * np.maximum(runs - 2, 0.0).sum()
         # few runs know little of what is usual among them: then only the improbable has no weight
         improbable = float(fdtri(FORCE_ROWS, max(freedom_of_others, 1.0), 1 - _IMPROBABLE))
         limit = max(_NO_WEIGHT**2, improbable)
-        weights = np.asarray(np.maximum(1 - distance / usual / limit, 0.0) ** 2, dtype=float)
-        good = totals(group, np.asarray(weights > _GOOD), points)
+        weights = np.maximum(1 - distance / usual / limit, 0.0) ** 2
+        good = totals(group, weights > _GOOD, points)
         few = good < np.maximum(_MIN_GOOD, _SHARE * runs)
         return np.where(few[group], 1.0, weights)
 
@@ -166,7 +245,7 @@ def _alike(moment: FloatArray, freedom: FloatArray) -> FloatArray:
     """Variances of the components (.., 4) of some freedom, drawn towards their mean."""
     weight = freedom + 1e-9
     mean = np.sum(weight * moment, axis=-1, keepdims=True) / np.sum(weight, axis=-1, keepdims=True)
-    return np.asarray((freedom * moment + _ALIKE * mean) / (freedom + _ALIKE))
+    return (freedom * moment + _ALIKE * mean) / (freedom + _ALIKE)
 
 
 def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:
@@ -188,7 +267,7 @@ def _expected(rows: FloatArray) -> FloatArray:
     first = chdtr(k + 2, limit)
     second = (k + 2) * chdtr(k + 4, limit)
     third = (k + 2) * (k + 4) * chdtr(k + 6, limit)
-    return np.asarray(first - 2 * second / limit + third / limit**2)
+    return first - 2 * second / limit + third / limit**2
 
 
 def _unusual(chi: FloatArray, spare: FloatArray, usable: BoolArray, before: BoolArray) -> BoolArray:
@@ -199,11 +278,11 @@ def _unusual(chi: FloatArray, spare: FloatArray, usable: BoolArray, before: Bool
         if usual.sum() < 2:
             break
         ratio = np.where(usual, chi / np.maximum(spare, 1.0), -1.0)
-        worst = int(np.argmax(ratio))
+        worst = np.argmax(ratio)
         remaining = usual.copy()
         remaining[worst] = False
-        all_spare = float(spare[remaining].sum())
-        typical = max(float(chi[remaining].sum()) / max(all_spare, 1.0), _LEAST_CHI)
+        all_spare = spare[remaining].sum()
+        typical = max(chi[remaining].sum() / max(all_spare, 1.0), _LEAST_CHI)
         if float(fdtrc(spare[worst], max(all_spare, 1.0), ratio[worst] / typical)) >= _CHANCE:
             break
         separate[worst] = True

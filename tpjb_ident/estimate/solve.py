@@ -6,31 +6,79 @@ pulling H towards zero: there is no separate step of errors in variables.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.arrowhead import NUMBERS, Step, Sums, are_told, step
-from tpjb_ident.estimate.blocks import Blocks, Rig, totals, vector
+from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.estimate.arrowhead import NUMBERS, Prior, Shape, Step, Sums, are_told, step
 from tpjb_ident.estimate.equation import (
     HOUSING_ROWS,
     UNKNOWNS,
+    Blocks,
+    Rig,
     State,
     film_columns,
     film_force_rows,
     motion_matrix,
+    totals,
+    vector,
     with_factor,
 )
-from tpjb_ident.estimate.force_scatter import PHASES, AlongForce, ForceScatter
-from tpjb_ident.estimate.load_slope import slopes_over_load
-from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns
-from tpjb_ident.estimate.parameters import Table
-from tpjb_ident.estimate.scatter import Residuals, Scatter, mixed_dof
-from tpjb_ident.estimate.shape import Shape
+from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns, slopes_over_load
+from tpjb_ident.estimate.scatter import PHASES, AlongForce, ForceScatter, Residuals, Scatter, mixed_dof
 from tpjb_ident.estimate.term import Additive, FilmTerm, Fitted, Term
+
+#: Standard deviation that a parameter has at least, in its unit.
+_LEAST = 1e-9
+
+
+class Table:
+    """Parameters of some terms; where a row has none of a term, its place stays as it is.
+
+    `row` (P,): row of every point, None where all points share one. What another solve made of terms (`held`, by
+    name) stays as it is, with its error.
+    """
+
+    def __init__(
+        self, terms: Sequence[Term], rows: int, row: IntArray | None = None, held: Mapping[str, Fitted] | None = None
+    ) -> None:
+        self.terms, self._shared = list(terms), row is None
+        ends = np.cumsum([0] + [term.width for term in terms]).tolist()
+        self.mean, deviation = np.zeros((rows, ends[-1])), np.ones((rows, ends[-1]))
+        self.always, self.never = np.zeros((2, rows, ends[-1]), dtype=bool)
+        self._place: dict[str, tuple[IntArray, slice]] = {}
+        for term, first, last in zip(terms, ends, ends[1:]):
+            mine = np.zeros(1, dtype=np.intp) if row is None else row[list(term.points)]
+            assert len(np.unique(mine)) == len(mine), f"{term.name}: points of one group have nothing of their own"
+            place = self._place[term.name] = (mine, slice(first, last))
+            known = (held or {}).get(term.name)
+            mean = [p.mean for p in term.parameters] if known is None else known.value
+            spread = [p.deviation for p in term.parameters] if known is None else known.deviation
+            self.mean[place] = np.reshape(mean, (-1, term.width))
+            deviation[place] = np.maximum(np.reshape(spread, (-1, term.width)), _LEAST)
+            self.always[place] = term.always_estimated and known is None
+            self.never[place] = term.never_estimated or known is not None
+        self.precision = 1 / deviation**2
+        self.value = self.mean.copy()
+
+    def of(self, term: Term, values: FloatArray | BoolArray) -> FloatArray:
+        """A term's part of values (rows, columns), in the order of its parameters."""
+        return np.asarray(values[self._place[term.name]].ravel())
+
+    def chosen(self, term: Term) -> BoolArray:
+        """Places of a term's parameters, (rows, columns)."""
+        mask = np.zeros(self.mean.shape, dtype=bool)
+        mask[self._place[term.name]] = True
+        return mask
+
+    def prior(self) -> Prior:
+        """What is known beforehand, as far as the values are from their means; without rows where all share one."""
+        parts = (self.mean - self.value, self.precision, self.always, self.never)
+        return Prior(*(part[0] for part in parts)) if self._shared else Prior(*parts)
+
 
 #: Steps of Gauss-Newton, at most, and the relative change of H at which it ends.
 _STEPS, _CONVERGED = 18, 1e-9
@@ -46,32 +94,32 @@ _UNTOLD = 1e-14
 _CHUNK = 4096
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Solution:
     """H of every point with its covariance by source; points of a shape are its groups, each with its k numbers."""
 
     h: ComplexArray  #: (P, 2, 2), N/m: at the frequency found; NaN where the runs do not tell it
-    records: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2
-    shares: dict[str, FloatArray] = field(repr=False)  #: (P, 8, 8) by term, (N/m)^2
-    factors: FloatArray = field(repr=False)  #: (q, P, 8), N/m: a standard deviation of every shared parameter
-    fitted: dict[str, Fitted] = field(repr=False)
-    terms: tuple[Term, ...] = field(repr=False)  #: those with parameters
-    all_terms: tuple[Term, ...] = field(repr=False)
-    rig: Rig = field(repr=False)
-    blocks: Blocks = field(repr=False)
-    group: IntArray = field(repr=False)  #: of every point
-    scatter: Scatter = field(repr=False)
+    records: FloatArray  #: (P, 8, 8), (N/m)^2
+    shares: dict[str, FloatArray]  #: (P, 8, 8) by term, (N/m)^2
+    factors: FloatArray  #: (q, P, 8), N/m: a standard deviation of every shared parameter
+    fitted: dict[str, Fitted]
+    terms: tuple[Term, ...]  #: those with parameters
+    all_terms: tuple[Term, ...]
+    rig: Rig
+    blocks: Blocks
+    group: IntArray  #: of every point
+    scatter: Scatter
     chi_square: FloatArray  #: (P,): of the blocks' equations, reduced
     spare: FloatArray  #: (P,): real equations beyond the unknowns
-    scatter_share: FloatArray = field(repr=False)  #: (n, 4): of the components' variance that is the runs' scatter
-    factor: ComplexArray = field(repr=False)  #: (n, m): what multiplies the readings of every block
-    shift: ComplexArray = field(repr=False)  #: (n, m), SI: what is in the readings beside the motion's part
-    run_change: ComplexArray = field(repr=False)  #: (n, 2, 2), N/m: H of a run beside that of its point
+    scatter_share: FloatArray  #: (n, 4): of the components' variance that is the runs' scatter
+    factor: ComplexArray  #: (n, m): what multiplies the readings of every block
+    shift: ComplexArray  #: (n, m), SI: what is in the readings beside the motion's part
+    run_change: ComplexArray  #: (n, 2, 2), N/m: H of a run beside that of its point
     ran_away: bool = False  #: no point has an answer
 
     def blocks_of(self, group: int) -> BoolArray:
         """Blocks of a group, (n,)."""
-        return np.asarray(self.group[self.blocks.point] == group)
+        return self.group[self.blocks.point] == group
 
     def noise_freedom(self, group: int) -> float:
         """Real degrees of freedom of the noise of a group's records."""
@@ -92,7 +140,7 @@ class Solution:
         compliances = (term.standing_on(self.fitted[term.name]) for term in self.terms)
         return next((compliance for compliance in compliances if compliance is not None), None)
 
-    def conditions(self) -> tuple[Condition, ...]:
+    def conditions(self) -> Conditions:
         """What the terms' tests say of the rig: it touches every point."""
         conditions = [condition for term in self.terms for condition in term.conditions(self.fitted[term.name])]
         text = "the runs together give no H, as where they are driven below their noise: it is the windows' alone"
@@ -120,7 +168,7 @@ class Solver:
         self.by_point = Table([term for term in self.terms if term.points], self.shape.groups, self.shape.group)
         runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
         enough = 4 * runs >= min(self.shape.numbers, NUMBERS)  # a run has four equations of the film
-        self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)) & enough)
+        self.solvable = np.isfinite(start).all(axis=(1, 2)) & enough
         self.answered = totals(self.shape.group, self.solvable, self.shape.groups) > 0
         self.unit = float(np.median(np.abs(start[self.solvable]))) if self.solvable.any() else 1.0
         self.h = np.where(self.solvable[:, None, None], start, self.unit * np.eye(2))
@@ -237,7 +285,11 @@ class Solver:
         z = np.concatenate([blocks.z, np.zeros((len(blocks), HOUSING_ROWS))], axis=1) - state.shift
         z[:, : blocks.z.shape[1]] *= blocks.present
         white = np.linalg.solve(L, z[:, :, None])
-        state.u = np.asarray(np.linalg.solve(_regular(R[:, :UNKNOWNS]), Q1 @ white)[:, :, 0])
+        # ones on the diagonal where a block's readings tell nothing of an unknown
+        size = np.abs(np.einsum("nii->ni", R[:, :UNKNOWNS]))
+        untold = size <= _UNTOLD * size.max(axis=1, keepdims=True)
+        regular = R[:, :UNKNOWNS] + untold[:, :, None] * np.eye(UNKNOWNS)
+        state.u = np.asarray(np.linalg.solve(regular, Q1 @ white)[:, :, 0])
         film = film_columns(rig, blocks, state) * self.unit
         by_point = [term.columns(blocks, state) for term in self.by_point.terms]
         shared = [term.columns(blocks, state) for term in self.shared.terms]
@@ -355,13 +407,6 @@ class _Rows:
         spent = np.einsum("nca,nca->nc", along.J_h @ conditional, along.J_h)
         chi_square = np.einsum("nk,nk->n", self.r, self.r)
         return Residuals(chi_square, self.counted, leverage, along.chi_square, along.information, spent)
-
-
-def _regular(R: ComplexArray) -> ComplexArray:
-    """R (n, 4, 4) with ones on its diagonal where a block's readings tell nothing of an unknown."""
-    size = np.abs(np.einsum("nii->ni", R))
-    untold = size <= _UNTOLD * size.max(axis=1, keepdims=True)
-    return np.asarray(R + untold[:, :, None] * np.eye(UNKNOWNS), dtype=complex)
 
 
 def _real(rows: ComplexArray) -> FloatArray:

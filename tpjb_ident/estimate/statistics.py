@@ -34,12 +34,12 @@ def half_width(level: float, random: FloatArray, dof: FloatArray, systematic: Fl
 
 def bisquare_weight(u: FloatArray, c: float) -> FloatArray:
     """Tukey's weight psi(u) / u; `u` (n,)."""
-    return np.asarray(np.maximum(1 - (u / c) ** 2, 0.0) ** 2)
+    return np.maximum(1 - (u / c) ** 2, 0.0) ** 2
 
 
 def huber_weight(u: FloatArray, c: float) -> FloatArray:
     """Huber's weight psi(u) / u; `u` (n,), not negative."""
-    return np.asarray(c / np.maximum(u, c))
+    return c / np.maximum(u, c)
 
 
 def reweighted(
@@ -111,4 +111,4 @@ def _quantile(share: float, dimension: int) -> float:
 def trimming_weight(u2: FloatArray, lower: float, upper: float) -> FloatArray:
     """One up to `lower`, falling smoothly to zero at `upper` (no window tips the answer by a hair); `u2` (n,)."""
     v = np.clip((u2 - lower) / (upper - lower), 0.0, 1.0)
-    return np.asarray((1 - v) ** 2 * (1 + 2 * v))
+    return (1 - v) ** 2 * (1 + 2 * v)

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
-from tpjb_ident.estimate.equation import HOUSING_ROWS, State, film_change_rows
+from tpjb_ident.conditions import Conditions
+from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, Sensor, State, film_change_rows
 
 if TYPE_CHECKING:
     from tpjb_ident.estimate.solve import Solution
@@ -149,11 +148,11 @@ class Term:
         """Compliance of the springs under the housing (2, 2) [m/N], of the term that knows it."""
         return None
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """What to say where the records contradict what was stated."""
         return ()
 
-    def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> tuple[Condition, ...]:
+    def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> Conditions:
         """What to say of one point (its number), `h` (2, 2) [N/m]."""
         return ()
 
@@ -207,10 +206,10 @@ class Additive(Term):
         """What the parameters' values (q,) add to the readings, (n, m + 2)."""
         columns = self.columns(blocks, state)
         if not self.points:
-            return np.asarray(columns @ value)
+            return columns @ value
         table = np.zeros((len(blocks.points), self.width))
         table[list(self.points)] = value.reshape(-1, self.width)
-        return np.asarray(np.einsum("nrl,nl->nr", columns, table[blocks.point]))
+        return np.einsum("nrl,nl->nr", columns, table[blocks.point])
 
 
 class FilmTerm(Additive):
@@ -238,7 +237,7 @@ class FilmTerm(Additive):
         """By how much H of a run differs from its point's, (n, 2, 2) [N/m]."""
         changes, group = self.changes(blocks, state), self.group[blocks.point]
         numbers = value.reshape(-1, changes.shape[1])[group] * (group >= 0)[:, None]
-        return np.asarray(np.einsum("nk,nkij->nij", numbers, changes))
+        return np.einsum("nk,nkij->nij", numbers, changes)
 
 
 def exceeding(fitted: Fitted, parameters: tuple[Parameter, ...]) -> list[int]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.estimate.blocks import totals
+from tpjb_ident.estimate.equation import totals
 from tpjb_ident.estimate.statistics import trimming_limits, trimming_weight
 
 #: |sum| over sum of moduli of a run's windows below which its phase counts as wandering.
@@ -202,9 +202,9 @@ def motion_in(residual: ComplexArray, weights: FloatArray, means: ComplexArray, 
     # motion along two directions spans the runs
     pattern = np.linalg.svd(shown / scale, full_matrices=False)[2][:2].T
     z, root = residual @ film.T / scale, np.sqrt(weights)[:, None]
-    rest, total = z, max(float(weights.sum()), 1.0)
+    rest, total = z, max(weights.sum(), 1.0)
     m, k = pattern.shape
-    least = _LEAST * float(np.mean(np.abs(root * z) ** 2)) + _TINY
+    least = _LEAST * np.mean(np.abs(root * z) ** 2) + _TINY
     for _ in range(_NOISE_ROUNDS):
         variance = np.sum(np.abs(root * rest) ** 2, axis=0) / total * m / max(m - k, 1) + least
         gram = np.linalg.inv(pattern.conj().T @ (pattern / variance[:, None]) + _LEAST**2 / least * np.eye(k))

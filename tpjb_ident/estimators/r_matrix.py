@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Conditions
 from tpjb_ident.errors import ArgumentError
 
 
@@ -76,7 +76,7 @@ class TableFit:
     weights: FloatArray  #: (n,), or (n, 2) by force axis
     covariance: FloatArray = field(default_factory=lambda: np.full((8, 8), np.nan))
     dof: FloatArray = field(default_factory=lambda: np.full(8, np.nan))
-    conditions: tuple[Condition, ...] = ()
+    conditions: Conditions = ()
     chi_square: float = np.nan
     attenuation: FloatArray = field(default_factory=lambda: np.full(2, np.nan))
 
@@ -164,7 +164,7 @@ def _scale(phasors: ComplexArray) -> float:
     """Median modulus of the rows: a scale that a few gross outliers cannot move far."""
     if not len(phasors):
         return 1.0
-    scale = float(np.median(np.linalg.norm(phasors, axis=1)))
+    scale = np.median(np.linalg.norm(phasors, axis=1))
     return scale if scale > 0 else 1.0
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Conditions
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.estimate.statistics import half_width
 from tpjb_ident.rounding import with_interval
@@ -66,16 +66,16 @@ class DynamicStiffness:
 
     h: ComplexArray
     omega: float
-    covariance: FloatArray = field(repr=False)
-    dof: FloatArray = field(repr=False)
+    covariance: FloatArray
+    dof: FloatArray
     method: str
-    weights: FloatArray = field(repr=False)
-    status: tuple[Condition, ...] = ()
+    weights: FloatArray
+    status: Conditions = ()
     condition: float = np.nan
     chi_square: float = np.nan
     spare_equations: int = 0
-    attenuation: FloatArray = field(default_factory=lambda: np.full(2, np.nan), repr=False)
-    systematic: FloatArray = field(default_factory=lambda: np.zeros((8, 8)), repr=False)
+    attenuation: FloatArray = field(default_factory=lambda: np.full(2, np.nan))
+    systematic: FloatArray = field(default_factory=lambda: np.zeros((8, 8)))
 
     @property
     def direct(self) -> tuple[float, float]:

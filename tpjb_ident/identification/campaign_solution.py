@@ -1,28 +1,45 @@
-"""Means of a campaign's points as blocks, and H of all of them by one solve, clocks and mains put right on the way."""
+"""Means of a campaign's points as blocks, and H of all of them by one solve, clocks and mains put right on the way.
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+Clocks of further devices are found as the solve goes on: whether there are any, and how fast they run.
+Cells on a clock that is off by e turn against the probes by 2 pi f e per second, alike in all runs and at all lines in
+proportion to their frequency. A beat or a wander of one device does neither. So a clock is supposed only where one
+rate explains the slopes of all runs; where the manifest states clocks, they are as stated. Over a band its responses
+turn as the windows of sines do.
+"""
+
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
+from scipy.special import chdtrc
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.calibration import Channel
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.campaign import Campaign
-from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, RigStiffness, Sensor, film_force, stacked, vector
+from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.estimate.arrowhead import complex_matrix
+from tpjb_ident.estimate.equation import (
+    Blocks,
+    RigStiffness,
+    Sensor,
+    axes_of,
+    campaign_rig,
+    film_force,
+    sensors_of,
+    stacked,
+    vector,
+)
 from tpjb_ident.estimate.noise import unbiased_noise
-from tpjb_ident.estimate.sensors import axes_of, campaign_rig, sensors_of
-from tpjb_ident.estimate.shape import complex_matrix
 from tpjb_ident.estimate.solve import Solution
-from tpjb_ident.identification.clocks import solved_with_clocks
+from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means
 from tpjb_ident.results.linearity import FilmChange, film_change
-from tpjb_ident.runs.finished_runs import RunDigest
-from tpjb_ident.runs.point_data import PointData
+from tpjb_ident.runs.point_data import PointData, RunDigest
 from tpjb_ident.runs.static_load import StaticLoads, missed_load, static_loads
 from tpjb_ident.runtime.executors import Workers
+from tpjb_ident.terms.clock import START, Clock
 from tpjb_ident.terms.mains import (
     MAINS_ON_LINE,
     MainsFit,
@@ -33,6 +50,105 @@ from tpjb_ident.terms.mains import (
 )
 from tpjb_ident.terms.registry import solve, solved_as_learnt
 
+if TYPE_CHECKING:
+    from tpjb_ident.identification.band_blocks import BandSolution
+
+
+#: Standard errors beyond which a rate is one, and phase [rad] over a record from which it matters.
+_CLEAR, _NOTABLE = 6.0, 2e-3
+#: Probability below which one rate does not explain the runs' slopes.
+_ONE_RATE = 1e-3
+#: Share of the runs that tell it, those nearest to their median.
+_USUAL = 0.8
+#: Passes over the records in which the clocks' rates are found, at most, and phase [rad] over a record that the solve
+#: puts right by itself.
+_CLOCK_PASSES, _TURNED = 2, 1e-2
+
+
+#: Of sines, or over bands.
+Answer = TypeVar("Answer", "CampaignSolution", "BandSolution")
+
+
+def solved_with_clocks(
+    sensors: tuple[Sensor, ...], rate: float, solve: Callable[[tuple[Sensor, ...], Mapping[str, float]], Answer]
+) -> Answer:
+    """Solve, find the devices, and solve again with the rates of their clocks put right in the records.
+
+    `solve` takes sensors and the rates found by device; `rate` [Hz] of the records. Devices that the manifest states
+    are taken at their times; one that was found started within a sample of the first.
+    """
+    answer = solve(sensors, {})
+    sensors, rates = with_found_devices(sensors, answer.solution.blocks, START / rate)
+    if rates:
+        answer = solve(sensors, rates)
+    for _ in range(_CLOCK_PASSES if len({sensor.clock for sensor in sensors}) > 1 else 0):
+        solution, blocks = answer.solution, answer.solution.blocks
+        more = Clock(solution.rig, blocks).rates(solution.fitted[Clock.name].value)
+        turn = max(map(abs, more.values())) * (2 * blocks.time * blocks.omega).max()
+        if turn < _TURNED:
+            break
+        rates = {device: rates.get(device, 0.0) + change for device, change in more.items()}
+        answer = solve(sensors, rates)
+    return answer
+
+
+def with_found_devices(
+    sensors: tuple[Sensor, ...], blocks: Blocks, start: float
+) -> tuple[tuple[Sensor, ...], dict[str, float]]:
+    """The sensors, cells and accelerometers with devices of their own where their phases show them, and their rates.
+
+    They started within `start` [s] of the first, one deviation.
+    """
+    force = None if any(sensor.clock for sensor in sensors) else _rate(sensors, blocks, "force")
+    if force is None or not force.clear:
+        return sensors, {}
+    acceleration = _rate(sensors, blocks, "acceleration")
+    # too weak to tell: as a rule accelerometers are recorded with the cells
+    devices, rates = {"force": "cells", "acceleration": "cells"}, {"cells": force.rate}
+    if acceleration is not None and abs(acceleration.rate - force.rate) > _CLEAR * np.hypot(
+        acceleration.error, force.error
+    ):
+        devices["acceleration"] = "accelerometers" if acceleration.clear else ""
+        rates |= {"accelerometers": acceleration.rate} if acceleration.clear else {}
+    separate = [replace(s, clock=devices.get(s.quantity, "")) for s in sensors]
+    return tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.clock else s for s in separate), rates
+
+
+class _Rate(NamedTuple):
+    rate: float
+    error: float  #: standard error
+    clear: bool  #: whether it is a rate of its own
+
+
+def _rate(sensors: Sequence[Sensor], blocks: Blocks, quantity: str) -> _Rate | None:
+    """Rate of a quantity's clock against the probes'; None where no one rate explains the runs."""
+    rows = [j for j, sensor in enumerate(sensors) if sensor.quantity == quantity]
+    probes = [j for j, sensor in enumerate(sensors) if sensor.quantity == "displacement"]
+    usable = (blocks.windows > 3) & blocks.present[:, rows + probes].all(axis=1)
+    if not rows or usable.sum() < 2:
+        return None
+    turn, turn_error = _turning(blocks, rows)
+    probe, probe_error = _turning(blocks, probes)
+    rate, error = ((probe - turn) / blocks.omega)[usable], (np.hypot(turn_error, probe_error) / blocks.omega)[usable]
+    # a run that slipped tells nothing of a rate
+    near = np.argsort(np.abs(rate - np.median(rate)) / error)[: max(2, int(_USUAL * len(rate)))]
+    weight = 1 / np.hypot(error, np.median(error)) ** 2
+    middle, doubt = float(np.average(rate[near], weights=weight[near])), float(1 / np.sqrt(np.sum(weight)))
+    alike = chdtrc(len(near), np.sum(((rate - middle)[near] / error[near]) ** 2)) > _ONE_RATE
+    turned = float(np.median(np.abs(rate) * 2 * (blocks.omega * blocks.time)[usable]))
+    return _Rate(middle, doubt, abs(middle) > _CLEAR * doubt and turned > _NOTABLE) if alike else None
+
+
+def _turning(blocks: Blocks, rows: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """Rate at which the phase of some sensors turns (n,) [rad/s], and its standard error (n,)."""
+    z: ComplexArray = blocks.z[:, rows]
+    power = np.maximum(np.sum(np.abs(z) ** 2, axis=1), 1e-300)
+    turning = np.sum(z.conj() * blocks.slope[:, rows], axis=1).imag / power
+    noise = blocks.slope_noise[:, rows][:, :, rows]
+    variance = np.einsum("ni,nij,nj->n", z.conj(), noise, z).real / 2 / power**2
+    return turning, np.sqrt(np.maximum(variance, 0.0))
+
+
 #: Degrees of freedom below which the noise of a point is taken together with the other points'.
 _FREEDOM = 60.0
 #: Error of a run's mean load where its windows do not tell, relative.
@@ -41,9 +157,9 @@ _LOAD_ERROR = 2e-4
 _LEAST_SCATTER = 1e-3
 
 
-def unstated(campaign: Campaign) -> tuple[Condition, ...]:
+def unstated(campaign: Campaign) -> Conditions:
     """Say which probes and cells have no uncertainty in the manifest."""
-    names = [s.name for s in sensors_of(campaign) if s.quantity in QUANTITIES[:2] and s.uncertainty is None]
+    names = [s.name for s in sensors_of(campaign) if s.quantity in VECTOR_QUANTITIES[:2] and s.uncertainty is None]
     text = f"no uncertainty in the manifest for {', '.join(names)}: their systematic part is left out"
     return holding((names, "calibration-uncertainty-unstated", text))
 
@@ -74,7 +190,7 @@ def campaign_blocks(
                 continue
             channels = point.channels[g]
             calibrations = calibrations or [[] for _ in channels]
-            load, loads = data.point.static_load, run.cell_force.mean
+            load, loads = data.point.static_load, run.means("force")
             loads = loads[np.isfinite(loads).all(axis=1)]
             # standard error of the size of the run's mean cell force
             error = float(np.linalg.norm(loads.std(axis=0, ddof=1)) / np.sqrt(len(loads))) if len(loads) > 1 else 0.0
@@ -134,18 +250,18 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
     return noises, np.array(freedoms)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CampaignSolution:
     """H of every point of a campaign, and what was put right on the way."""
 
     task: MeansTask
-    means: tuple[PointMeans, ...] = field(repr=False)
-    loads: StaticLoads = field(repr=False)
+    means: tuple[PointMeans, ...]
+    loads: StaticLoads
     film: tuple[FilmChange, ...]
-    solution: Solution = field(repr=False)
-    mains_shift: ComplexArray = field(repr=False)  #: (n, m), SI: pick-up taken off the blocks' readings
-    mains: dict[int, MainsFit] = field(default_factory=dict, repr=False)  #: by point
-    in_cells: dict[int, FloatArray] = field(default_factory=dict, repr=False)  #: by point, (8, 8): mains in the cells
+    solution: Solution
+    mains_shift: ComplexArray  #: (n, m), SI: pick-up taken off the blocks' readings
+    mains: dict[int, MainsFit] = field(default_factory=dict)  #: by point
+    in_cells: dict[int, FloatArray] = field(default_factory=dict)  #: by point, (8, 8): mains in the cells
 
     @cached_property
     def misfits(self) -> FloatArray:
@@ -176,7 +292,7 @@ def solve_campaign(
     loads = static_loads(campaign, points)
 
     def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> CampaignSolution:
-        task = replace(common, sensors=sensors, rates=rates)
+        task = replace(common, channels=sensors, rates=rates)
         means = tuple(workers.map(point_means, [(data,) for data in points], task))
         film = tuple(_film(data, point) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])
@@ -195,7 +311,10 @@ def solve_campaign(
     on_line = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE) and p in blocks.point]
     fits = _mains(on_line, digests, solution, force) if correct and on_line else {}
     if fits:
-        shift = _mains_readings(solution.rig, blocks, fits)
+        shift, probes = np.zeros_like(blocks.z), solution.rig.of("displacement")
+        for p, fit in fits.items():
+            rows = np.ix_(np.flatnonzero(blocks.point == p), probes)
+            shift[rows] = np.einsum("nja,na->nj", blocks.along[rows], fit.pickup)
         again = solve(solution.rig, replace(blocks, z=blocks.z - shift), solution.h)
         last = replace(last, solution=again, mains_shift=shift, mains=fits)
     D = vector(solution.rig, blocks, "displacement")
@@ -205,7 +324,7 @@ def solve_campaign(
 
 def _film(data: PointData, point: PointMeans) -> FilmChange:
     lines = [digest.harmonics[line] for digest, line in zip(data.digests, data.lines) if digest.harmonics]
-    return film_change([line for line in lines if line is not None], point.start)
+    return film_change(lines, point.start)
 
 
 def _mains(
@@ -223,9 +342,9 @@ def _mains(
     fits = {}
     for p in points:
         mine = blocks.point == p
-        usual = float(np.median(np.linalg.norm(F[mine], axis=1)))
-        in_cells = float(np.linalg.norm(force)) / usual / np.sqrt(2)
-        scatter = float(np.hypot(max(typical, _LEAST_SCATTER), in_cells if in_cells > typical else 0.0))
+        usual = np.median(np.linalg.norm(F[mine], axis=1))
+        in_cells = np.linalg.norm(force) / usual / np.sqrt(2)
+        scatter = np.hypot(max(typical, _LEAST_SCATTER), in_cells if in_cells > typical else 0.0)
         fit = fit_mains(D[mine], F[mine], pickup, scatter) if np.isfinite(solution.h[p]).all() else None
         if fit is not None:
             fits[p] = fit
@@ -247,11 +366,42 @@ def misfits(solution: Solution) -> FloatArray:
     return np.linalg.norm(residual, axis=1) / np.linalg.norm(F, axis=1)
 
 
-def _mains_readings(rig: Rig, blocks: Blocks, fits: Mapping[int, MainsFit]) -> ComplexArray:
-    """Pick-up of the probes, (n, m) [m]."""
-    shift = np.zeros_like(blocks.z)
-    probes = rig.of("displacement")
-    for p, fit in fits.items():
-        places = np.flatnonzero(blocks.point == p)
-        shift[np.ix_(places, probes)] = np.einsum("nja,na->nj", blocks.along[np.ix_(places, probes)], fit.pickup)
-    return shift
+#: Terms whose uncertainty scatters with the runs: of points that each have runs of their own.
+RUN_TERMS = ("load miss", "load direction")
+
+
+def estimate_of(
+    solution: Solution, point: int, h: ComplexArray, omega: float, method: str, by_run: Sequence[str] = ()
+) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
+    """H (2, 2) of a point of a solve, and its covariances (8, 8) by source; what scatters `by_run` is random."""
+    shared = {name: share[point] for name, share in solution.shares.items() if np.any(share[point])}
+    random = {"random": solution.records[point]}
+    random |= {name: shared.pop(name) for name in by_run if name in shared}
+    covariance, freedom = total(random.values()), solution.freedom(point)
+    estimate = DynamicStiffness(
+        h, omega, covariance, freedom, method, np.ones((1, 2)), systematic=total(shared.values())
+    )
+    return estimate, random | shared
+
+
+def total(covariances: Iterable[FloatArray]) -> FloatArray:
+    """Sum of covariances (8, 8)."""
+    return np.sum([np.zeros((8, 8)), *covariances], axis=0)
+
+
+def shared_changes(
+    solution: Solution, points: Sequence[int], by_run: Sequence[str] = (), more: Mapping[str, FloatArray] | None = None
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Changes (q, 8 P) of some points by all terms but points' own, and those that differ from point to point `by_run`.
+
+    They are scaled so that the mean of the rows' products is their covariance [N/m]; with the names of the sources.
+    `more`: one deviation (P, 8) of further sources by name.
+    """
+    shared = [(term, parameter) for term in solution.terms if not term.points for parameter in term.parameters]
+    rows = [k for k, (term, _) in enumerate(shared) if term.name not in by_run]
+    further = more or {}
+    names = (*(f"{shared[k][0].name}: {shared[k][1].name}" for k in rows), *further)
+    if not names:
+        return np.zeros((1, 8 * len(points))), names
+    factors = np.concatenate([solution.factors[np.ix_(rows, points)], *(f[None] for f in further.values())])
+    return factors.reshape(len(names), -1) * np.sqrt(len(names)), names

@@ -1,30 +1,54 @@
-"""A campaign's dynamic runs to dynamic coefficients: the whole path, point by point."""
+"""A campaign's dynamic runs to dynamic coefficients: the whole path, point by point; runs over a band by their own."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from rigdata.arrays import FloatArray, IntArray
 from rigdata.campaign import Campaign
+from rigdata.problem import RigDataError
 from rigdata.vector import zero_uncertainty
+from tpjb_ident.bands.responses import BandPoint, band_groups, read_point
 from tpjb_ident.bands.run_spectra import is_broadband
-from tpjb_ident.conditions import merged
+from tpjb_ident.check.observation import observe
+from tpjb_ident.conditions import Conditions, holding, merged
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.estimators.estimate import method_of
-from tpjb_ident.identification.campaign_solution import solve_campaign, unstated
-from tpjb_ident.identification.estimates import RUN_TERMS, shared_changes
-from tpjb_ident.identification.identify_bands import identify_bands
-from tpjb_ident.identification.point import SOLVED, PointTask, finished_point, point_share
+from tpjb_ident.estimate.arrowhead import real_numbers
+from tpjb_ident.estimate.equation import RigStiffness, Sensor, campaign_rig, sensors_of
+from tpjb_ident.estimate.solve import Solution
+from tpjb_ident.estimators.estimate import MIN_COHERENCE, fit_conditions, method_of
+from tpjb_ident.estimators.stiffness import DynamicStiffness
+from tpjb_ident.identification.band_blocks import ONE_LINE, STRONG, BandSolution, band_blocks, solve_bands
+from tpjb_ident.identification.campaign_solution import (
+    RUN_TERMS,
+    estimate_of,
+    run_temperatures,
+    shared_changes,
+    solve_campaign,
+    solved_with_clocks,
+    unstated,
+)
+from tpjb_ident.identification.point import SOLVED, finished_point, point_share
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.phasors.mains_frequency import mains_frequency
-from tpjb_ident.results.frequency_outliers import with_frequency_outliers
-from tpjb_ident.results.identification import Identification
-from tpjb_ident.results.quality import with_probe_doubts
-from tpjb_ident.runs.baseline import DryTest, dry_test
-from tpjb_ident.runs.checked_runs import check_finished
-from tpjb_ident.runs.finished_runs import FinishedRuns, excluded_runs, without_runs
-from tpjb_ident.runs.point_data import gather
-from tpjb_ident.runs.run_jobs import Progress, all_runs
-from tpjb_ident.runs.run_store import RunStore
+from tpjb_ident.phasors.whole_record import mains_frequency
+from tpjb_ident.results.frequency_model import fits_over_frequency, with_frequency_outliers
+from tpjb_ident.results.identification import BandLine, BandResult, Identification
+from tpjb_ident.results.linearity import FilmChange, change_conditions
+from tpjb_ident.results.point_result import PointResult, differing_runs, of_runs, physics, with_probe_doubts
+from tpjb_ident.rounding import listed
+from tpjb_ident.runs.point_data import ExcludedRun, FinishedRuns, excluded_runs, gather, without_runs
+from tpjb_ident.runs.run_jobs import (
+    DryTest,
+    Progress,
+    RunStore,
+    all_runs,
+    campaign_verdicts,
+    check_conditions,
+    check_finished,
+    dry_test,
+)
+from tpjb_ident.runs.static_load import static_loads
 from tpjb_ident.runtime.executors import Workers
 from tpjb_ident.terms.registry import cell_stiffness
 
@@ -76,8 +100,10 @@ def identify(
     if not runs:
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     report = progress or (lambda text, done, total: None)
-    settings = _with_mains(replace(chosen, method=method or chosen.method), campaign)
-    dry = dry_test(campaign, settings.phasors, _without_instruments(settings.method))
+    lines = replace(chosen.phasors.lines, mains=mains_frequency(campaign, chosen.phasors.lines.mains))
+    settings = replace(chosen, method=method or chosen.method, phasors=replace(chosen.phasors, lines=lines))
+    solver, _ = method_of(settings.method)
+    dry = dry_test(campaign, settings.phasors, SOLVED if solver == "iv" else solver)  # it has no command
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
     bands = None
     if any(is_broadband(run) for run in runs):
@@ -86,22 +112,14 @@ def identify(
     if sines.of_kind("dynamic"):
         finished = all_runs(sines, settings.phasors, report, workers, store)
         identification = assemble(sines, finished, settings, report, workers, dry)
-    identification = identification if bands is None else _joined(identification, bands)
-    identification = replace(identification, points=with_frequency_outliers(identification.points))
-    return _with_zero_uncertainty(identification, campaign)
+    return _doubted(identification if bands is None else _joined(identification, bands), campaign)
 
 
-def _without_instruments(name: str) -> str:
-    """The method of a name, or the default one where it needs a command; an unknown one is refused."""
-    method, _ = method_of(name)
-    return SOLVED if method == "iv" else method
-
-
-def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -> Identification:
-    """Positions of the shaft are as uncertain as the probes' stated zeros."""
+def _doubted(identification: Identification, campaign: Campaign) -> Identification:
+    """Points that other frequencies contradict; positions are as uncertain as the probes' stated zeros."""
     zero = zero_uncertainty(campaign.channels.values(), "displacement")
-    points = tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in identification.points)
-    return replace(identification, points=points)
+    points = with_frequency_outliers(identification.points)
+    return replace(identification, points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in points))
 
 
 def _joined(sines: Identification, bands: Identification) -> Identification:
@@ -126,12 +144,6 @@ def _joined(sines: Identification, bands: Identification) -> Identification:
     )
 
 
-def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySettings:
-    lines = settings.phasors.lines
-    lines = replace(lines, mains=mains_frequency(campaign, lines.mains))
-    return replace(settings, phasors=replace(settings.phasors, lines=lines))
-
-
 def assemble(
     campaign: Campaign,
     finished: FinishedRuns,
@@ -148,11 +160,12 @@ def assemble(
     gathered = gather([digest.phasors for digest in digests], digests)
     report("estimating", 0, len(gathered))
     solved = solve_campaign(campaign, gathered, digests, workers, settings.correct, dry.stiffness)
-    task = PointTask(settings, solved.task, checked, dry)
-    jobs = [(data, point_share(solved, data, p)) for p, data in enumerate(gathered)]
+    jobs = []
+    for p, data in enumerate(gathered):
+        jobs.append((point_share(solved, data, p, dry, check_conditions(checked, data.names)),))
     excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
     points = []
-    for point in workers.map(finished_point, jobs, task):
+    for point in workers.map(finished_point, jobs, settings):
         without = without_runs(point.point, excluded, several)
         points.append(replace(point, quality=merged(point.quality, without)))
         report("estimating", len(points), len(gathered))
@@ -162,3 +175,169 @@ def assemble(
     changes, names = shared_changes(solved.solution, range(len(gathered)), RUN_TERMS)
     springs = cell_stiffness(solved.solution)
     return Identification(campaign.id, settings.method, named, changes, remarks, (), names, springs)
+
+
+#: Share of the driven lines that must be told from noise.
+_LEAST_LINES = 0.5
+#: Disturbing lines that are named.
+_NAMED = 6
+#: Source of what the solves without an instrument are apart.
+_BRACKET = "no instrument"
+
+
+def identify_bands(
+    campaign: Campaign, settings: IdentifySettings, progress: Progress, bare: RigStiffness
+) -> Identification:
+    """Identify every operating point of a campaign that was excited over a band."""
+    runs = [run for run in campaign.of_kind("dynamic") if is_broadband(run)]
+    observations = []
+    for done, run in enumerate(runs):
+        progress(run.id, done, len(runs))
+        observations.append(observe(run))
+    checked = campaign_verdicts(campaign, observations)
+    bad = checked.unusable
+    unusable = [ExcludedRun(run.id, run.point, RigDataError(bad[run.id])) for run in runs if run.id in bad]
+    groups = band_groups([run for run in runs if run.id not in bad])
+
+    excluded: list[ExcludedRun] = []
+
+    def solve(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> BandSolution:
+        fast = {sensor.name: rates[sensor.clock] for sensor in sensors if sensor.clock in rates}
+        points = []
+        excluded[:] = unusable
+        for group in groups:
+            point, without = read_point(group, campaign.housing_mass, settings.phasors, fast)
+            points += [] if point is None else [point]
+            excluded.extend(without)
+        if not points:
+            raise excluded[0].error
+        loads = static_loads(campaign, points)
+        temperatures = run_temperatures(campaign, [(s.phasors.run, s.temperatures) for p in points for s in p.spectra])
+        data = band_blocks(points, sensors, loads, temperatures, settings.clearance)
+        known = {"bare": bare, "rates": rates, "to_set_point": settings.correct}
+        return solve_bands(campaign_rig(campaign, loads.doubted(sensors), data.blocks, loads.common, **known), data)
+
+    solved = solved_with_clocks(sensors_of(campaign), min(run.sample_rate for run in runs), solve)
+    results, numbers = [], []
+    points = solved.data.points
+    for b, point in enumerate(points):
+        of_loads = solved.data.loads.conditions(b), check_conditions(checked, point.names)
+        without = without_runs(point.point, excluded, any_excitation=True)
+        of_records = (spectra.phasors.conditions for spectra in point.spectra)
+        of_lines = solved.solution.conditions(), band_conditions(point, solved, b)
+        quality = merged(*of_loads, without, *of_records, *of_lines)
+        result, parts = _result(solved, b, quality, settings.clearance)
+        results.append(result)
+        numbers += parts
+    changes, names = _shared(solved, numbers)
+    places = [point.point for point in points]
+    named = excluded_runs(excluded, len(runs), places, any_excitation=True)
+    identified = tuple(point for band in results for point in band.points)
+    about = (*named, *unstated(campaign)), tuple(results), names, cell_stiffness(solved.part)
+    return Identification(campaign.id, settings.method, identified, changes, *about)
+
+
+def _shared(solved: BandSolution, parts: list[int]) -> tuple[FloatArray, tuple[str, ...]]:
+    """What some parts share: what scatters from run to run is common to them too."""
+    halves = np.array([solved.bracket(solved.parts[q]) for q in parts]).reshape(-1, 2, 2)
+    more = {_BRACKET: real_numbers(halves) / np.sqrt(3)} if halves.any() else {}
+    return shared_changes(solved.part, parts, more=more)
+
+
+def _estimate(
+    solved: BandSolution, solution: Solution, group: int, lines: IntArray, method: str
+) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
+    """H of a group of lines, at the middle one, and its covariances by source.
+
+    Without an instrument all noise was the force's: H is in the middle of H1 and H2, as uncertain as a rectangle.
+    """
+    k, half = lines[len(lines) // 2], solved.bracket(lines)
+    est, budget = estimate_of(solution, group, solution.h[k] + half, float(solved.data.omega[k]), method)
+    if half.any():
+        budget[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
+        est = replace(est, systematic=est.systematic + budget[_BRACKET])
+    return replace(est, condition=float(np.median(solved.condition[lines]))), budget
+
+
+def _result(solved: BandSolution, b: int, quality: Conditions, clearance: float | None) -> tuple[BandResult, list[int]]:
+    """Lines, models and points of one band, and the numbers of its parts."""
+    data, usable = solved.data.points[b], solved.usable_of(b)
+    lines = tuple(_line(solved, data, int(k)) for k in usable)
+    parts = [q for q, part in enumerate(solved.parts) if solved.data.band[part[0]] == b and len(usable)]
+    points = [_point(solved, q, quality, clearance) for q in parts]
+    # what runs scatter by is one for all parts: no chance between them
+    free = [np.full(8, solved.part.noise_freedom(q)) for q in parts]
+    by_noise = [replace(p, stiffness=replace(p.stiffness, dof=dof)) for p, dof in zip(points, free)]
+    fits = fits_over_frequency(by_noise, _shared(solved, parts)[0])
+    models, chosen = (fits[0].fits, fits[0].supported) if fits else ({}, "raw H")
+    figures = data.names, data.spectra[0].period, data.resolution, tuple(points)
+    return BandResult(data.point, data.kind, lines, models, chosen, quality, *figures), parts
+
+
+def _line(solved: BandSolution, point: BandPoint, k: int) -> BandLine:
+    """One line by the method that counts, and by the others: how runs scatter is no matter of the method."""
+    classic = solved.classic[k]
+    best, _ = _estimate(solved, solved.solution, k, np.array([k]), point.method)
+    (bare,) = solved.solution.rig.bare.at(np.array([best.omega]))
+    table = {point.method: best}
+    for name, value in classic.h.items():
+        table.setdefault(name, replace(best, h=value - bare, method=name))
+    return BandLine(best.omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
+
+
+def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float | None) -> PointResult:
+    """One part of a band as a point: its lines alone tell its h; K-C-M only says how h changes within it."""
+    lines = solved.parts[q]
+    b = int(solved.data.band[lines[0]])
+    point = solved.data.points[b]
+    est, budget = _estimate(solved, solved.part, q, lines, f"band-{point.method}")
+    inside = [solved.classic[k] for k in lines if solved.usable[k]]
+    amplitude = max(s.amplitude for s in point.spectra)
+    film = FilmChange(float(solved.data.blocks.bent[lines[0]]))
+    bent = change_conditions(film, budget, est, amplitude, clearance)
+    return PointResult(
+        **of_runs(point, [s.temperatures for s in point.spectra]),
+        point=replace(point.point, excitation=2 * np.pi * round(est.omega / (2 * np.pi), 3)),
+        stiffness=est,
+        by_method={est.method: est},
+        n_windows=sum(line.n_rows for line in inside),
+        outlier_fraction=0.0,
+        coherence=float(np.median([line.coherence.min() for line in inside])) if inside else float("nan"),
+        amplitude=amplitude,
+        quality=merged(quality, physics(est, point.inertia), bent),
+        rejected=(),
+        load_miss=solved.data.loads.misses[b],
+        clearance=clearance,
+        budget=budget,
+        scattering=("random",),
+    )
+
+
+def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> Conditions:
+    """What the lines of one band say, and its runs beside each other."""
+    mine = solved.data.band == b
+    driven, usable = np.flatnonzero(mine & solved.data.driven), solved.usable_of(b)
+    condition = float(np.median(solved.condition[driven])) if len(driven) else 0.0
+    alike, few = condition > ONE_LINE, len(usable) < max(_LEAST_LINES * len(driven), 1)
+    one_line = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
+    weak = f"{len(usable)} of {mine.sum()} lines stand {STRONG:g} times (F ratio) above the noise"
+    spectra = point.spectra[0]
+    low, high = spectra.frequencies[0], spectra.frequencies[-1]
+    held = [f"{d.name} {d.frequency:.4g} Hz" for d in spectra.disturbances if low <= d.frequency <= high]
+    bare = solved.solution.rig.bare
+    unknown = int((~bare.known(solved.data.omega[usable])).sum()) if len(bare.omega) else 0
+    blind = point.method == "hv" and len(usable) > 0
+    coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0
+    text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"
+    return merged(
+        fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.spectra)),
+        differing_runs(solved.run_scatter),
+        holding(
+            (alike, "fewer-than-two-directions", one_line),
+            (few and not alike, "excitation-too-weak", weak),
+            (held, "lines-left-out", listed(held, _NAMED)),
+            (blind, "no-instrument", text),
+            (coherent < MIN_COHERENCE, "low-coherence", f"{coherent:.2f}, median over the band"),
+            (unknown, "baseline-missing", f"at {unknown} of {len(usable)} lines of the band"),
+        ),
+    )

@@ -8,7 +8,7 @@ force where there are accelerometers, as Eq. (13) wants the film's force.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,13 +17,12 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
 from tpjb_ident.bands.run_spectra import is_broadband
-from tpjb_ident.estimate.shape import real_numbers
+from tpjb_ident.estimate.arrowhead import real_numbers
+from tpjb_ident.estimators.estimate import RlmSettings, rlm_fit
 from tpjb_ident.estimators.r_matrix import r_matrix
-from tpjb_ident.estimators.rlm import RlmSettings, rlm_fit
-from tpjb_ident.phasors.extraction import extract
-from tpjb_ident.phasors.lines import Line, LineSet
+from tpjb_ident.phasors.lines import Line, LineSet, WindowSettings
 from tpjb_ident.phasors.run_data import PhasorSettings
-from tpjb_ident.phasors.windows import WindowSettings
+from tpjb_ident.phasors.run_phasors import extract
 from tpjb_ident.results.point_result import quality_cell
 from tpjb_ident.runs.point_data import PointData, gather
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
@@ -43,11 +42,11 @@ class PlainSettings:
     norm: str = "huber"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PlainPoint:
     """One operating point, solved as printed."""
 
-    data: PointData = field(repr=False)
+    data: PointData
     h: ComplexArray  #: (2, 2) complex, N/m
     standard_error: np.ndarray  #: (8,), N/m: statsmodels' own, of Re and Im of h
     status: tuple[str, ...]

@@ -6,30 +6,27 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import directions
-from tpjb_ident.check.findings import Verdicts
-from tpjb_ident.conditions import Condition, holding, merged
-from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, method_of
+from tpjb_ident.conditions import Conditions, holding, merged
+from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, method_of, not_locked
 from tpjb_ident.estimators.r_matrix import phasor_table
-from tpjb_ident.estimators.solved_windows import not_locked
 from tpjb_ident.estimators.stiffness import DynamicStiffness
-from tpjb_ident.identification.campaign_solution import CampaignSolution
-from tpjb_ident.identification.estimates import RUN_TERMS, estimate_of
-from tpjb_ident.identification.point_means import MeansTask, channel_windows, means_attenuation, vectors
+from tpjb_ident.identification.campaign_solution import RUN_TERMS, CampaignSolution, estimate_of
+from tpjb_ident.identification.point_means import channel_windows, means_attenuation, vectors
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.run_data import RunPhasors, complex_median
 from tpjb_ident.results.linearity import FilmChange, amplitude_slope, change_conditions
-from tpjb_ident.results.point_result import PointResult, of_runs
-from tpjb_ident.results.quality import (
+from tpjb_ident.results.point_result import (
+    PointResult,
     amplitude,
     coherence,
     differing_runs,
     directional_pattern,
     flags,
+    of_runs,
     rejected_windows,
 )
-from tpjb_ident.runs.baseline import DryTest
-from tpjb_ident.runs.checked_runs import check_conditions
 from tpjb_ident.runs.point_data import PointData
+from tpjb_ident.runs.run_jobs import DryTest
 
 #: Name of the method that the solve stands for in the tables.
 SOLVED = "mm-eiv"
@@ -41,32 +38,21 @@ _MIN_SINE = 0.1
 
 @dataclass(frozen=True)
 class PointShare:
-    """What the solve of the campaign says of one point: all that its windows are finished with."""
+    """One point with what the solve of the campaign says of it."""
 
-    shift: ComplexArray  #: (g, m): taken off the readings of every run
-    factor: ComplexArray  #: (g, m)
-    run_change: ComplexArray  #: (g, 2, 2)
+    #: its windows as they would be at the set point, without what is in the readings beside the motion
+    data: PointData
     estimate: DynamicStiffness | None
     budget: dict[str, FloatArray]
-    conditions: tuple[Condition, ...]
-    shaft: bool
+    conditions: Conditions
+    checks: Conditions
     miss: ComplexArray
     film: FilmChange
 
 
-@dataclass(frozen=True)
-class PointTask:
-    """What all points of a campaign are finished with."""
-
-    settings: IdentifySettings
-    means: MeansTask
-    checked: Verdicts
-    dry: DryTest
-
-
-def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare:
-    """The part of a campaign's solution that belongs to point `p`."""
-    solution, blocks, means = solved.solution, solved.solution.blocks, solved.means[p]
+def point_share(solved: CampaignSolution, data: PointData, p: int, dry: DryTest, checks: Conditions) -> PointShare:
+    """The part of a campaign's solution that belongs to point `p`, and what the `checks` of its runs say."""
+    solution, blocks = solved.solution, solved.solution.blocks
     runs, m = len(data.runs), len(solution.rig)
     shift, factor = np.zeros((runs, m), complex), np.ones((runs, m), complex)
     change, weight = np.zeros((runs, 2, 2), complex), np.zeros(runs)
@@ -75,12 +61,21 @@ def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare
     shift[g], factor[g] = (solution.shift + solved.mains_shift)[mine], solution.factor[mine]
     change[g], weight[g] = solution.run_change[mine], solution.scatter.weights[mine]
     estimate, budget = _estimate(solved, p, weight, data)
-    conditions, shaft = _conditions(solved, p), bool(means.shaft_conditions)
+    if solved.means[p].shaft_conditions:  # more than runs say of the shaft on their lines
+        data = replace(data, runs=tuple(map(_without_shaft, data.runs)))
+    z, _ = channel_windows(data, solved.task)
+    D, F = vectors((z - shift[data.run_index]) / factor[data.run_index], data, solved.task)
+    corrected = replace(data, D=D, F=F - np.einsum("nij,nj->ni", change[data.run_index], D))
     miss, film = solved.loads.misses[p], solved.film[p]
-    return PointShare(shift, factor, change, estimate, budget, conditions, shaft, miss, film)
+    conditions = *_conditions(solved, p), *dry.missing(data.omega)
+    return PointShare(corrected, estimate, budget, conditions, checks, miss, film)
 
 
-def _conditions(solved: CampaignSolution, p: int) -> tuple[Condition, ...]:
+def _without_shaft(run: RunPhasors) -> RunPhasors:
+    return replace(run, conditions=tuple(c for c in run.conditions if not c.endswith("X on excitation line")))
+
+
+def _conditions(solved: CampaignSolution, p: int) -> Conditions:
     counted = solved.misfits[solved.solution.blocks_of(p) & (solved.solution.scatter.weights > 0)]
     # two runs fix H: what is left over is shared by all of them
     share = np.sqrt(np.sum(counted**2) / (len(counted) - 2)) if len(counted) > 2 else 0.0
@@ -126,10 +121,9 @@ def _estimate(
     return estimate, budget
 
 
-def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> PointResult:
+def finished_point(settings: IdentifySettings, share: PointShare) -> PointResult:
     """The point with every method, its uncertainties and what is to be said of it."""
-    settings = task.settings
-    data = _corrected(recorded, task.means, share)
+    data = share.data
     by_method = all_methods(data, settings, share.estimate)
     if not settings.keep_weights:  # a verdict per window in place of its weights: 1 byte instead of 16
         for name, est in by_method.items():
@@ -139,23 +133,22 @@ def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> P
     size, coherent = amplitude(data, weights), coherence(data.D, data.F, best.h, weights)
     linearity = amplitude_slope(data, best.h, weights)
     conditions = merged(
-        *(_remarks(run, share) for run in recorded.runs),
+        *(run.conditions for run in data.runs),
         best.status,
         flags(data, best, coherent),
         directional_pattern(data, weights),
         linearity.condition(),
         disagreement(by_method, settings.method),
         share.conditions,
-        task.dry.missing(recorded.omega),
         change_conditions(share.film, share.budget, best, size, settings.clearance),
-        check_conditions(task.checked, recorded.names),
+        share.checks,
     )
     return PointResult(
-        **of_runs(recorded, [digest.temperatures for digest in recorded.digests]),
-        point=recorded.point,
+        **of_runs(data, [digest.temperatures for digest in data.digests]),
+        point=data.point,
         stiffness=best,
         by_method=by_method,
-        n_windows=len(recorded.D),
+        n_windows=len(data.D),
         outlier_fraction=float((weights < REJECTED_WEIGHT).mean()),
         coherence=coherent,
         amplitude=size,
@@ -166,20 +159,6 @@ def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> P
         clearance=settings.clearance,
         budget=share.budget,
     )
-
-
-def _remarks(run: RunPhasors, share: PointShare) -> tuple[Condition, ...]:
-    """A run's own remarks, without those on the shaft's line where the solve has more to say of it."""
-    return tuple(c for c in run.conditions if not (share.shaft and str(c).endswith("X on excitation line")))
-
-
-def _corrected(data: PointData, task: MeansTask, share: PointShare) -> PointData:
-    """The point's windows as they would be at the set point, without what is in the readings beside the motion."""
-    z, _ = channel_windows(data, task)
-    z = (z - share.shift[data.run_index]) / share.factor[data.run_index]
-    D, F = vectors(z, data, task)
-    F = F - np.einsum("nij,nj->ni", share.run_change[data.run_index], D)
-    return replace(data, D=D, F=F)
 
 
 def all_methods(
@@ -198,7 +177,7 @@ def all_methods(
     return estimates
 
 
-def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[Condition, ...]:
+def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> Conditions:
     """Say which methods differ from the default beyond both intervals."""
     best = by_method[default]
     conditions = []
@@ -208,7 +187,7 @@ def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[
         gap = np.abs(estimate.vector - best.vector)
         room = np.hypot(estimate.half_width(systematic=False), best.half_width(systematic=False))
         if (gap > room).any():
-            worst = int(np.argmax(gap / room))
+            worst = np.argmax(gap / room)
             conditions.append(f"{name} ({gap[worst] / room[worst]:.1f} times the interval)")
     return holding((conditions, "methods-disagree", f"{', '.join(conditions)} away from {default}"))
 

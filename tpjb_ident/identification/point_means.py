@@ -7,14 +7,14 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
-from rigdata.vector import directions, plane_vector
-from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
-from tpjb_ident.estimate.sensors import alive
+from rigdata.vector import directions
+from tpjb_ident.conditions import Condition, Conditions
+from tpjb_ident.estimate.equation import Sensor, alive
 from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation, motion_in, window_means
-from tpjb_ident.estimators.mm import mm_fit, within_directions
+from tpjb_ident.estimators.least_trimmed import mm_fit, within_directions
 from tpjb_ident.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
-from tpjb_ident.phasors.shaft import shaft_order
+from tpjb_ident.phasors.frequency import shaft_order
+from tpjb_ident.phasors.run_data import Directed, by_channel
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 
@@ -24,7 +24,7 @@ _LEAST_WINDOWS = 0.4
 _ONE_LINE = 1e6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PointMeans:
     """What the windows of a point say before the solve."""
 
@@ -32,28 +32,24 @@ class PointMeans:
     means: WindowMeans | None
     channels: tuple[tuple[Channel | None, ...], ...]  #: (g, m): None where a run says nothing of a sensor
     condition: float
-    residual: tuple[ComplexArray, float] = field(repr=False)  #: density of the noise (m, m) and its degrees of freedom
-    status: tuple[Condition, ...] = ()
+    residual: tuple[ComplexArray, float]  #: density of the noise (m, m) and its degrees of freedom
+    status: Conditions = ()
     shaft: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (g,): NaN where it is not on the line
-    shaft_conditions: tuple[Condition, ...] = ()
+    shaft_conditions: Conditions = ()
 
 
 @dataclass(frozen=True)
-class MeansTask:
+class MeansTask(Directed):
     """What every point's windows are averaged with."""
 
-    sensors: tuple[Sensor, ...]
+    channels: tuple[Sensor, ...]
     rates: Mapping[str, float] = field(default_factory=dict)  #: of the devices' clocks, relative
     temperatures: Mapping[str, float] = field(default_factory=dict)  #: of the runs, at the probes [K]
 
     @property
     def along(self) -> FloatArray:
         """Unit vectors of the sensors' axes, (m, 2)."""
-        return directions([sensor.axis for sensor in self.sensors])
-
-    def of(self, quantity: str) -> list[int]:
-        """Places of the sensors of a quantity."""
-        return [j for j, sensor in enumerate(self.sensors) if sensor.quantity == quantity]
+        return directions([sensor.axis or 0.0 for sensor in self.channels])
 
 
 def point_means(task: MeansTask, data: PointData) -> PointMeans:
@@ -64,7 +60,7 @@ def point_means(task: MeansTask, data: PointData) -> PointMeans:
     table = phasor_table(D, F, data.run_index)
     weights, start, status = _robust_start(table)
     film = _film(task, data.mass)
-    readings = Readings([sensor.device for sensor in task.sensors], film)
+    readings = Readings([sensor.clock for sensor in task.channels], film)
     means = window_means(z, data.run_index, _window_times(data), readings, weights, present)
     condition = displacement_condition(table.D, weights[table.valid])
     shaft, conditions = _shaft(data, means, task)
@@ -74,8 +70,8 @@ def point_means(task: MeansTask, data: PointData) -> PointMeans:
 
 def _film(task: MeansTask, mass: float) -> FloatArray:
     """Displacements and oil forces as the sensors see them, of their readings, (m, m)."""
-    film = np.diag([float(sensor.quantity != "acceleration") for sensor in task.sensors])
-    cells, accelerometers = task.of("force"), task.of("acceleration")
+    film = np.diag([float(sensor.quantity != "acceleration") for sensor in task.channels])
+    cells, accelerometers = task.pick("force"), task.pick("acceleration")
     if len(accelerometers) > 1:
         inertia = mass * task.along[cells] @ np.linalg.pinv(task.along[accelerometers])
         film[np.ix_(cells, accelerometers)] = inertia
@@ -86,16 +82,12 @@ def _residual_density(
     data: PointData, task: MeansTask, means: WindowMeans | None, film: FloatArray
 ) -> tuple[ComplexArray, float]:
     """Noise of a phasor times the length of its fit (m, m), by what lines leave of the records, and its freedom."""
-    m = len(task.sensors)
+    m = len(task.channels)
     rows: list[ComplexArray] = [np.zeros((0, m), complex)]
     for run, line in zip(data.runs, data.lines):
-        if line >= len(run.residual) or not len(run.residual[line]):
-            continue
-        places = {channel.name: k for k, channel in enumerate(run.channels)}
-        if any(sensor.name not in places for sensor in task.sensors):
-            continue
-        bins = run.residual[line][:, [places[sensor.name] for sensor in task.sensors]]
-        rows.append(np.sqrt(len(run.start) * run.length) * bins[np.isfinite(bins).all(axis=1)])
+        if line < len(run.residual):
+            bins = by_channel(run.residual[line], run.channels, task.channels)
+            rows.append(np.sqrt(len(run.start) * run.length) * bins[np.isfinite(bins).all(axis=1)])
     bins = np.concatenate(rows)
     if means is not None:
         bins = bins - motion_in(bins, np.ones(len(bins)), means.mean, film)
@@ -103,7 +95,7 @@ def _residual_density(
     return np.asarray(bins.T @ bins.conj() / max(freedom, 1.0), complex), freedom
 
 
-def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple[ComplexArray, tuple[Condition, ...]]:
+def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple[ComplexArray, Conditions]:
     """Unit phasor of what turns with the shaft in every run (g,), where the runs tell it from the motion."""
     none = np.full(len(data.runs), np.nan + 0j)
     first = data.runs[0].lines
@@ -114,8 +106,7 @@ def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple
     s = np.array([run.shaft_phase[i] if len(run.shaft_phase) else np.nan for run, i in zip(data.runs, data.lines)])
     motion = np.full((len(data.runs), 2), np.nan + 0j)
     if means is not None:
-        rows = task.of("displacement")
-        motion = means.mean[:, rows] @ np.linalg.pinv(task.along[rows]).T
+        motion = task.plane("displacement", means.mean)
     reason = not_told(order, s, motion)
     if reason:
         return none, (Condition(name, f"what turns with the shaft cannot be told from the motion: {reason}"),)
@@ -128,31 +119,30 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
 
     Off it are what clocks run ahead and, as far as it is known, the drift of a channel's gain with the temperature.
     """
-    z = np.full((len(data.run_index), len(task.sensors)), np.nan + 0j)
+    z = np.full((len(data.run_index), len(task.channels)), np.nan + 0j)
     described: list[dict[int, Channel]] = []
     for g, (run, line) in enumerate(zip(data.runs, data.lines)):
-        table = {(channel.name, channel.quantity): k for k, channel in enumerate(run.channels)}
-        least = _LEAST_WINDOWS * float(np.isfinite(run.z[:, line]).mean(axis=0).max(initial=0.0))
+        named = {(channel.name, channel.quantity): channel for channel in run.channels}
+        phasors = by_channel(run.z[:, line], run.channels, task.channels)
+        least = _LEAST_WINDOWS * np.isfinite(run.z[:, line]).mean(axis=0).max(initial=0.0)
         described.append({})
-        for j, sensor in enumerate(task.sensors):
-            k = table.get((sensor.name, sensor.quantity))
-            if k is not None and _usual(run.z[:, line, k], least):
-                channel = described[g][j] = run.channels[k]
-                gain = warm_gain(channel, task.temperatures.get(run.run, np.nan))
-                z[data.run_index == g, j] = run.z[:, line, k] / gain
+        # in more than a share of the windows, and not zeros throughout
+        usable = (np.isfinite(phasors).mean(axis=0) > least) & np.nan_to_num(phasors).any(axis=0)
+        for j in np.flatnonzero(usable).tolist():
+            channel = described[g][j] = named[task.channels[j].name, task.channels[j].quantity]
+            gain = warm_gain(channel, task.temperatures.get(run.run, np.nan))
+            z[data.run_index == g, j] = phasors[:, j] / gain
     # channels that show nothing of what others of their quantity do
-    z[:, ~alive(task.sensors, np.abs(np.nan_to_num(z)).max(axis=0, initial=0.0))] = np.nan
+    z[:, ~alive(task.channels, np.abs(np.nan_to_num(z)).max(axis=0, initial=0.0))] = np.nan
     living = []
     for g, channels in enumerate(described):
         shown = np.isfinite(z[data.run_index == g]).any(axis=0)
         living.append(tuple(channels.get(j) if is_shown else None for j, is_shown in enumerate(shown)))
-    return z * _clock_turns(data, task), tuple(living)
-
-
-def _usual(values: ComplexArray, least: float) -> bool:
-    """Whether a channel has phasors in more than a share `least` of a run's windows, and not zeros throughout."""
-    finite = np.isfinite(values)
-    return bool(finite.mean() > least and np.abs(values[finite]).max(initial=0.0) > 0)
+    # how far the devices' clocks have run ahead
+    rates = [task.rates.get(sensor.clock, 0.0) for sensor in task.channels]
+    omega = 2 * np.pi * np.array([r.lines.driven[i] for r, i in zip(data.runs, data.lines)])
+    ahead = np.multiply.outer(omega[data.run_index] * _window_times(data), rates)
+    return z * np.exp(1j * ahead), tuple(living)
 
 
 def warm_gain(channel: Channel, temperature: float) -> float:
@@ -164,12 +154,8 @@ def warm_gain(channel: Channel, temperature: float) -> float:
 
 def vectors(z: ComplexArray, data: PointData, task: MeansTask) -> tuple[ComplexArray, ComplexArray]:
     """Displacement and oil force of channels' phasors (n, m), (n, 2) each, from the sensors that have one."""
-    plane = {q: plane_vector(task.along[task.of(q)], z[:, task.of(q)]) for q in QUANTITIES if len(task.of(q)) > 1}
-    force = plane["force"]
-    if "acceleration" in plane:
-        inertia = data.mass * plane["acceleration"]
-        force = force + np.where(np.isfinite(inertia), inertia, 0.0)
-    return plane["displacement"], force
+    inertia = np.nan_to_num(data.mass * task.plane("acceleration", z))
+    return task.plane("displacement", z), task.plane("force", z) + inertia
 
 
 def _window_times(data: PointData) -> FloatArray:
@@ -177,14 +163,7 @@ def _window_times(data: PointData) -> FloatArray:
     return np.concatenate([run.start + 0.5 * run.length for run in data.runs])
 
 
-def _clock_turns(data: PointData, task: MeansTask) -> ComplexArray:
-    """Unit phasors (n, m) that take off how far the devices' clocks have run ahead."""
-    rates = np.array([task.rates.get(sensor.device, 0.0) for sensor in task.sensors])
-    omega = 2 * np.pi * np.array([r.lines.excitation[i].frequency for r, i in zip(data.runs, data.lines)])
-    return np.asarray(np.exp(1j * np.multiply.outer(omega[data.run_index] * _window_times(data), rates)))
-
-
-def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[Condition, ...]]:
+def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, Conditions]:
     """Weights (n,) of all given windows, H (2, 2) and the start's conditions."""
     weights = np.zeros(len(table.valid))
     none = np.full((2, 2), np.nan + 0j)
@@ -200,7 +179,7 @@ def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[C
 
 def means_attenuation(means: WindowMeans, task: MeansTask) -> FloatArray:
     """Noise over total power of the displacements, (2,)."""
-    rows = task.of("displacement")
+    rows = task.pick("displacement")
     plane = np.linalg.pinv(task.along[rows])
     noise = plane @ means.noise[np.ix_(rows, rows)] @ plane.T
     return attenuation(means.mean[:, rows] @ plane.T, means.count, noise)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from tpjb_ident.phasors.run_phasors import PhasorSettings
+from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.presentation import changed
 
 #: Methods of ``estimators.csv``; ``"rlm:tukey"`` names a norm.

@@ -18,10 +18,9 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import holding, merged
-from tpjb_ident.phasors.channel_times import device_readers
-from tpjb_ident.phasors.found_lines import vertex
 from tpjb_ident.phasors.lines import SPEED_DRIFT
-from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_data import RunPhasors, device_readers
+from tpjb_ident.phasors.whole_record import vertex
 
 #: Seconds from the start that are looked at, and powers of two of samples, at least and at most.
 _LOOK, _LEAST_POWER, _MOST_POWER = 2.0, 13, 15
@@ -54,7 +53,13 @@ class SlowerChannel:
     export_rate: float
     order: int
 
-    def at(self, frequency: FloatArray) -> ComplexArray:
+    @property
+    def steps(self) -> int:
+        """Samples of the export a reading where that is a whole number, else zero."""
+        ratio = self.export_rate / self.rate
+        return round(ratio) if abs(ratio - round(ratio)) < _EVEN * ratio else 0
+
+    def at(self, frequency: FloatArray) -> ComplexArray | FloatArray:
         """What the filling does to a sine of `frequency` (n,) [Hz]: sinc^2 for lines, sinc and half a step for steps.
 
         Where the rates divide evenly the sums over the samples of a period take the place of the integrals.
@@ -62,15 +67,13 @@ class SlowerChannel:
         f = np.asarray(frequency, dtype=float)
         if self.order == 4:
             k = np.arange(1, _IMAGES)[:, None] * self.rate
-            return np.asarray(1 / (1 + ((f / (k - f)) ** 4 + (f / (k + f)) ** 4).sum(axis=0)), dtype=complex)
-        ratio = self.export_rate / self.rate
-        even = abs(ratio - round(ratio)) < _EVEN * ratio
-        small = np.sin(np.pi * f / self.export_rate) * round(ratio) if even else np.pi * f / self.rate
+            return 1 / (1 + ((f / (k - f)) ** 4 + (f / (k + f)) ** 4).sum(axis=0))
+        small = np.sin(np.pi * f / self.export_rate) * self.steps if self.steps else np.pi * f / self.rate
         gain = np.sin(np.pi * f / self.rate) / small
         if self.order == 2:
-            return np.asarray(gain**2, dtype=complex)
-        late = 0.5 / self.rate - (0.5 / self.export_rate if even else 0.0)
-        return np.asarray(gain * np.exp(-2j * np.pi * f * late))
+            return gain**2
+        late = 0.5 / self.rate - (0.5 / self.export_rate if self.steps else 0.0)
+        return gain * np.exp(-2j * np.pi * f * late)
 
     def images(self, frequencies: FloatArray) -> FloatArray:
         """Frequencies at which images of some lines stand in the export."""
@@ -115,10 +118,8 @@ def slower_channel(values: FloatArray, export_rate: float, speed: float = 0.0) -
         again = agreement[2 * k - 2 : 2 * k + 3]
         is_repeated = len(again) < 5 or again.max() >= 0.5 * agreement[k]
         if agreement[k] > max(_ABOVE * nearby, _AGREEMENT) and is_repeated and order is not None:
-            rate = _sharpened(agreement, chance, k) * export_rate / n
-            ratio = export_rate / rate
-            even = abs(ratio - round(ratio)) < _EVEN * ratio
-            return SlowerChannel(export_rate / round(ratio) if even else rate, export_rate, order)
+            slower = SlowerChannel(_sharpened(agreement, chance, k) * export_rate / n, export_rate, order)
+            return replace(slower, rate=export_rate / slower.steps) if slower.steps else slower
     return None
 
 
@@ -129,7 +130,7 @@ def _clean_stretch(values: FloatArray) -> FloatArray:
     usual = np.quantile(bend[np.isfinite(bend)], 0.99) if np.isfinite(bend).any() else 0.0
     bad[1:-1] |= bend > _GLITCH * usual
     edges = np.concatenate([[-1], np.flatnonzero(bad), [len(values)]])
-    longest = int(np.argmax(np.diff(edges)))
+    longest = np.argmax(np.diff(edges))
     return values[edges[longest] + 1 : edges[longest + 1]]
 
 
@@ -163,7 +164,7 @@ def _filling_order(size: FloatArray, k: int) -> int | None:
     f = f[k - f < len(size) - 1]
     if not len(f):
         return None
-    shown = float(np.median(np.log(size[k - f] / size[f]) / np.log(f / (k - f))))
+    shown = np.median(np.log(size[k - f] / size[f]) / np.log(f / (k - f)))
     order = min(_ORDERS, key=lambda n: abs(n - shown))
     return order if abs(shown - order) < _AGREE * order else None
 

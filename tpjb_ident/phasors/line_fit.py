@@ -2,6 +2,10 @@
 
 Convention: a channel is Re{ z exp(+i omega t) } with t = 0 at the start of the run, so that windows
 of one run are repeats of one phasor as long as the drive is locked to the recorder's clock.
+
+Glitches and gaps are told from the lines channel by channel: what is bad in a probe stays good in the cells. An
+isolated bad sample takes nothing with it; where several stand close together, it is a disturbance, and its flanks lie
+below the limit.
 """
 
 from __future__ import annotations
@@ -11,16 +15,80 @@ from typing import NamedTuple
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
-from tpjb_ident.phasors.bad_samples import (
-    BAD_LIMIT,
-    SCALE_LIMIT,
-    absolute_residual,
-    is_present,
-    robust_deviation,
-    usual_scale,
-    with_flanks,
-)
-from tpjb_ident.phasors.windows import line_design
+from rigdata.calibration import OVERFLOW
+from tpjb_ident.phasors.lines import line_design
+
+#: A residual is no smaller than this share of the largest: what stands still has none, and is not divided by.
+_ROUNDING = 1e-100
+#: A sample is bad beyond this many robust standard deviations of the fit's residual.
+BAD_LIMIT = 5.5
+#: A window this many times noisier than its run's median is looked at again.
+SCALE_LIMIT = 1.5
+#: So many bad samples with at most one good one between neighbours are a disturbance,
+_MANY = 3
+#: and take so many more on either side with them.
+_MARGIN = 3
+#: Change of a residual over the usual one at which least absolute deviations have settled.
+_SETTLED = 0.02
+_LAD_ROUNDS = 15
+
+
+def robust_deviation(residual: FloatArray) -> float:
+    """Standard deviation of a normal residual by its median size."""
+    return 1.4826 * float(np.median(np.abs(residual)))
+
+
+def white_noise(values: FloatArray) -> float:
+    """Standard deviation of the noise of single values (n,): steps, levels and ramps drop out of second differences."""
+    return robust_deviation(np.diff(values, 2)) / float(np.sqrt(6.0))
+
+
+def window_median(values: FloatArray, absent: float = np.nan) -> FloatArray:
+    """Median over the windows (n, m) that have a value, `absent` where none has, (m,)."""
+    present = np.isfinite(values)
+    ranked = np.sort(np.pad(np.where(present, values, np.inf), ((0, 1), (0, 0)), constant_values=np.inf), axis=0)
+    count, column = present.sum(axis=0), np.arange(values.shape[1])
+    middle = 0.5 * (ranked[(count - 1) // 2, column] + ranked[count // 2, column])
+    return np.where(count > 0, middle, absent)
+
+
+def usual_scale(scale: FloatArray) -> FloatArray:
+    """Median over the windows with a scale (n_windows, q); infinite where none has."""
+    return window_median(scale, np.inf)
+
+
+def is_present(values: FloatArray) -> BoolArray:
+    """Whether a reading is a value: finite, and no overflow mark; (n,)."""
+    with np.errstate(invalid="ignore"):  # a NaN compared is what "no value" looks like
+        return np.abs(values) < OVERFLOW
+
+
+def with_flanks(outlying: BoolArray) -> BoolArray:
+    """Bad samples: isolated ones by themselves, disturbances with their flanks; `outlying` (n,)."""
+    bad = np.array(outlying)
+    at = np.flatnonzero(outlying)
+    for group in np.split(at, np.flatnonzero(np.diff(at) > 2) + 1):
+        if len(group) >= _MANY:
+            bad[max(group[0] - _MARGIN, 0) : group[-1] + _MARGIN + 1] = True
+    return bad
+
+
+def absolute_residual(design: FloatArray, values: FloatArray) -> FloatArray:
+    """What least absolute deviations leave of some values (n,): a quarter of them may be wrong.
+
+    By reweighted normal equations: good enough for a first verdict on samples. `design` (n, n_columns).
+    """
+    weights, size = np.ones(len(values)), np.full(len(values), np.inf)
+    for _ in range(_LAD_ROUNDS):
+        weighted = design * weights[:, None]
+        solution = np.linalg.pinv(weighted.T @ design, rcond=1e-12, hermitian=True) @ (weighted.T @ values)
+        previous, size = size, np.abs(values - design @ solution)
+        middle = max(np.median(size), _ROUNDING * size.max(initial=0.0), np.finfo(float).tiny)
+        if np.abs(size - previous).max() <= _SETTLED * middle:
+            break  # nothing moves any more that could make a verdict
+        weights = 1 / np.maximum(size / middle, 0.1)
+    return size
+
 
 #: Outlying samples up to this share are few; a window that has lost more than the other gives no phasor.
 _FEW, _MAX_LOST = 0.1, 0.5
@@ -105,7 +173,10 @@ class LineFitter:
             is_good = ~gaps & (remainder <= BAD_LIMIT * scale[k])
             residual[k] = np.where(is_good, values[k] - self.design @ coefficients[k], 0.0)
         mean = coefficients @ self._level + offset[:, 0]
-        z = _phasors(coefficients.reshape(q, n, -1), self.frequencies, start)
+        # turned from the windows' own starts to that of the run
+        waves = coefficients[:, : 2 * len(self.frequencies)].reshape(q, n, -1)
+        turn = np.exp(-2j * np.pi * np.multiply.outer(start, self.frequencies))
+        z = np.ascontiguousarray(((waves[:, :, 0::2] + 1j * waves[:, :, 1::2]) * turn).transpose(1, 2, 0))
         figures = (np.ascontiguousarray(part.reshape(q, n).T) for part in (mean, scale, lost))
         return WindowFit(z, *figures), residual.reshape(q, n, -1)
 
@@ -183,21 +254,13 @@ def even_design(length: int, rate: float, frequencies: FloatArray, drift_order: 
     return design
 
 
-def _phasors(coefficients: FloatArray, frequencies: FloatArray, start: FloatArray) -> ComplexArray:
-    """From (q, n, n_columns) to phasors (n, n_lines, q), turned from the windows' own starts to that of the run."""
-    n = 2 * len(frequencies)
-    local = coefficients[:, :, 0:n:2] + 1j * coefficients[:, :, 1:n:2]
-    turn = np.exp(-2j * np.pi * np.multiply.outer(start, frequencies))
-    return np.ascontiguousarray((local * turn).transpose(1, 2, 0))
-
-
 def _level(design: FloatArray, frequencies: FloatArray, duration: float) -> FloatArray:
     """What the coefficients make of a window's mean, (n_columns,).
 
     A line that does not turn once in the window is part of it, and so is one that is no turn apart from such a line:
     their columns are told from a constant by their sum alone.
     """
-    weights = np.asarray(design.mean(axis=0))
+    weights = design.mean(axis=0)
     turns = np.sort(frequencies) * duration
     separate = turns[np.diff(turns, prepend=0.0) >= 1.0]
     is_resolved = frequencies * duration >= separate.min(initial=np.inf)

@@ -51,10 +51,10 @@ class NoiseModel:
     def slow_covariance(self, time: FloatArray, duration: FloatArray | None = None) -> FloatArray:
         """All but the white noise, (m, m); `time` (m,) [s]; of averages where `duration` (m,) [s] is given."""
         centred = time - np.mean(time)
-        bent = 2.0 * _BEND * (centred**2 - np.mean(centred**2)) / max(float(np.ptp(time)), 1e-300)
+        bent = 2.0 * _BEND * (centred**2 - np.mean(centred**2)) / max(np.ptp(time), 1e-300)
         drift = self.drift * np.column_stack([centred, bent])
         slow = self.flicker * flicker_kernel(time, duration) + drift @ drift.T
-        return np.asarray(slow + self.walk**2 * walk_kernel(time, duration))
+        return slow + self.walk**2 * walk_kernel(time, duration)
 
     def mean_variance(self, duration: float) -> float:
         """Variance of one average over `duration` seconds about the run's own level [m^2]."""
@@ -67,19 +67,19 @@ def walk_kernel(time: FloatArray, duration: FloatArray | None = None) -> FloatAr
 
     `time` (m,) [s], `duration` (m,) [s].
     """
-    span = max(float(np.ptp(time)), 1e-300)
+    span = max(np.ptp(time), 1e-300)
     share = (time - np.min(time)) / span
     square = 0.5 * share**2
     kernel = span * (1.0 / 3.0 + square[:, None] + square - np.maximum(share[:, None], share))
     # the later of two moments within an average comes a sixth of it after its middle
-    return np.asarray(kernel if duration is None else kernel - np.diag(duration / 6.0))
+    return kernel if duration is None else kernel - np.diag(duration / 6.0)
 
 
 def _walk_columns(time: FloatArray) -> FloatArray:
     """Columns (m, k) that sum up, with random factors, to a walk of one metre per square root of a second at `time`."""
-    span = max(float(np.ptp(time)), 1e-300)
+    span = max(np.ptp(time), 1e-300)
     waves = np.pi * np.arange(1, _WAVES + 1)
-    return np.asarray(np.cos((time[:, None] - np.min(time)) / span * waves) * np.sqrt(2.0 * span) / waves)
+    return np.cos((time[:, None] - np.min(time)) / span * waves) * np.sqrt(2.0 * span) / waves
 
 
 def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> FloatArray:
@@ -184,5 +184,5 @@ def _white_level(series: NoiseSeries) -> float:
     """Rough white level [m^2 s] from second differences of neighbouring blocks."""
     second = np.diff(series.values, 2) * np.sqrt(np.median(series.duration) / 6.0)
     # a noise-free record (a simulation): anything far below the signal will do
-    least = max(1e-6 * float(np.ptp(series.values)), 1e-15) ** 2 * np.median(series.duration)
+    least = max(1e-6 * np.ptp(series.values), 1e-15) ** 2 * np.median(series.duration)
     return float(max(np.median(second**2) / 0.455, least))

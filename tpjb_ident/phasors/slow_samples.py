@@ -6,8 +6,6 @@ what came before and the median of what comes after, give or take the noise; a m
 corners of every ramp.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -21,8 +19,8 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from rigdata.vector import directions
-from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.phasors.bad_samples import robust_deviation
+from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.phasors.line_fit import robust_deviation
 
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
 _SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch
@@ -55,16 +53,6 @@ def slow_samples(run: Run) -> tuple[FloatArray, FloatArray, FloatArray, BoolArra
     return slower.time, load, place, good_samples(np.hstack([load, place]), longest), slower.rate
 
 
-def _statistics(run: Run) -> dict[str, ChannelStatistics]:
-    """Statistics of every force and displacement channel."""
-    statistics: dict[str, ChannelStatistics] = {}
-    for name, channel in run.channels.items():
-        if channel.quantity in ("force", "displacement"):
-            statistics[name] = ChannelStatistics()
-            statistics[name].add(np.asarray(run.record(name).values))
-    return statistics
-
-
 def spare_slopes(run: Run, along: FloatArray) -> dict[str, FloatArray]:
     """By how much each live reading changes with the vector of its quantity along directions (k, 2), (k,) each.
 
@@ -85,7 +73,7 @@ def spare_slopes(run: Run, along: FloatArray) -> dict[str, FloatArray]:
     return slopes
 
 
-def refused_runs(problems: Sequence[Problem]) -> tuple[Condition, ...]:
+def refused_runs(problems: Sequence[Problem]) -> Conditions:
     """A condition that names the runs which were left out, with the first reason of each; none where all are used."""
     reasons = {str(problem.run): problem.what for problem in reversed(problems)}
     listed = "; ".join(f"{run} ({reasons[run]})" for run in sorted(reasons))
@@ -129,7 +117,7 @@ def _outside_both_medians(x: FloatArray, longest: int) -> BoolArray:
         _NOTHING,
     )
     beyond = np.maximum(np.minimum(before, after) - x, x - np.maximum(before, after))
-    return np.asarray(beyond > _THRESHOLD * noise)
+    return beyond > _THRESHOLD * noise
 
 
 def converter_step(x: FloatArray) -> tuple[float, float]:
@@ -154,7 +142,11 @@ def live_run(run: Run) -> Run:
     A force or displacement that stops in the middle of a staircase looks like a very stiff or very soft pivot: nothing
     in the curve itself gives it away, but readings without noise do.
     """
-    statistics = _statistics(run)
+    statistics: dict[str, ChannelStatistics] = {}
+    for name, channel in run.channels.items():
+        if channel.quantity in ("force", "displacement"):
+            statistics[name] = ChannelStatistics()
+            statistics[name].add(run.record(name).values)
     alive = [c for name, c in run.channels.items() if name not in statistics or not statistics[name].constant]
     used = {name: c for name, c in run.channels.items() if c in alive or not is_spare(c, alive)}
     if len(used) < len(run.channels):
@@ -162,10 +154,11 @@ def live_run(run: Run) -> Run:
     problems = []
     for quantity in ("force", "displacement"):
         alike = [name for name, c in run.channels.items() if c.quantity == quantity]
-        moving = [_repeated(statistics[name]) for name in alike if not statistics[name].constant]
-        if (
-            max(moving, default=0.0) <= _NOISE_FREE
-        ):  # else noise is below a converter's step, and standing still is usual
+        repeated = 0.0  # largest share of readings equal to the one before, apart from the longest stretch
+        for s in (statistics[name] for name in alike if not statistics[name].constant):
+            repeated = max(repeated, (s.repeats - s.longest_flat + 1) / max(s.values - s.longest_flat, 1))
+        # else noise is below a converter's step, and standing still is usual
+        if repeated <= _NOISE_FREE:
             problems += [_problem(run, name, statistics[name]) for name in alike if stands_still(statistics[name])]
     if problems:
         raise RigDataError(problems)
@@ -175,11 +168,6 @@ def live_run(run: Run) -> Run:
 def stands_still(statistics: ChannelStatistics) -> bool:
     """Whether the longest stretch of equal readings is longer than chance makes it."""
     return statistics.longest_flat >= max(_SHORTEST, _TIMES_EXPECTED * statistics.expected_flat())
-
-
-def _repeated(statistics: ChannelStatistics) -> float:
-    """Share of samples equal to the one before, apart from the longest stretch."""
-    return (statistics.repeats - statistics.longest_flat + 1) / max(statistics.values - statistics.longest_flat, 1)
 
 
 def _problem(run: Run, name: str, statistics: ChannelStatistics) -> Problem:
@@ -235,6 +223,6 @@ def _chance(channels: Sequence[Channel], rows: FloatArray, noise: FloatArray) ->
     design, residual = np.vstack(effects) / spread, (rows @ null.T).ravel() / spread[:, 0]
     best, _, rank, _ = np.linalg.lstsq(design, residual, rcond=None)
     # what no gain or angle whatever explains is noise: of probes that drift more than they seem to
-    inexplicable = float(np.sum((residual - design @ best) ** 2)) / max(len(residual) - rank, 1)
+    inexplicable = np.sum((residual - design @ best) ** 2) / max(len(residual) - rank, 1)
     covariance = design @ design.T + max(inexplicable, 1.0) * np.eye(len(residual))
     return float(special.chdtrc(len(residual), residual @ np.linalg.solve(covariance, residual)))

@@ -18,7 +18,7 @@ import numpy as np
 from scipy import ndimage
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
-from tpjb_ident.phasors.bad_samples import robust_deviation, white_noise
+from tpjb_ident.phasors.line_fit import robust_deviation, white_noise
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import piece_means
 

@@ -12,7 +12,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Run
 from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.vector import wrapped
-from tpjb_ident.phasors.bad_samples import robust_deviation
+from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import REMEDY, contradictions
 from tpjb_ident.pivot.dry_record import (

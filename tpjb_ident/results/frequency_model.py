@@ -2,6 +2,10 @@
 
 Chi-square says which of them the data support. A tilting-pad bearing owes neither: its pads are dynamic, and when
 K-C-M is refused too the raw H is the answer.
+
+Runs of one point that are wrong alike agree with one another; other frequencies tell, where the film is near K-C-M. A
+point stands apart where its own H, left free, makes far more of what K-C-M leaves go than one more power of frequency
+in every entry does, which has as many numbers: H of a film runs smoothly. Where pads bend it, little is told this way.
 """
 
 from collections.abc import Sequence
@@ -13,9 +17,11 @@ from scipy.special import chdtrc
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
+from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.errors import ArgumentError
-from tpjb_ident.estimate.shape import MODELS, power_columns
+from tpjb_ident.estimate.arrowhead import MODELS, NUMBERS, power_columns, remainder
 from tpjb_ident.estimate.statistics import half_width
+from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.point_result import PointResult, by_static_point
 from tpjb_ident.schema import KINDS
@@ -76,7 +82,7 @@ class FrequencyModel:
         """Dynamic stiffness of the model, (2, 2) or (n, 2, 2) [N/m]; `omega` (n,) [rad/s]."""
         K, C, M = (*self.parameters.reshape(-1, 2, 2), np.zeros((2, 2)))[:3]
         w = np.asarray(omega, dtype=float)[..., None, None]
-        return np.asarray(K - w**2 * M + 1j * w * C)
+        return K - w**2 * M + 1j * w * C
 
     def columns(self) -> dict[str, Any]:
         """What the tables say of the model, under `MODEL_COLUMNS`; zero what it does not have."""
@@ -127,7 +133,7 @@ def fit_over_frequency(
     if len(np.unique(omega)) < needed:
         raise ArgumentError(f"{model} needs {needed} frequencies with an answer, got {len(np.unique(omega))}")
     # Natural scales keep the normal equations well conditioned: per omega, per omega^2.
-    middle = float(np.sqrt(omega.min() * omega.max()))
+    middle = np.sqrt(omega.min() * omega.max())
     design = power_columns(omega / middle, MODELS[model])
     y, covariance = np.array([e.vector for e in chosen]), np.array([e.covariance for e in chosen])
     weight = np.linalg.inv(covariance)
@@ -139,8 +145,10 @@ def fit_over_frequency(
     residual = y - design @ (x / scale)
     chi_square = float(np.einsum("na,nab,nb->", residual, weight, residual))
     random = gains @ covariance @ gains.transpose(0, 2, 1)
+    variances = np.einsum("npp->np", random)
     spare, noise_dof = 8 * len(chosen) - len(x), [float(np.median(e.dof)) for e in chosen]
     lengths = np.linalg.norm(residual, axis=1) / np.linalg.norm(y, axis=1)
+    spread = np.sum(variances**2 / np.array(noise_dof)[:, None], axis=0)  # Welch and Satterthwaite
     shared = np.zeros((1, len(chosen), 8))
     if changes is not None:
         shared = changes.reshape(len(changes), -1, 8)[:, usable]
@@ -148,7 +156,7 @@ def fit_over_frequency(
         model,
         x,
         random.sum(axis=0),
-        _effective_dof(np.einsum("npp->np", random), np.array(noise_dof)),
+        np.where(spread > 0, variances.sum(axis=0) ** 2 / np.where(spread > 0, spread, 1.0), np.inf),
         _systematic(gains, np.array([e.systematic for e in chosen]), shared),
         chi_square,
         spare,
@@ -168,14 +176,7 @@ def _systematic(gains: FloatArray, systematic: FloatArray, changes: FloatArray) 
     # what no source explains is the point's own: of its baseline, of mains on the cells
     separate = systematic - np.einsum("qna,qnb->nab", changes, changes) / len(changes)
     single = (gains @ separate @ gains.transpose(0, 2, 1)).sum(axis=0)
-    return np.asarray(together.T @ together / len(changes) + single)
-
-
-def _effective_dof(variances: FloatArray, dof: FloatArray) -> FloatArray:
-    """Welch-Satterthwaite degrees of freedom (p,) of sums of variances (n, p) with `dof` (n,)."""
-    spread = np.sum(variances**2 / dof[:, None], axis=0)
-    total = variances.sum(axis=0) ** 2
-    return np.where(spread > 0, total / np.where(spread > 0, spread, 1.0), np.inf)
+    return together.T @ together / len(changes) + single
 
 
 @dataclass(frozen=True)
@@ -210,3 +211,66 @@ def fits_over_frequency(points: Sequence[PointResult], changes: FloatArray | Non
                     models[name] = replace(model, chi_square=np.nan, probability=np.nan, misfit=np.nan)
             fits.append(StaticFits(members, tuple(places), models))
     return fits
+
+
+#: Frequencies from which K-C-M leaves something over when one of them is free.
+_FREQUENCIES = 4
+#: Powers of frequency with one more than K-C-M in the real entries and in the imaginary ones.
+_SMOOTH = 5
+#: Share of H by which a point stands apart, at least: pads and pivots bend H over frequency by less.
+_NOTABLE = 0.03
+#: Distance from the nearest frequency up to which the others tell of a point, over their span.
+_REACH = 0.6
+#: Times as much as another power of frequency that the point's own H must make go, and as any other point's does.
+_CLEARLY, _ALONE = 25.0, 5.0
+
+
+def with_frequency_outliers(points: Sequence[PointResult]) -> tuple[PointResult, ...]:
+    """The points, each that stands apart from the other frequencies of its load with a condition and a wider interval.
+
+    Which of them is right nothing tells: a gain or a range that is off, or a film that does so.
+    """
+    result = list(points)
+    for places in by_static_point(points):
+        outlier = frequency_outlier([points[i].stiffness for i in places])
+        if outlier is not None:
+            k, distance = outlier
+            share = np.linalg.norm(distance) / np.linalg.norm(points[places[k]].stiffness.h)
+            others = f"the other {len(places) - 1} frequencies of this load"
+            doubt = Condition("frequency-outlier", f"h is {100 * share:.0f} % from what {others} let expect")
+            result[places[k]] = _widened(points[places[k]], CHANGE_AS_DEVIATION * distance, doubt)
+    return tuple(result)
+
+
+def _widened(point: PointResult, deviation: FloatArray, doubt: Condition) -> PointResult:
+    """The point, h by every method uncertain by a further source of one deviation (8,) [N/m]."""
+    covariance = np.outer(deviation, deviation)
+    by_method = dict(point.by_method)
+    for name, estimate in point.by_method.items():
+        by_method[name] = replace(estimate, systematic=estimate.systematic + covariance)
+    default = next(name for name, estimate in point.by_method.items() if estimate is point.stiffness)
+    quality, budget = merged(point.quality, (doubt,)), {**point.budget, "other frequencies": covariance}
+    return replace(point, stiffness=by_method[default], by_method=by_method, quality=quality, budget=budget)
+
+
+def frequency_outlier(estimates: Sequence[DynamicStiffness]) -> tuple[int, FloatArray] | None:
+    """Place of the estimate that stands apart, and its distance (8,) from the others' curve; None where none does."""
+    omega = np.array([e.omega for e in estimates])
+    if len(np.unique(omega)) < _FREQUENCIES:
+        return None
+    size = np.array([np.linalg.norm(e.h) for e in estimates])
+    y, root = np.array([e.vector for e in estimates])[:, :, None], np.eye(NUMBERS) / size[:, None, None]
+    noise = sum(np.trace(e.covariance) / s**2 for e, s in zip(estimates, size))
+    w = omega / np.exp(np.log(omega).mean())
+    smooth = np.sum(remainder(power_columns(w, _SMOOTH), y, root, slice(None)) ** 2) + noise
+    distance, rest = np.zeros((len(w), NUMBERS)), np.full(len(w), np.inf)
+    for k in range(len(w)):
+        others = np.arange(len(w)) != k
+        if np.abs(w[others] - w[k]).min() > _REACH * np.ptp(w[others]):
+            continue  # the others are too far off to tell
+        left = remainder(power_columns(w, MODELS["K-C-M"]), y, root, others)[:, :, 0]
+        distance[k], rest[k] = left[k], np.sum(left[others] ** 2) + noise
+    place, second = np.argsort(rest)[:2].tolist()
+    is_clear = _CLEARLY * rest[place] < smooth and _ALONE * rest[place] < rest[second]
+    is_apart = np.linalg.norm(distance[place]) > _NOTABLE and is_clear
+    return (place, distance[place] * size[place]) if is_apart else None

@@ -1,20 +1,21 @@
-"""Everything that was identified from a campaign, and how it becomes tables."""
+"""Everything that was identified from a campaign, points and bands, and how it becomes tables."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.operating_point import OperatingPoint
 from tpjb_ident.columns import amount, place_of
-from tpjb_ident.conditions import Condition, sentences
+from tpjb_ident.conditions import Conditions, sentences
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.presentation import Presented
-from tpjb_ident.results.frequency_model import MODEL_COLUMNS, StaticFits, fits_over_frequency
+from tpjb_ident.results.frequency_model import MODEL_COLUMNS, FrequencyModel, StaticFits, fits_over_frequency
 from tpjb_ident.results.point_result import PointResult, quality_cell
 from tpjb_ident.rounding import counted
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
@@ -22,7 +23,6 @@ from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.results.band_result import BandResult
 
 _WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_KEY)
 #: Of a coefficient in ``coefficients.csv``.
@@ -62,16 +62,16 @@ class Identification(Presented):
     campaign: str
     method: str
     points: tuple[PointResult, ...]
-    calibration_changes: FloatArray = field(repr=False)
-    conditions: tuple[Condition, ...] = ()
+    calibration_changes: FloatArray
+    conditions: Conditions = ()
     bands: tuple[BandResult, ...] = ()
-    calibration_names: tuple[str, ...] = field(default=(), repr=False)
-    cell_stiffness: tuple[float, float] | None = field(default=None, repr=False)
+    calibration_names: tuple[str, ...] = ()
+    cell_stiffness: tuple[float, float] | None = None
 
     @property
     def systematic(self) -> FloatArray:
         """Systematic covariance over all P points, (8 P, 8 P) [N^2/m^2]; made when asked for: it grows with P^2."""
-        joint = np.asarray(self.calibration_changes.T @ self.calibration_changes / len(self.calibration_changes))
+        joint = self.calibration_changes.T @ self.calibration_changes / len(self.calibration_changes)
         for p, point in enumerate(self.points):
             # what no point shares stands with its own alone
             joint[8 * p : 8 * p + 8, 8 * p : 8 * p + 8] = point.stiffness.systematic
@@ -227,3 +227,107 @@ def _budget_rows(p: PointResult) -> list[dict[str, Any]]:
 
 
 __all__ = ["Identification", "coefficient_columns"]
+
+
+_KEY_COLUMNS = (*STATIC_KEY, "excitation")
+_PARTS = [f"h{entry}_{part}_N_per_m" for part in ("real", "imag") for entry in ENTRIES]
+_FIGURES = (
+    "coherence_x",
+    "coherence_y",
+    "method",
+    "dof",
+    "n_records",
+    "n_averages",
+    "resolution_Hz",
+    "condition_number",
+    "quality",
+)
+_LINE_COLUMNS = (
+    *_KEY_COLUMNS,
+    "excitation_Hz",
+    *(name + ending for name in _PARTS for ending in ("", "_lo", "_hi", "_se", "_se_systematic")),
+    *_FIGURES,
+)
+_MODEL_COLUMNS = (*_KEY_COLUMNS, "model", "supported", "method", *MODEL_COLUMNS, "quality")
+
+
+@dataclass(frozen=True)
+class BandLine:
+    """One line of the band."""
+
+    frequency: float
+    by_method: dict[str, DynamicStiffness] = field(repr=False)
+    method: str
+    coherence: FloatArray  #: (2,): of the force along X and Y with the displacements
+    n_rows: int
+
+    @property
+    def stiffness(self) -> DynamicStiffness:
+        """By the method that counts."""
+        return self.by_method[self.method]
+
+
+@dataclass(frozen=True)
+class BandResult:
+    """Dynamic stiffness over a band at one operating point."""
+
+    point: OperatingPoint
+    kind: str
+    lines: tuple[BandLine, ...] = field(repr=False)
+    models: dict[str, FrequencyModel] = field(repr=False)
+    supported: str
+    quality: Conditions
+    runs: tuple[str, ...]
+    period: float | None
+    resolution: float
+    points: tuple[PointResult, ...] = field(default=(), repr=False)
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Of the lines, (n,) [Hz]."""
+        return np.array([line.frequency for line in self.lines])
+
+    @property
+    def h(self) -> ComplexArray:
+        """Dynamic stiffness over the lines, (n, 2, 2) [N/m]."""
+        return np.array([line.stiffness.h for line in self.lines]).reshape(-1, 2, 2)
+
+    @property
+    def method(self) -> str:
+        """The method that counts."""
+        return self.lines[0].method if self.lines else "none"
+
+    def half_width(self, level: float = 0.95) -> FloatArray:
+        """Half the interval of Re and Im of the four entries, (n, 8) [N/m]."""
+        return np.array([line.stiffness.half_width(level) for line in self.lines]).reshape(-1, 8)
+
+    def key(self) -> dict[str, Any]:
+        """Columns that name the result."""
+        return dict(zip(_KEY_COLUMNS, (*self.point.static_key, self.kind)))
+
+
+def frf_frame(results: Sequence[BandResult], every_method: bool = False) -> pd.DataFrame:
+    """One row per line, by the method that counts (``frf.csv``) or by every method (``frf_estimators.csv``)."""
+    import pandas as pd
+
+    rows = []
+    for result in results:
+        for line in result.lines:
+            chosen = line.by_method if every_method else {line.method: line.stiffness}
+            for name, est in chosen.items():
+                figures = [*line.coherence, name, float(np.min(est.dof)), len(result.runs), line.n_rows]
+                figures += [result.resolution, est.condition, quality_cell(result.quality)]
+                rows.append([*result.key().values(), line.frequency, *est.figures()[:, :5].ravel(), *figures])
+    return pd.DataFrame(rows, columns=_LINE_COLUMNS)
+
+
+def models_frame(results: Sequence[BandResult]) -> pd.DataFrame:
+    """One row per operating point and model: ``frf_models.csv``."""
+    import pandas as pd
+
+    rows = []
+    for result in results:
+        common = {**result.key(), "supported": result.supported, "method": result.method}
+        common["quality"] = quality_cell(result.quality)
+        rows += [{**common, "model": model.model, **model.columns()} for model in result.models.values()]
+    return pd.DataFrame(rows, columns=_MODEL_COLUMNS)

@@ -17,10 +17,10 @@ import numpy as np
 from scipy.special import stdtrit
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Condition, Conditions, holding
 from tpjb_ident.estimate.term import ALLOWED_CHANGE, CHANGE_BY_ORBIT, worth_stating
 from tpjb_ident.estimators.stiffness import DynamicStiffness
-from tpjb_ident.phasors.line_means import FilmLines
+from tpjb_ident.phasors.run_data import FilmLines
 from tpjb_ident.runs.point_data import PointData
 
 #: Runs of one direction must differ in amplitude by this factor to tell anything.
@@ -48,7 +48,7 @@ class AmplitudeSlope:
     standard_error: float = np.nan
     runs: int = 0
 
-    def condition(self) -> tuple[Condition, ...]:
+    def condition(self) -> Conditions:
         """What to say about it in the point's quality, where it is more than noise."""
         limit = -float(stdtrit(max(self.runs - 2, 1), SIGNIFICANCE / 2)) * self.standard_error
         change, error = 100 * self.stiffening, 100 * self.standard_error
@@ -64,8 +64,8 @@ def amplitude_slope(data: PointData, h: ComplexArray, weights: FloatArray) -> Am
             D, F = (np.average(z[places], axis=0, weights=weights[places]) for z in (data.D, data.F))
             fitted = h @ D
             excess = float((fitted.conj() @ (F - fitted)).real / np.linalg.norm(fitted) ** 2)
-            angle = round(float(np.degrees(run.direction)) % 180.0, 1)
-            groups.setdefault(angle, []).append((np.log2(float(np.linalg.norm(D))), excess))
+            angle = round(np.degrees(run.direction) % 180.0, 1)
+            groups.setdefault(angle, []).append((np.log2(np.linalg.norm(D)), excess))
     # Differences within a direction only: what a direction as a whole is off by is no amplitude effect.
     centred = [np.array(g) - np.mean(g, axis=0) for g in groups.values()]
     centred = [g for g in centred if np.ptp(g[:, 0]) > np.log2(MIN_RATIO)]
@@ -87,9 +87,9 @@ class FilmChange:
     hidden: float = np.inf  #: what could stay unseen of it
 
 
-def film_change(runs: Sequence[FilmLines], h: ComplexArray) -> FilmChange:
+def film_change(runs: Sequence[FilmLines | None], h: ComplexArray) -> FilmChange:
     """Share by which h (2, 2) [N/m] may be off through the amplitude of the motion, by its runs' lines."""
-    usable = [run for run in runs if run.force > 0] if np.isfinite(h).all() else []
+    usable = [run for run in runs if run is not None] if np.isfinite(h).all() else []
     sizes = {name: _size(usable, name, h) for name in ("2f", *_WEIGHTS)}
     rows = [weight * sizes[name] for name, weight in _WEIGHTS.items()]
     parts = np.array(rows if np.isfinite(sizes["3f"]).all() else [_SECOND * sizes["2f"] ** 2])
@@ -107,14 +107,14 @@ def _size(runs: Sequence[FilmLines], name: str, h: ComplexArray) -> FloatArray:
     """
     squares, noises = [], []
     for run in runs:
-        line = run.lines.get(name)
+        line = run.get(name)
         if line is None or not np.isfinite(line.force).all():
             continue
         stiffness = h.real + 1j * line.ratio * h.imag
-        noise = line.force_noise + float(np.linalg.norm(stiffness, 2)) ** 2 * line.displacement_noise
-        excess = float(np.sum(np.abs(line.force - stiffness @ line.displacement) ** 2))
-        squares.append((excess - noise) / run.force**2)
-        noises.append(noise / run.force**2)
+        noise = line.force_noise + np.linalg.norm(stiffness, 2) ** 2 * line.displacement_noise
+        excess = np.sum(np.abs(line.force - stiffness @ line.displacement) ** 2)
+        squares.append(excess - noise)
+        noises.append(noise)
     if 2 * len(squares) < len(runs) or not squares:
         return np.full(2, np.nan)
     return np.sqrt([max(float(np.median(squares)), 0.0), np.median(noises) / len(squares)])
@@ -126,15 +126,15 @@ def change_conditions(
     est: DynamicStiffness,
     amplitude: float,
     clearance: float | None,
-) -> tuple[Condition, ...]:
+) -> Conditions:
     """What to say of a point, by what its `budget` leaves of the change.
 
     A large motion alone is no fault where the harmonics show that the film answers it as a linear one.
     """
     uncertain = change.share
     if "amplitude" in budget:  # runs of several amplitudes may have told it
-        size = float(np.linalg.norm(est.h)) / np.sqrt(2)
-        uncertain = min(float(1.96 * np.sqrt(np.diag(budget["amplitude"]).max()) / size), uncertain)
+        size = np.linalg.norm(est.h) / np.sqrt(2)
+        uncertain = min((1.96 * np.sqrt(np.diag(budget["amplitude"]).max()) / size), uncertain)
     if uncertain > _REFUSED:
         text = "by what the film makes of the motion at multiples of its frequency, the coefficients may be off by"
         return (Condition("film-not-linear", f"{text} {100 * uncertain:.0f} %. Excite less"),)
@@ -144,7 +144,7 @@ def change_conditions(
     if amplitude > NEVER_LINEAR * clearance and not change.share:
         text = f"amplitude {share:.0f} % of the clearance without a harmonic of the film: check probes and clearance"
         return (Condition("large-amplitude", text),)
-    room = float(np.min(np.abs(est.half_width()[[0, 3]] / np.diag(est.h).real)))
+    room = np.min(np.abs(est.half_width()[[0, 3]] / np.diag(est.h).real))
     if change.hidden < room or uncertain < change.share:  # what stays unseen is less than the interval
         return ()
     text = f"amplitude {share:.1f} % of the clearance > 5 %, and no harmonic tells what it does"

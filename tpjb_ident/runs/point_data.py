@@ -1,15 +1,135 @@
-"""All windows of one operating point, gathered from its runs, and the film temperatures over them."""
+"""Finished runs of one identification, and all windows of one operating point, gathered from its runs.
 
-from collections.abc import Sequence
+What is kept of a run is small beside its records: some hundred bytes a window. A run with a damaged file or a dead
+channel says nothing, and nothing else suffers from that. A point keeps its answer as long as other runs excite it; one
+that loses all of its runs is told as lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
+from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.phasors.run_phasors import RunPhasors
-from tpjb_ident.runs.finished_runs import RunDigest
+from tpjb_ident.check.observation import Observation
+from tpjb_ident.columns import amount, place_of
+from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.phasors.run_data import FilmLines, RunPhasors, film_lines, mains_lines
+from tpjb_ident.rounding import listed
+
+#: Runs named one by one; more are counted.
+_LISTED = 6
+
+
+@dataclass(frozen=True, repr=False)
+class RunDigest:
+    """What a run says."""
+
+    phasors: RunPhasors  #: of its excitation lines alone
+    mains: ComplexArray | None  #: (2,) complex, m: displacement at the mains line, where it stands apart
+    mains_force: ComplexArray | None  #: (2,) complex, N: oil force at the mains line, where it stands apart
+    temperatures: dict[int, float]
+    harmonics: tuple[FilmLines | None, ...] = ()
+    sample_rate: float = 0.0
+    observations: tuple[Observation, ...] = ()
+
+    @property
+    def run(self) -> str:
+        """Name."""
+        return self.phasors.run
+
+    @property
+    def point(self) -> OperatingPoint:
+        """Set point."""
+        return self.phasors.point
+
+
+def digest(
+    phasors: RunPhasors,
+    temperatures: dict[int, float],
+    sample_rate: float = 0.0,
+    observations: tuple[Observation, ...] = (),
+) -> RunDigest:
+    """Sum up the phasors of all lines of a run that was recorded at `sample_rate` [Hz]."""
+    lines = len(phasors.lines.excitation)
+    excitation = replace(phasors, z=phasors.z[:, :lines].copy(), residual=phasors.residual[:lines])
+    return RunDigest(excitation, *mains_lines(phasors), temperatures, film_lines(phasors), sample_rate, observations)
+
+
+@dataclass(frozen=True)
+class ExcludedRun:
+    """A dynamic run that takes no part."""
+
+    run: str
+    point: OperatingPoint
+    error: Exception
+
+    @property
+    def reason(self) -> str:
+        """The first reason, in one line."""
+        return str(self.error).partition("\n")[0]
+
+    def belongs(self, point: OperatingPoint, any_excitation: bool) -> bool:
+        """Whether the run is one of an operating point, whatever the run's lines are or only at its set point."""
+        alike = self.point.static_key == point.static_key
+        return alike and (any_excitation or self.point.excitation_hz == point.excitation_hz)
+
+
+def without_runs(point: OperatingPoint, excluded: Sequence[ExcludedRun], any_excitation: bool) -> Conditions:
+    """What a point has to say of its runs that take no part."""
+    runs = [run.run for run in excluded if run.belongs(point, any_excitation)]
+    return holding((runs, "run-left-out", f"without {', '.join(runs)}, which cannot be used"))
+
+
+def excluded_runs(
+    excluded: Sequence[ExcludedRun], of: int, points: Sequence[OperatingPoint], any_excitation: bool
+) -> Conditions:
+    """Which of the campaign's `of` dynamic runs take no part, and why; which operating points have no run left."""
+    reasons = listed([f"{run.run} ({run.reason})" for run in excluded], _LISTED, "; ")
+    lost = [run for run in excluded if not any(run.belongs(point, any_excitation) for point in points)]
+    places = [place_of(run.point.static_load, run.point.excitation_hz) for run in lost]
+    if any_excitation:
+        places = [amount(run.point.static_load, "load") for run in lost]
+    runs = listed([run.run for run in lost], _LISTED)
+    return holding(
+        (excluded, "runs-left-out", f"{len(excluded)} of {of} dynamic runs take no part: {reasons}"),
+        (lost, "point-lost", f"no usable run at {'; '.join(dict.fromkeys(places))}: {runs}"),
+    )
+
+
+@dataclass(frozen=True)
+class FinishedRuns:
+    """All runs of a campaign, in its order: what they say, or why they take no part."""
+
+    outcomes: tuple[RunDigest | ExcludedRun, ...]
+
+    @property
+    def digests(self) -> list[RunDigest]:
+        """Of the runs that can be used."""
+        return [outcome for outcome in self.outcomes if isinstance(outcome, RunDigest)]
+
+    @property
+    def excluded(self) -> list[ExcludedRun]:
+        """Runs that take no part."""
+        return [outcome for outcome in self.outcomes if isinstance(outcome, ExcludedRun)]
+
+    def without(self, problems: Mapping[str, Problem]) -> FinishedRuns:
+        """The runs, those with an error of their own left out; raises the first error where none remains."""
+        outcomes: list[RunDigest | ExcludedRun] = []
+        for outcome in self.outcomes:
+            if isinstance(outcome, RunDigest) and outcome.run in problems:
+                outcome = ExcludedRun(outcome.run, outcome.point, RigDataError(problems[outcome.run]))
+            outcomes.append(outcome)
+        remaining = FinishedRuns(tuple(outcomes))
+        if outcomes and not remaining.digests:
+            raise remaining.excluded[0].error
+        return remaining
+
 
 #: Samples from which a run's temperatures are taken.
 _TEMPERATURE_SAMPLES = 2**17
@@ -30,17 +150,17 @@ class RunsOfPoint:
     @property
     def inertia(self) -> float:
         """Housing mass whose inertia stays in the cells' force [kg]: none where accelerometers measure it."""
-        return self.runs[0].housing_mass if self.runs[0].acceleration is None else 0.0
+        return 0.0 if self.runs[0].pick("acceleration") else self.runs[0].housing_mass
 
     @property
-    def mean_loads(self) -> FloatArray:
-        """Mean cell force of every run, shape (n_runs, 2) [N]."""
-        return np.array([finite_mean(run.cell_force.mean) for run in self.runs])
+    def mean_loads(self) -> ComplexArray:
+        """Mean cell force of every run, X + i Y, shape (n_runs,) [N]."""
+        return np.array([finite_mean(run.means("force")) @ [1.0, 1j] for run in self.runs])
 
     @property
     def mean_positions(self) -> FloatArray:
         """Mean displacement of every run, shape (n_runs, 2) [m]."""
-        return np.array([finite_mean(run.displacement.mean) for run in self.runs])
+        return np.array([finite_mean(run.means("displacement")) for run in self.runs])
 
 
 @dataclass(frozen=True)
@@ -117,7 +237,7 @@ def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> 
     """Windows of a point's runs, each with the line that is meant."""
     runs = tuple(run for run, _ in members)
     lines = tuple(i for _, i in members)
-    D = [run.displacement.phasors[:, i] for run, i in zip(runs, lines)]
+    D = [run.displacement[:, i] for run, i in zip(runs, lines)]
     F = [run.oil_force(i) for run, i in zip(runs, lines)]
     index = np.repeat(np.arange(len(runs)), [len(d) for d in D])
     return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), index)

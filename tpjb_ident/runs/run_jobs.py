@@ -1,30 +1,201 @@
-"""Turning all runs of a campaign to phasors: one job per run, wherever the workers are.
+"""Turning all runs of a campaign to phasors, one job per run, wherever the workers are; finished ones are kept.
 
-A job carries the run's description and reads the file itself, so that little travels out and a few phasors
-travel back.
+A job carries the run's description and reads the file itself, so that little travels out and a few phasors travel back.
+Finished runs are kept beside the results until all are done: a rerun after a kill goes on where it stopped.
+
+How a stale result is kept out: a kept run counts only if its fingerprint is found again. The fingerprint is the
+SHA-256 of everything that the run's phasors depend on: every stored byte of its record, its entry in the manifest
+with the calibration of all channels, the housing's mass, the settings, the limits of the checks, the versions of the
+numerical packages and the sources of the code that reads and fits. It is computed anew, from the files, for every run
+of a rerun (which is several times quicker than reading and fitting it); nothing is concluded from names, sizes or
+dates. A record that changes while it is read is not kept. Files are written whole or not at all, and one that cannot be
+read is no result. No pickles: a folder of results may come from anybody.
+
+The rig without its bearing is known from a dry shaker test. What hoses, seals and cables carry past the film is in
+the cells' force too. The campaign's `baseline` runs measure it, F = H_b D without oil; in the dynamic runs F = (H +
+H_b) D.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+import hashlib
+import json
+import shutil
+import zipfile
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
+from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.conditions import Condition, holding, merged
-from tpjb_ident.phasors.reading_cache import beginning_of, with_kept_beginning
-from tpjb_ident.phasors.run_data import RunPhasors
-from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.phasors.shaft import shaft_phases
-from tpjb_ident.phasors.windows import RecordTooShortError
-from tpjb_ident.runs.finished_runs import ExcludedRun, FinishedRuns, RunDigest, digest
-from tpjb_ident.runs.point_data import mean_temperatures, point_of
-from tpjb_ident.runs.run_store import RunStore, file_state, fingerprint
+from tpjb_ident.check.campaign import judged
+from tpjb_ident.check.findings import QUESTIONS, Finding, Reporter, Verdicts, reach, verdicts
+from tpjb_ident.check.observation import Observation, RecordLines, observe
+from tpjb_ident.conditions import Condition, Conditions, holding, merged
+from tpjb_ident.estimate.equation import RigStiffness
+from tpjb_ident.estimators.estimate import estimate_table
+from tpjb_ident.estimators.r_matrix import phasor_table
+from tpjb_ident.phasors.frequency import shaft_phases
+from tpjb_ident.phasors.lines import Line, LineSet, RecordTooShortError
+from tpjb_ident.phasors.run_data import (
+    FilmLine,
+    PhasorSettings,
+    RunPhasors,
+    beginning_of,
+    with_kept_beginning,
+)
+from tpjb_ident.phasors.run_phasors import run_phasors
+from tpjb_ident.runs.point_data import ExcludedRun, FinishedRuns, RunDigest, digest, gather, mean_temperatures, point_of
 from tpjb_ident.runtime.executors import Workers
+from tpjb_ident.runtime.provenance import sha256, source_stamp
+from tpjb_ident.runtime.tables import write_atomic
+
+#: What tells whether a file is still the one that was read: size, time of its last change [ns], node.
+FileState = tuple[int, int, int]
+#: What reading says of an entry that is cut off, or that somebody else wrote.
+_NOT_OURS = (
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    EOFError,
+    MemoryError,
+    RuntimeError,
+    zipfile.BadZipFile,
+)
+#: Classes that a result is made of, field by field, and series of values.
+_RECORDS = (
+    RunDigest, RunPhasors, OperatingPoint, LineSet, Line, FilmLine,
+    Observation, RecordLines, Reporter, Finding, Problem,
+)  # fmt: skip
+_MADE: dict[str, Any] = {kind.__name__: kind for kind in (*_RECORDS, tuple, list, set)}
+
+
+def file_state(path: Path) -> FileState | None:
+    """State of an ordinary file; None where there is none, or none that may be looked at."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return (status.st_size, status.st_mtime_ns, status.st_ino) if path.is_file() else None
+
+
+def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
+    """SHA-256 of everything that a run's phasors depend on; "" where its file is gone."""
+    reader: Any = run.reader
+    try:
+        record = reader.stored_hash() if hasattr(reader, "stored_hash") else sha256(reader.path)
+    except OSError:  # whoever reads it next says what is wrong with it
+        return ""
+    entry = (run.id, run.kind, run.point, run.excitation_direction, dict(run.channels), reader)
+    described = (dict(reader.channels), housing_mass, settings)
+    text = "\n".join([record, repr(entry), repr(described), repr(QUESTIONS), source_stamp()])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+class RunStore:
+    """A folder of finished runs."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def _file(self, run_id: str) -> Path:
+        return self.folder / f"{hashlib.sha256(run_id.encode()).hexdigest()[:32]}.npz"
+
+    def known(self, run_id: str) -> str:
+        """Fingerprint under which a run is kept, "" if it is not."""
+        stored = self._read(run_id)
+        return "" if stored is None else str(stored[0]["fingerprint"])
+
+    def _read(self, run_id: str) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
+        try:
+            # opened here: numpy leaves a file open that it cannot understand
+            with self._file(run_id).open("rb") as file, np.load(file, allow_pickle=False) as stored:
+                arrays = {name: stored[name] for name in stored.files}
+            meta = json.loads(str(arrays.pop("meta")))
+            if meta["run"] != run_id or not isinstance(meta["fingerprint"], str):
+                return None
+        except _NOT_OURS:
+            return None  # not there, cut off, or not ours: the run is simply done again
+        return meta, arrays
+
+    def keep(self, mark: str, result: RunDigest) -> None:
+        """Keep a finished run under its fingerprint `mark`."""
+        arrays: dict[str, Any] = {}
+        meta = {"fingerprint": mark, "run": result.run, "result": packed(result, arrays)}
+        text = np.array(json.dumps(meta))
+        with suppress(FileNotFoundError):  # another run into the same folder has ended and cleared it
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_atomic(self._file(result.run), lambda path: np.savez(path, meta=text, **arrays))
+
+    def load(self, run: Run, mark: str) -> RunDigest | None:
+        """Give a kept run back; None if it is not there, or not under this fingerprint."""
+        stored = self._read(run.id)
+        if not mark or stored is None or stored[0]["fingerprint"] != mark:
+            return None
+        try:
+            result = unpacked(stored[0]["result"], stored[1], run)
+        except _NOT_OURS:
+            return None
+        return result if isinstance(result, RunDigest) else None
+
+    def clear(self) -> None:
+        """Forget everything; the folder that it lies in goes too if nothing else is there."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+        with suppress(OSError):  # other results are in it
+            self.folder.parent.rmdir()
+
+
+def packed(value: Any, arrays: dict[str, Any]) -> Any:
+    """A value as JSON can hold it: what it is made of by the name of its class, its arrays in `arrays`.
+
+    Channels are those of the run, by name; of the run itself only the excitation is kept that was looked at.
+    """
+    kind = type(value).__name__
+    if isinstance(value, np.ndarray):
+        name = f"array {len(arrays)}"
+        arrays[name] = value
+        return {"array": name}
+    if isinstance(value, Condition):
+        return {"condition": [str(value), value.detail]}
+    if isinstance(value, Channel):
+        return {"channel": value.name}
+    if isinstance(value, Run):
+        return {"run": value.point.excitation}
+    if isinstance(value, dict):
+        return {"dict": [[key, packed(item, arrays)] for key, item in value.items()]}
+    if isinstance(value, tuple | list | set):
+        return {kind: [packed(item, arrays) for item in value]}
+    if is_dataclass(value):
+        return {kind: {f.name: packed(getattr(value, f.name), arrays) for f in fields(value)}}
+    return value
+
+
+def unpacked(stored: Any, arrays: dict[str, np.ndarray], run: Run) -> Any:
+    """What `packed` was given, of `run`."""
+    if not isinstance(stored, dict):
+        return stored
+    ((kind, content),) = stored.items()
+    if kind == "array":
+        return arrays[content]
+    if kind == "condition":
+        return Condition(*content)
+    if kind == "channel":
+        return run.channels[content]
+    if kind == "run":
+        return replace(run, point=replace(run.point, excitation=content))
+    if kind == "dict":
+        return {key: unpacked(item, arrays, run) for key, item in content}
+    if isinstance(content, list):
+        return _MADE[kind](unpacked(item, arrays, run) for item in content)
+    return _MADE[kind](**{name: unpacked(item, arrays, run) for name, item in content.items()})
+
 
 Progress = Callable[[str, int, int], None]
 #: Condition of a run whose accelerometer is dead.
@@ -102,7 +273,7 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDiges
         try:
             phasors = run_phasors(cached, housing_mass, settings)
         except RecordTooShortError as error:
-            raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
+            raise RecordTooShortError(f"run {run.id}: {error}") from error
         observations = _observed(run, cached, phasors)
         phasors, dead = _without_dead(phasors, observations[0])
         repairs = [f"{p.file}, {p.place}: {p.what}" for p in run.reader.problems() if p.severity == "warning"]
@@ -128,7 +299,7 @@ def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, 
     return tuple(observations)
 
 
-def _without_dead(phasors: RunPhasors, observation: Observation) -> tuple[RunPhasors, tuple[Condition, ...]]:
+def _without_dead(phasors: RunPhasors, observation: Observation) -> tuple[RunPhasors, Conditions]:
     """The run without spare channels that the checks call dead; refused with a dead probe or cell.
 
     What is said of a dead accelerometer: the run may do without.
@@ -150,3 +321,89 @@ def _without_dead(phasors: RunPhasors, observation: Observation) -> tuple[RunPha
     z, mean = phasors.z.copy(), phasors.mean.copy()
     z[:, :, spare], mean[:, spare] = np.nan, np.nan
     return replace(phasors, z=z, mean=mean), tuple(conditions)
+
+
+#: Runs that tell of the channels what dynamic runs cannot.
+_STATIC = ("dry_pivot", "clearance", "locus")
+_CONTRADICTED, _DOUBTFUL, _RUN_GAIN = "records-contradicted", "records-doubtful", "run-gain-off"
+
+
+def check_finished(campaign: Campaign, finished: FinishedRuns) -> tuple[FinishedRuns, Verdicts]:
+    """Judge all finished runs beside each other; those with an error of their own are left out."""
+    observed = [observation for digest in finished.digests for observation in digest.observations]
+    if not observed:  # runs that are no files
+        return finished, Verdicts()
+    result = campaign_verdicts(campaign, observed)
+    return finished.without(result.unusable), result
+
+
+def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -> Verdicts:
+    """What the checks say of dynamic runs, by run; static runs say what they show of the channels."""
+    static = [observe(run) for run in campaign.runs if run.kind in _STATIC]
+    reports = [observation.report for observation in judged(campaign, [*observations, *static])[0]]
+    reach(reports)
+    result = verdicts([report for report in reports if report.run.kind == "dynamic"])
+    for observation in static:
+        for i in observation.pick("displacement") if observation.run.kind == "clearance" else ():
+            result.swept[observation.run.id, observation.channels[i].name] = np.ptp(observation.spread[:, i]) / 2
+    # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
+    optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
+    for run, problems in result.shared.items():
+        result.doubtful.setdefault(run, []).extend(p for p in problems if p.place in optional)
+        problems[:] = [p for p in problems if p.place not in optional]
+    return result
+
+
+def check_conditions(result: Verdicts, runs: Iterable[str]) -> Conditions:
+    """What the checks say of one point."""
+    members = list(runs)
+    groups = ((_CONTRADICTED, result.shared), (_DOUBTFUL, result.doubtful), (_RUN_GAIN, result.run_gains))
+    by_name = ((name, [p for run in members for p in by_run.get(run, ())]) for name, by_run in groups)
+    return tuple(Condition(name, _sentence(problems)) for name, problems in by_name if problems)
+
+
+def _sentence(problems: list[Problem]) -> str:
+    """The first finding; how many more there are."""
+    different = list(dict.fromkeys(f"{p.place} {p.what}".strip() for p in problems))
+    first = f"{problems[0].run}: {different[0]}" if problems[0].run else different[0]
+    more = f"; and {len(different) - 1} more (see tpjb check)" if len(different) > 1 else ""
+    return f"{first}{more}. {problems[0].cure}"
+
+
+@dataclass(frozen=True, repr=False)
+class DryTest:
+    """What a campaign's dry shaker test says."""
+
+    stiffness: RigStiffness = field(default_factory=RigStiffness)
+    conditions: Conditions = ()  #: where no run gives an answer
+
+    def missing(self, omega: float) -> Conditions:
+        """Say where a campaign has baseline runs, but no answer of theirs at `omega` [rad/s]."""
+        if self.stiffness.known(np.array([omega]))[0]:
+            return ()
+        if not len(self.stiffness.omega):
+            return self.conditions
+        low, high = self.stiffness.omega[[0, -1]] / (2 * np.pi)
+        text = f"measured from {low:g} to {high:g} Hz: at this excitation the rig's own stiffness is still inside"
+        return (Condition("baseline-missing", text),)
+
+
+def dry_test(campaign: Campaign, settings: PhasorSettings, method: str) -> DryTest:
+    """Dry test of a campaign from its baseline runs."""
+    runs = campaign.of_kind("baseline")
+    if not runs:
+        return DryTest()
+    for run in runs:
+        errors = [f.problem for f in observe(run).report.findings if f.problem.severity == "error"]
+        if errors:  # clipped or dead: there is no dry test without its channels
+            raise RigDataError(errors)
+    points = gather([run_phasors(run, campaign.housing_mass, settings) for run in runs])
+    estimates = [estimate_table(phasor_table(p.D, p.F, p.run_index), p.omega, method) for p in points]
+    good = sorted((est for est in estimates if np.isfinite(est.covariance).all()), key=lambda est: est.omega)
+    bad = [f"{est.omega / (2 * np.pi):g} Hz" for est in estimates if not np.isfinite(est.covariance).all()]
+    text = f"the baseline runs at {', '.join(bad)} give no answer: two directions are needed"
+    conditions = holding((bad, "baseline-missing", text))
+    if not good:
+        return DryTest(conditions=conditions)
+    parts = (np.array([getattr(est, name) for est in good]) for name in ("omega", "h", "covariance"))
+    return DryTest(RigStiffness(*parts), conditions)

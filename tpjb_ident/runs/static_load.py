@@ -21,8 +21,8 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
 from tpjb_ident.check.set_points import without_static_part
-from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.blocks import Sensor
+from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.estimate.equation import Sensor
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.runs.point_data import RunsOfPoint
@@ -63,7 +63,7 @@ class StaticLoads:
     zero: complex = 0j  #: N: what the cells read at no load
     zero_error: float = 0.0
 
-    def conditions(self, point: int) -> tuple[Condition, ...]:
+    def conditions(self, point: int) -> Conditions:
         """What to say of one point."""
         size, angle = abs(self.zero), np.degrees(np.angle(self.zero))
         text = f"over the loads of the campaign the cells' mean holds a constant of {size:.0f} N at {angle:.0f} deg "
@@ -88,22 +88,12 @@ def static_loads(campaign: Campaign, points: Sequence[RunsOfPoint]) -> StaticLoa
     """Zero of the cells, and the misses of all runs of a campaign's points."""
     stated = max((c.zero_uncertainty for c in campaign.channels.values() if c.quantity == "force"), default=0.0)
     set_points = np.concatenate([np.full(len(data.mean_loads), _set_point(data)) for data in points])
-    zero, error = cell_zero(np.concatenate([_measured(data) for data in points]), set_points, stated)
+    zero, error = cell_zero(np.concatenate([data.mean_loads for data in points]), set_points, stated)
     return StaticLoads(*load_misses(points, zero), zero, error)
-
-
-def _measured(data: RunsOfPoint) -> ComplexArray:
-    return np.asarray(data.mean_loads @ [1.0, 1j])
 
 
 def _set_point(data: RunsOfPoint) -> complex:
     return complex(data.point.static_load * np.exp(1j * data.point.static_load_direction))
-
-
-def _ratio(data: RunsOfPoint, zero: complex) -> ComplexArray:
-    """Cells over set point of every run (n_runs,): size and direction; NaN without a load."""
-    set_point = _set_point(data)
-    return np.asarray((_measured(data) - zero) / set_point if set_point else _measured(data) * np.nan)
 
 
 def load_misses(points: Sequence[RunsOfPoint], zero: complex = 0.0) -> tuple[list[ComplexArray], complex]:
@@ -112,7 +102,10 @@ def load_misses(points: Sequence[RunsOfPoint], zero: complex = 0.0) -> tuple[lis
     The ratio is the mean of the runs about the half that agrees best; of two such halves the one nearer to the set
     points. Cells that show no static force have none: it is zero then.
     """
-    ratios = [_ratio(data, zero) for data in points]
+    ratios = []  # size and direction; NaN without a load
+    for data in points:
+        set_point = _set_point(data)
+        ratios.append((data.mean_loads - zero) / set_point if set_point else data.mean_loads * np.nan)
     measured = np.concatenate(ratios)
     measured = measured[np.isfinite(measured)]
     common = _common_ratio(measured) if len(measured) else complex(1.0)
@@ -129,12 +122,12 @@ def _common_ratio(ratios: ComplexArray) -> complex:
     middles = ratios[:: 1 + len(ratios) // _MIDDLES]
     reach = np.sort(np.abs(middles[:, None] - ratios), axis=1)[:, half]
     # groups of runs that each agree among themselves are as good as one another
-    alike = np.flatnonzero(reach <= max(2 * float(reach.min()), _ONE_HALF))
+    alike = np.flatnonzero(reach <= max(2 * reach.min(), _ONE_HALF))
     place = alike[np.argmin(np.abs(middles[alike] - 1))]
     return complex(ratios[np.abs(ratios - middles[place]) <= 4 * reach[place] + 1e-12].mean())
 
 
-def load_conditions(miss: ComplexArray, common: complex) -> tuple[Condition, ...]:
+def load_conditions(miss: ComplexArray, common: complex) -> Conditions:
     """Loads that are off by more than scatter, and what all runs share: a gain of the cells, or what no gain explains.
 
     `miss` (n,): of a point's runs.
@@ -180,7 +173,7 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, uncertainty: float 
     size = np.abs(x)
     design, shares = np.stack([x, np.ones_like(x)], axis=1) / size[:, None], y / size
     values, weights, _, _ = reweighted(design, shares, lambda u: huber_weight(u, _BEND), most=_ROUNDS)
-    spread = float(np.sum(weights * np.abs(shares - design @ values) ** 2) / max(float(weights.sum()) - 2.0, 1.0))
+    spread = np.sum(weights * np.abs(shares - design @ values) ** 2) / max(weights.sum() - 2.0, 1.0)
     covariance = np.linalg.inv((design * weights[:, None]).conj().T @ design).real * spread
     zero, error = complex(values[1]), float(np.sqrt(covariance[1, 1]))
     is_clear = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()

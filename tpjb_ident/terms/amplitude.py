@@ -8,11 +8,9 @@ it is considered, and what the harmonics let expect goes into the interval.
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.arrowhead import NUMBERS
-from tpjb_ident.estimate.blocks import Blocks, Rig, totals
-from tpjb_ident.estimate.equation import State, entry_changes, entry_sizes
-from tpjb_ident.estimate.shape import real_numbers
+from tpjb_ident.conditions import Condition, Conditions
+from tpjb_ident.estimate.arrowhead import NUMBERS, real_numbers
+from tpjb_ident.estimate.equation import Blocks, Rig, State, entry_changes, entry_sizes, totals
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION, FilmTerm, Fitted, numbered
 
 #: Name of the condition where the runs tell G.
@@ -43,7 +41,7 @@ class Amplitude(FilmTerm):
             place = f"{blocks.points[p].static_load:g} N, {blocks.points[p].excitation_hz:g} Hz"
             self.parameters += numbered(place, "1", [CHANGE_AS_DEVIATION * float(blocks.bent[p])] * NUMBERS)
 
-    def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> tuple[Condition, ...]:
+    def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> Conditions:
         """What to say where the runs of a point tell G; `h` (2, 2) [N/m]."""
         if point not in self.points:
             return ()
@@ -52,7 +50,7 @@ class Amplitude(FilmTerm):
         if not fitted.estimated[part].any():
             return ()
         entries = real_numbers(h)
-        share = float(np.linalg.norm(fitted.value[part] * entries) / np.linalg.norm(entries))
+        share = np.linalg.norm(fitted.value[part] * entries) / np.linalg.norm(entries)
         text = f"h at the runs' mean amplitude differs by {100 * share:.1f} % from that at none"
         return (Condition(ZERO_AMPLITUDE, f"{text}; K and C are those at none, by the runs' several amplitudes"),)
 

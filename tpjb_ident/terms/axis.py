@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State
+from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.term import Additive, Parameter
 
 

@@ -3,10 +3,8 @@
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.estimate.arrowhead import NUMBERS
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State
-from tpjb_ident.estimate.shape import complex_matrix
+from tpjb_ident.estimate.arrowhead import NUMBERS, complex_matrix
+from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.term import FilmTerm, numbered
 
 

@@ -6,8 +6,8 @@ A clock exists between devices only. Whatever phases do within one device, its c
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter
 
 #: Devices with clocks of their own start together to half a sample at best; as a standard deviation of samples.
@@ -27,13 +27,11 @@ class Clock(Factor):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        devices = list(dict.fromkeys(sensor.device for sensor in rig.sensors))[1:]
+        devices = list(dict.fromkeys(sensor.clock for sensor in rig.sensors))[1:]
         self._devices = devices
         self._taken_off = np.array([rig.rates.get(device, 0.0) for device in devices])
         self.parameters = tuple(Parameter(device or "records", "100 ppm", _QUARTZ) for device in devices)
-        self.sensors = np.array(
-            [[sensor.device == device for device in devices] for sensor in rig.sensors], dtype=float
-        )
+        self.sensors = np.array([[sensor.clock == device for device in devices] for sensor in rig.sensors], dtype=float)
 
     def rates(self, value: FloatArray) -> dict[str, float]:
         """Rates by device, relative."""
@@ -46,9 +44,9 @@ class Clock(Factor):
     def slope_columns(self, blocks: Blocks, reading: ComplexArray) -> ComplexArray:
         """-i omega times the reading, per 100 ppm."""
         turned = -1j * _UNIT * blocks.omega[:, None] * reading
-        return np.asarray(turned[:, :, None] * self.sensors)
+        return turned[:, :, None] * self.sensors
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """Rates that stand clear of their errors."""
         clear = np.abs(self._total(fitted)) > _CLEAR * fitted.deviation
         rates = ", ".join(self.words(fitted))
@@ -64,4 +62,4 @@ class Clock(Factor):
         )
 
     def _total(self, fitted: Fitted) -> FloatArray:
-        return np.asarray(fitted.value + self._taken_off / _UNIT)
+        return fitted.value + self._taken_off / _UNIT

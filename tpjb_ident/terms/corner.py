@@ -11,9 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
-from tpjb_ident.estimate.equation import State
+from tpjb_ident.conditions import Condition, Conditions
+from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, State
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter
 
 #: Standard errors from which a corner is negative.
@@ -50,7 +49,7 @@ class Corner(Factor):
             return None
         return tuple(replace(s, out_of_step=s.quantity == "acceleration") for s in sensors)
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """Accelerometers whose corner would have to be negative: something else turns them, no filter does."""
         for parameter, value, error in zip(self.parameters, fitted.value, fitted.deviation):
             if parameter.name == "accelerometers" and value < -_CLEAR * error:

@@ -7,8 +7,8 @@ cells from accelerometers (a spring knows no phase); probes against cells only a
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, exceeding
 
 _MILLISECOND = 1e-3
@@ -25,7 +25,7 @@ class Delay(Factor):
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
         self._omega = blocks.usual_omega
-        devices = np.array([sensor.device or sensor.quantity for sensor in rig.sensors])
+        devices = np.array([sensor.clock or sensor.quantity for sensor in rig.sensors])
         deviation = np.array([sensor.delay_uncertainty for sensor in rig.sensors])
         names = list(dict.fromkeys(devices[deviation > 0].tolist()))
         self.sensors = ((devices[:, None] == np.array(names, dtype=str)) & (deviation[:, None] > 0)).astype(float)
@@ -36,7 +36,7 @@ class Delay(Factor):
         """-i omega, per ms."""
         return np.asarray(-1j * _MILLISECOND * blocks.omega)
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""
         if self.rig.out_of_step:
             late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)

@@ -12,8 +12,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.estimate.arrowhead import NUMBERS
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, entry_changes, entry_sizes, film_force_rows
+from tpjb_ident.estimate.equation import Blocks, Rig, State, entry_changes, entry_sizes, film_force_rows
 from tpjb_ident.estimate.noise import scatter_patterns
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION, FilmTerm, numbered, worth_stating
 

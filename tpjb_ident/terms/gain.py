@@ -3,8 +3,8 @@
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
+from tpjb_ident.conditions import Condition, Conditions
+from tpjb_ident.estimate.equation import Blocks, Rig, Sensor
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
 
 #: Difference of gains beyond any calibration: an axis, a sign or a cable is wrong.
@@ -52,7 +52,7 @@ class Gain(Factor):
         differing = {quantities[k] for k in exceeding(fitted, self.parameters)}
         return {name: [float(v) for v, q in zip(fitted.value, quantities) if q == name] for name in differing}
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """Sensors that differ from the others beyond what is stated."""
         outliers = [self.parameters[k].name for k in exceeding(fitted, self.parameters)]
         if not outliers:

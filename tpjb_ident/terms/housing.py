@@ -11,9 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, film_force, vector
-from tpjb_ident.estimate.equation import State, housing_rows
+from tpjb_ident.conditions import Condition, Conditions
+from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, State, film_force, housing_rows, vector
 from tpjb_ident.estimate.term import OUT_OF_STEP, Fitted, Parameter, Term
 
 _NANOMETRE = 1e-9
@@ -103,10 +102,10 @@ class Housing(Term):
         """What every block's cells, or probes where the housing floats, let the accelerometers show, (n, 2) [m/s^2]."""
         square = (blocks.omega**2)[:, None]
         if self.rig.mount == "cells":
-            return np.asarray(-square * vector(self.rig, blocks, "force") @ _compliance(fitted.value))
+            return -square * vector(self.rig, blocks, "force") @ _compliance(fitted.value)
         kappa, compliance = _kappa(fitted.value)
         moved = vector(self.rig, blocks, "displacement") @ kappa.T
-        return np.asarray(square * (moved + film_force(self.rig, blocks) @ compliance))
+        return square * (moved + film_force(self.rig, blocks) @ compliance)
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """In the housing's own rows, which are linear in every single parameter."""
@@ -120,7 +119,7 @@ class Housing(Term):
             columns[:, m:, k] = np.einsum("nij,nj->ni", (rows[0] - rows[1]) / 2, state.u)
         return columns
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
         if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return ()
@@ -131,7 +130,7 @@ class Housing(Term):
             return tuple(condition for condition in conditions if condition != OUT_OF_STEP)
         return self.rig.contradicted.get(self.name) or conditions
 
-    def _shown(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def _shown(self, fitted: Fitted) -> Conditions:
         """What these numbers say of the accelerometers."""
         share = f"inertia is {100 * self._inertia:.2g} % of the force"
         if self._is_unexplained(fitted) and fitted.unexplained * self._inertia > HARMLESS:
@@ -145,7 +144,7 @@ class Housing(Term):
             return (Condition("accelerometers-contradict-cells", f"{text}; {share}"),)
         return _out_of_step(lag, fitted.deviation[-1], "probes", self._omega)
 
-    def _standing(self, fitted: Fitted, share: str) -> tuple[Condition, ...]:
+    def _standing(self, fitted: Fitted, share: str) -> Conditions:
         """Of accelerometers on a housing on springs; `share`: words for the inertia."""
         (xx, yy, xy, loss), error = fitted.value, fitted.deviation
         faults = []
@@ -223,7 +222,7 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
             low += [support] if 4 * place <= len(usable) else []
             left += float(np.linalg.norm(shown - pushes @ support)) ** 2 * len(pushes) / (len(pushes) - 3)
             judged += float(np.linalg.norm(shown)) ** 2
-    if supports < 2 or not judged > 0.5 * float(np.linalg.norm(np.nan_to_num(acceleration))) ** 2:
+    if supports < 2 or not judged > 0.5 * np.linalg.norm(np.nan_to_num(acceleration)) ** 2:
         return not (blocks.windows > 1).any()
     if not left < _LEFT**2 * judged:
         return False
@@ -257,20 +256,20 @@ def _shaft_compliance(rig: Rig, blocks: Blocks) -> float:
 
 def _otherwise(fitted: Fitted, least: float) -> str:
     """How accelerometers of a floating stator differ from its probes, if by more than `least` and chance."""
-    kappa, error = fitted.value[:4].reshape(2, 2), float(fitted.deviation[:4].max())
+    kappa, error = fitted.value[:4].reshape(2, 2), fitted.deviation[:4].max()
     limit = least + 3 * error
     turn = (kappa[1, 0] - kappa[0, 1]) / 2
     if abs(turn) > limit:
         return f"they are turned by {np.degrees(np.arctan2(turn, 1 + np.trace(kappa) / 2)):.0f} deg against the probes"
     stretch, axes = np.linalg.eigh((kappa + kappa.T) / 2)
-    k = int(np.abs(stretch).argmax())
+    k = np.abs(stretch).argmax()
     if abs(stretch[k]) <= limit:
         return ""
     along = np.degrees(np.arctan2(axes[1, k], axes[0, k])) % 180
     return f"they show {1 + stretch[k]:.2f} times the motion along {along:.0f} deg that the probes show"
 
 
-def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> tuple[Condition, ...]:
+def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> Conditions:
     """Accelerometers against the sensors that tell the housing's motion: `phase` [rad] by which they lag."""
     if abs(phase) < _LOSS + 3 * error:
         return ()

@@ -7,8 +7,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.estimate.arrowhead import NUMBERS
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, entry_changes
+from tpjb_ident.estimate.equation import Blocks, Rig, State, entry_changes
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.estimate.term import FilmTerm, Fitted, Parameter, numbered
 from tpjb_ident.terms.load_turn import PLAUSIBLE, LoadTurn
@@ -60,5 +59,5 @@ def _mean_error(misses: FloatArray) -> float:
     """Deviation of what some runs miss together, by how their misses (n,) differ, of few runs by Student's t."""
     n = max(len(misses), 1)
     spare = _FREEDOM + n - 1
-    variance = (_FREEDOM * _USUAL**2 + float(np.sum((misses - misses.mean()) ** 2))) / spare
+    variance = (_FREEDOM * _USUAL**2 + np.sum((misses - misses.mean()) ** 2)) / spare
     return math.sqrt(variance / n) * student_widening(spare)

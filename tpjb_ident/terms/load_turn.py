@@ -14,8 +14,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.estimate.arrowhead import NUMBERS
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, entry_changes
+from tpjb_ident.estimate.equation import Blocks, Rig, State, entry_changes
 from tpjb_ident.estimate.term import FilmTerm, numbered
 
 #: Plausible of a bearing: relative slope [1/rad], and its change per unit of ln W, one standard deviation.

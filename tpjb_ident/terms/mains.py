@@ -15,7 +15,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.shape import complex_matrix, real_numbers
+from tpjb_ident.estimate.arrowhead import complex_matrix, real_numbers
 
 MAINS_ON_LINE = "mains on excitation line"
 MAINS_CORRECTED = "mains corrected"
@@ -93,7 +93,7 @@ class MainsEquations:
 
     def vectors(self, x: FloatArray) -> ComplexArray:
         """Disturbance of every run in X, Y, (g, 2) [m]; `x` (8 + g m,)."""
-        return np.asarray(np.exp(1j * x[8:].reshape(len(self.D), -1)) @ self.patterns)
+        return np.exp(1j * x[8:].reshape(len(self.D), -1)) @ self.patterns
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Weighted residuals, (4 g,); `x` (8 + g m,)."""
@@ -123,7 +123,7 @@ class MainsEquations:
     def _angles(self, h: ComplexArray) -> FloatArray:
         """Angles for given H, batched: (..., 2, 2) -> (..., g, m)."""
         remaining = self.D - self.F @ np.swapaxes(np.linalg.inv(h), -1, -2)
-        return np.asarray(np.angle(remaining @ np.linalg.pinv(self.patterns)))
+        return np.angle(remaining @ np.linalg.pinv(self.patterns))
 
     def solve(self) -> list[Minimum]:
         """Distinct minima, best first.
@@ -139,7 +139,7 @@ class MainsEquations:
             if fit.status <= 0 or any(np.abs(fit.x[:8] - m.x[:8]).max() < 1e-5 for m in minima):
                 continue
             normal = fit.jac.T @ fit.jac
-            log_volume = -0.5 * float(np.linalg.slogdet(normal)[1])
+            log_volume = -0.5 * np.linalg.slogdet(normal)[1]
             if not np.isfinite(log_volume):
                 continue  # a valley without a floor: these runs leave H open there
             covariance = np.linalg.pinv(normal)[:8, :8] * self.scale**2

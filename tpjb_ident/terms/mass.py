@@ -9,11 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.arrowhead import NUMBERS
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State
-from tpjb_ident.estimate.shape import MODELS, power_columns, real_numbers, remainder
+from tpjb_ident.conditions import Condition, Conditions
+from tpjb_ident.estimate.arrowhead import MODELS, NUMBERS, power_columns, real_numbers, remainder
+from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION, Additive, Fitted, Parameter
 
@@ -43,7 +41,7 @@ class Mass(Additive):
         heavier = replace(self.rig, mass=2 * self.rig.mass)
         return (state.reading(heavier, blocks) - state.reading(self.rig, blocks))[:, :, None]
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """What the frequencies said of it."""
         return self.rig.contradicted.get(self.name, ())
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.shape import Shape
+from tpjb_ident.estimate.arrowhead import Shape
+from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.estimate.term import Term
 from tpjb_ident.terms.amplitude import Amplitude

@@ -7,7 +7,7 @@ the lines of a run have it in common, and only its size among the runs tells how
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter
 
 #: Degrees of freedom below which the runs tell nothing of their scatter.
@@ -46,12 +46,12 @@ class RunGain(Factor):
         prior = np.array([p.deviation for p in self.parameters])
         share = np.clip(1 - (fitted.deviation / prior) ** 2, 0.0, 1.0)
         expected = np.array([by_load[self._first[r]] for r, _ in self._places])
-        freedom = float(share.sum()) / len(self.rig.of("force"))  # a warmer film moves all cells of a run alike
+        freedom = share.sum() / len(self.rig.of("force"))  # a warmer film moves all cells of a run alike
         size, counted = usual
         usual_variance = counted / (counted + freedom) * size**2
         if freedom < _LEAST:
             return size, np.inf
-        shown = max(float(np.sum(fitted.value**2 - share * expected**2)) / float(share.sum()), 0.0)
+        shown = max(np.sum(fitted.value**2 - share * expected**2) / share.sum(), 0.0)
         return float(np.sqrt(shown + usual_variance)), freedom * (
             (shown + usual_variance) / max(shown, 1e-3 * usual_variance)
         ) ** 2

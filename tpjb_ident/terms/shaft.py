@@ -7,8 +7,7 @@ drive stands otherwise against the shaft tell it from the motion.
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State
+from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.term import Additive, Parameter
 
 #: Name of the condition where it was told apart.
@@ -63,7 +62,7 @@ def not_told(order: int, phasors: ComplexArray, motion: ComplexArray) -> str:
     if not np.isfinite(motion).all():
         return "a run has no usable window"
     combine = np.linalg.svd(phasors[None, :])[2][1:].conj()
-    condition = float(np.linalg.cond(combine @ motion))
+    condition = np.linalg.cond(combine @ motion)
     if condition < _ILL_CONDITIONED:
         return ""
     return (

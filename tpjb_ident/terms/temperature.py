@@ -3,8 +3,8 @@
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.conditions import Condition, holding
-from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
 
 #: Parts in a thousand per kelvin, the unit of a coefficient in the solve.
@@ -34,6 +34,6 @@ class Temperature(Factor):
         """Thousandths per kelvin away from the reference."""
         return _UNIT * np.nan_to_num(blocks.temperature - self._reference)
 
-    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+    def conditions(self, fitted: Fitted) -> Conditions:
         """Drifts beyond what is stated."""
         return holding((exceeding(fitted, self.parameters), "probes-drift", "; ".join(self.words(fitted))))

@@ -6,8 +6,7 @@ Every block has a tilt of its own, about X and about Y: a random effect, wide be
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State
+from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.term import Term
 
 #: Rotation over displacement [1/m], one standard deviation: a shaft that turns about a point 0.3 m from the bearing.

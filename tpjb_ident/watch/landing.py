@@ -15,7 +15,7 @@ from rigdata.problem import RigDataError
 from rigdata.run import Run
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
 from rigdata.vector import directions
-from tpjb_ident.runs.run_store import FileState, file_state
+from tpjb_ident.runs.run_jobs import FileState, file_state
 
 
 class NewFiles:

@@ -25,7 +25,7 @@ from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.results.point_result import PointResult
-from tpjb_ident.runs.run_store import FileState, RunStore, file_state
+from tpjb_ident.runs.run_jobs import FileState, RunStore, file_state
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.watch.landing import NewFiles, Unplanned, place_record
 from tpjb_ident.watch.next_steps import CUT, RunStatus, State, Step, judge_states, next_steps, plan_lacks

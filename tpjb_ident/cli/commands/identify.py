@@ -23,8 +23,8 @@ from tpjb_ident.runtime.executors import cores, forks
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
-    from tpjb_ident.phasors.run_phasors import PhasorSettings
-    from tpjb_ident.runs.run_store import RunStore
+    from tpjb_ident.phasors.run_data import PhasorSettings
+    from tpjb_ident.runs.run_jobs import RunStore
 
 #: Records [bytes] above which several processes are quicker than one though each has to import everything, runs above
 #: which copies of this one are, and how many copies.
@@ -94,7 +94,7 @@ def _finished_runs(target: Path) -> Iterator[RunStore]:
     Results come into the folder whole or not at all; what is stored for a rerun is apart from them, in a folder of
     its own, and goes when the command ends, well or with an error.
     """
-    from tpjb_ident.runs.run_store import RunStore
+    from tpjb_ident.runs.run_jobs import RunStore
 
     store = RunStore(target / KEPT)
     try:
@@ -115,12 +115,12 @@ def _worth_starting(campaign: Campaign) -> tuple[int | None, None, str | None]:
 
 def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
     """Build `PhasorSettings` from ``--lines`` and ``--delay``."""
-    from tpjb_ident.phasors.run_data import QUANTITIES, PhasorSettings
+    from tpjb_ident.phasors.run_data import VECTOR_QUANTITIES, PhasorSettings
 
     excited = () if lines is None else parse_values(lines, "speed", "--lines")
     times = {}
     for text in delays:
         quantity, _, time = text.partition("=")
-        refuse_unknown(quantity, QUANTITIES, "--delay")
+        refuse_unknown(quantity, VECTOR_QUANTITIES, "--delay")
         times[quantity] = parse_value(time, "time", f"--delay {quantity}")
     return PhasorSettings(excitation_lines=tuple(omega / (2 * math.pi) for omega in excited), delays=times)

@@ -83,7 +83,7 @@ def _open_watcher(c: Command, folder: Path, settle: float, within: float | None)
             f"{folder}` as soon as the first record is there, and list the runs that you plan."
         )
     from model.bearing import BearingError
-    from tpjb_ident.runs.run_store import RunStore
+    from tpjb_ident.runs.run_jobs import RunStore
     from tpjb_ident.watch.landing import NewFiles
     from tpjb_ident.watch.watcher import Watcher
 

@@ -33,9 +33,8 @@ from tpjb_ident.report.drawing.picture import (
     style_of,
     with_errors,
 )
-from tpjb_ident.results.band_result import BandResult
 from tpjb_ident.results.frequency_model import FrequencyModel
-from tpjb_ident.results.identification import Identification
+from tpjb_ident.results.identification import BandResult, Identification
 from tpjb_ident.schema import ENTRIES, KINDS, STATIC_KEY, coefficient_column
 
 #: Intervals of a smaller share [%] are hidden by their marks: then differences get a panel of their own.
@@ -230,7 +229,7 @@ def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
 def _frf_rows(source: Any) -> tuple[pd.DataFrame | None, FrequencyModel | None]:
     """Rows as in ``frf.csv`` (without coherence where sines were run), and the model through them."""
     if hasattr(source, "supported"):  # one band
-        from tpjb_ident.results.band_result import frf_frame
+        from tpjb_ident.results.identification import frf_frame
 
         return frf_frame([source]), source.models.get(source.supported)
     table = as_table(source)
