@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, Self
 
 Severity = Literal["error", "warning", "note"]
+#: From as many problems of one sort on they are counted, not listed.
+ALIKE = 4
 #: Keys with more dots than this nest deeper than any file of ours; parsing them takes the square of their length.
 MAX_DEPTH = 64
 #: A step of a dotted key: a bare or quoted piece and its dot.
@@ -103,10 +106,25 @@ class RigDataError(RigError):
 
     def __init__(self, problems: Problem | Iterable[Problem]) -> None:
         self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)
-        super().__init__("\n".join(str(p) for p in self.problems))
+        super().__init__("\n".join(map(str, gathered(self.problems))))
 
     def __reduce__(self) -> tuple[type[RigDataError], tuple[tuple[Problem, ...]]]:
         return RigDataError, (self.problems,)  # so that it travels back whole from a worker process
+
+
+def gathered(problems: Iterable[Problem]) -> Iterator[Problem]:
+    """Tell once what is the same but for its numbers in many runs, an error at many places of a run or manifest."""
+    groups = defaultdict(list)
+    for p in problems:
+        words = re.sub(r"[-+]?\d[\d.e+-]*", "#", p.what)
+        groups[p.severity, words, p.file if p.severity == "error" else ""].append(p)
+    for first, *others in groups.values():
+        if len(others) + 1 < ALIKE:
+            yield from (first, *others)
+            continue
+        places = dict.fromkeys(p.place.split(",")[0] if p.severity == "error" else p.run or p.file for p in others)
+        times = f"{len(others)} more times, such as {', '.join([*places][:3])}"
+        yield replace(first, what=f"{first.what} (the like {times})")
 
 
 def refuse(file: str, place: str, what: str, cure: str, run: str | None = None) -> RigDataError:

@@ -76,14 +76,13 @@ def test_cross_coupling_is_shown_when_it_is_beyond_doubt(half, matters):
 
 
 def test_notes_of_one_sort_are_counted():
-    from rigdata.problem import Problem
-    from tpjb_ident.cli.commands.check import problem_lines
+    from rigdata.problem import Problem, gathered
 
     alike = [Problem("note", f"run{i}.csv", "time", f"the clock has {i} steps", "none", f"r{i}") for i in range(39)]
     error = [Problem("error", f"run{i}.csv", "time", "is empty", "mend it", f"r{i}") for i in range(5)]
-    sentences = problem_lines([*error, *alike])
+    sentences = list(gathered([*error, *alike]))
     assert len(sentences) == 6
-    assert "the like 38 more times" in sentences[-1]
+    assert "the like 38 more times, such as r1, r2, r3)" in str(sentences[-1])
 
 
 def test_a_verdict_leads_to_a_command():

@@ -11,6 +11,7 @@ from rigdata.manifest.manifest import MAX_MANIFEST, parse_manifest
 from rigdata.operating_point import ROTATIONS
 from rigdata.problem import RigDataError
 from rigdata.units import SI_UNITS, parse_quantity
+from tests.manifests import PROBES, SWEEP, manifest
 from tests.rigdata.manifest_tables import markdown
 
 GOOD = """\
@@ -107,6 +108,16 @@ def test_the_example_of_the_format():
     assert dynamic.excitation_direction == pytest.approx(math.radians(54))
     assert (dry.pad, dry.branch, dry.sample_rate) == (1, "up", 500.0)
     assert manifest.notes == ()
+
+
+def test_a_key_that_is_mistyped_in_many_runs_is_told_once():
+    runs = [SWEEP | {"id": f"c-{i}", "brunch": "up"} for i in range(18)]
+    with pytest.raises(RigDataError) as error:
+        parse_manifest(manifest(PROBES, *runs))
+    assert len(error.value.problems) == 18
+    (line,) = str(error.value).splitlines()
+    assert line.startswith("campaign.toml, line 18, [[runs]] no. 1 brunch: unknown key 'brunch' (the like 17 more")
+    assert line.endswith("times, such as line 23, line 28, line 33). Did you mean 'branch'?")
 
 
 @pytest.mark.parametrize(

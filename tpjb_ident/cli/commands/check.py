@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -14,15 +12,12 @@ from tpjb_ident.cli.command import Command, command
 from tpjb_ident.columns import Column, words
 from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.rounding import counted, listed
+from tpjb_ident.rounding import counted
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from rigdata.problem import Problem
     from rigdata.run import Run
-
-#: From as many problems of one sort on they are counted, not listed.
-ALIKE = 4
 
 
 def span(*values: float) -> str:
@@ -42,6 +37,7 @@ def check(c: Command, campaign: Path) -> None:
     """
     from rigdata import RigDataError
     from rigdata.campaign import campaign_place
+    from rigdata.problem import gathered
     from tpjb_ident.check.campaign import check_campaign
 
     if not campaign.exists():
@@ -62,8 +58,8 @@ def check(c: Command, campaign: Path) -> None:
         c.json("check.json", summary)
     errors = summary["counts"]["error"]
     c.print(f"{summary['campaign']}: {', '.join(counted(n, severity) for severity, n in summary['counts'].items())}")
-    for line in problem_lines(problems):
-        c.print(line)
+    for problem in gathered(problems):
+        c.print(f"{problem.severity}: {problem}")
     if source is not None:
         _show_coverage(c, source)
     if any("open (??)" in p.what for p in problems):
@@ -76,7 +72,7 @@ def check(c: Command, campaign: Path) -> None:
     if errors:
         findings = c.target / "check.json"
         raise BadInputError(
-            f"{path}: {counted(errors, 'error')}, listed above and in {findings}. Mend them, then check again."
+            f"{path}: {counted(errors, 'error')}, told above and listed in {findings}. Mend them, then check again."
         )
 
 
@@ -94,23 +90,6 @@ def check_summary(c: Command, name: str, problems: Sequence[Problem], campaign: 
         "problems": [asdict(problem) for problem in problems],
         "files_sha256": c.inputs,
     }
-
-
-def problem_lines(problems: Sequence[Problem]) -> list[str]:
-    """One line per problem; what is the same but for its numbers in many runs is printed once, with their count."""
-    groups = defaultdict(list)
-    for p in problems:
-        pattern = re.sub(r"[-+]?\d[\d.e+-]*", "#", p.what)
-        groups[p.severity, pattern, p.place if p.severity == "error" else ""].append(p)
-    lines = []
-    for (severity, *_), group in groups.items():
-        if severity == "error" or len(group) < ALIKE:
-            lines += [f"{severity}: {p}" for p in group]
-            continue
-        runs = list(dict.fromkeys(p.run or p.file for p in group[1:]))
-        times = f"{len(group) - 1} more times: {listed(runs, 3)}; see check.json"
-        lines.append(f"{severity}: {group[0]} (the like {times})")
-    return lines
 
 
 def _drawing_problems(c: Command, campaign: Campaign, problems: list[Problem]) -> list[Problem]:
