@@ -117,7 +117,8 @@ def test_filling_in_a_unit_leaves_what_is_like_it_and_a_valid_manifest_valid(fol
     text = manifest.read_text("utf-8").replace('axis = "?? deg"', 'axis = "45 deg"', 1)
     manifest.write_text(text.replace('axis = "?? deg"', 'axis = "135 deg"   # by the drawing'), "utf-8")
     assert len(load_campaign(folder).runs) == 1
-    ended(0, "init", folder, "--update")
+    result = ended(0, "init", folder, "--update")
+    assert "; no place is open; bearing.toml: 12 places open (??)." in " ".join(result.stdout.split())
     after = manifest.read_text("utf-8")
     assert 'like = "Prox A"' in after
     assert 'axis = "135 deg"   # by the drawing' in after
@@ -131,6 +132,7 @@ def test_open_places_are_one_line_and_the_last_one_the_next_command(folder):
     assert "2 axis" in first
     assert "1 mass" in first
     assert last == f"Next: tpjb init {folder} --update"
+    assert "; bearing.toml: 12 places open (??)." in first
     result = ended(2, "check", folder, "--out", folder.parent / "out")
     assert sum("open (??)" in line for line in result.stdout.splitlines()) == 1
     assert "0 errors" not in result.stdout

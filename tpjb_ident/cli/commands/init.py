@@ -35,7 +35,7 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
     rig can know ??. Records are only read. A campaign.toml that is there already stays as it is; with --update it is
     carried on: what you typed stays, open places and guesses are made anew, new records become runs.
     """
-    from rigdata.manifest.fields import open_paths, open_summary
+    from rigdata.manifest.fields import MARK, open_paths, open_summary
     from rigdata.survey.draft import column_names, updated_manifest
 
     if not folder.is_dir():
@@ -53,7 +53,8 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
     stated = [p for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]]
     bearing = bearing or (stated[0].name if len(stated) == 1 else None)
     exports, problems = _read_exports(c, folder, column_names(before) if update else ())
-    angles = _pivot_angles(folder / (bearing or BEARING))
+    drawing = (folder if bearing else c.target) / (bearing or BEARING)
+    angles = _pivot_angles(drawing)
     if update:
         text, changes = updated_manifest(before, exports, angles)
         channels: list[list[str]] = []
@@ -66,7 +67,9 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
     else:
         _write(c, MANIFEST, text, before)
     open_places = open_summary(open_paths(tomllib.loads(text)))
-    c.print(f"{manifest}: {count}; {open_places or 'no place is open'}.")
+    undrawn = drawing.read_text("utf-8", "replace").count(f'"{MARK}') if drawing.is_file() else 0
+    beside = f"; {drawing.name}: {counted(undrawn, 'place')} open ({MARK})" if undrawn else ""
+    c.print(f"{manifest}: {count}; {open_places or 'no place is open'}{beside}.")
     if channels:
         c.show(f"{folder.name}: channels", words("channel", "quantity", "unit", "axis", "axis by"), channels)
     for problem in problems:
