@@ -1,6 +1,7 @@
 """The parts of `check_campaign`, each on data whose fault is known."""
 
 import math
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,7 +22,7 @@ from rigdata.virtual_rig import Fault, Noise, Sensor
 from tests.good_campaigns import PLAN, directions, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
 from tests.seeds import first_quick
-from tpjb_ident.check.campaign import check_campaign
+from tpjb_ident.check.campaign import _check_lengths, check_campaign
 from tpjb_ident.check.findings import (
     Finding,
     Reporter,
@@ -32,7 +33,7 @@ from tpjb_ident.check.findings import (
     reach,
     repairs,
 )
-from tpjb_ident.check.observation import _at_rest, excitation_line, steady_level
+from tpjb_ident.check.observation import Observation, _at_rest, excitation_line, steady_level
 from tpjb_ident.check.signals import check_signal, is_spare
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
@@ -199,6 +200,28 @@ def test_shared_records_and_leftovers(tmp_path):
     found = {p.what: p.severity for p in check_campaign(path)}
     assert "error" not in found.values()
     assert {"no run names the group forgotten", "datasets without a description: extra"} <= set(found)
+
+
+def test_a_record_that_ends_early_at_a_lines_end_is_told_where_the_others_are_of_one_length(campaign_of, tmp_path):
+    folder = shutil.copytree(campaign_of(stiff_rig(7, plan=TINY), "csv-german"), tmp_path / "c")
+    record = folder / "runs" / "d-05000-25-02.csv"
+    lines = record.read_bytes().splitlines(keepends=True)
+    record.chmod(0o644)
+    record.write_bytes(b"".join(lines[: len(lines) * 6 // 10]))
+    (problem,) = [p for p in check_campaign(folder) if p.severity != "note"]
+    assert (problem.severity, problem.run, problem.place) == ("warning", "d-05000-25-02", "record")
+    assert "the others of its kind 1 s: cut off, or not written to its end" in problem.what
+
+
+@pytest.mark.parametrize(
+    ("seconds", "short"),
+    [((9, 10, 10), 0), ((6, 10, 10), 1), ((6, 10), 0), ((10, 10, 10, 30), 0), ((20, 35, 45, 60, 80), 0)],
+)
+def test_lengths_of_records_that_scatter_say_nothing(seconds, short):
+    observations = [Observation(run, Reporter(run), seconds=s) for s in seconds for run in [make_run(str(s))]]
+    _check_lengths(observations)
+    assert sum(o.report.keys == ["short record"] for o in observations) == short
+    assert sum(len(o.report.keys) for o in observations) == short
 
 
 def test_a_problem_prints_itself_with_place_and_cure():

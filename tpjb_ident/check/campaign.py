@@ -1,16 +1,19 @@
 """Read everything of a campaign and report every problem found, not just the first."""
 
 import itertools
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from rigdata.campaign import Campaign
 from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.run import Run
 from rigdata.survey.exports import records_below
 from tpjb_ident.arguments import as_campaign
-from tpjb_ident.check.findings import is_shared, merge
+from tpjb_ident.check.findings import far, is_shared, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.rig_fit import rig_fit
@@ -95,6 +98,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     check_sweeps(of_kind("clearance"))
     check_locus(of_kind("locus"))
     _check_duplicates(observations)
+    _check_lengths(observations)
     fit = rig_fit(campaign, dynamic, static)
     return observations, () if fit is None else fit.conditions()
 
@@ -116,6 +120,22 @@ def _check_duplicates(observations: Sequence[Observation]) -> None:
             continue
         kind = "shared" if _shared_record(observation.run, earlier) else "duplicate"
         observation.report.ask(kind, other=earlier.id, file=earlier.file)
+
+
+def _check_lengths(observations: Sequence[Observation]) -> None:
+    """Records far shorter than the others of a kind of test were cut off; lengths that scatter say nothing."""
+    groups = defaultdict(list)
+    for observation in observations:
+        run = observation.run
+        if observation.seconds > 0:
+            groups[run.kind, run.branch, run.excitation_kind, run.point.excitation].append(observation)
+    for alike in groups.values():
+        lengths = np.array([observation.seconds for observation in alike])
+        usual = float(np.median(lengths))
+        for observation, is_apart in zip(alike, far(abs(lengths / usual - 1), 0.2, 4.0, count=3)):
+            if is_apart:
+                length = observation.seconds
+                observation.report.ask("short record", usual / length, length=length, usual=usual)
 
 
 def _shared_record(first: Run, second: Run) -> bool:

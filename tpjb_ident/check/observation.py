@@ -161,6 +161,7 @@ class Observation(Directed):
     samples: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     digest: str = ""
     speed: float = math.nan
+    seconds: float = math.nan  #: how long the record is
     #: (m,): size of what turns with the shaft, SI; empty where nothing tells it
     shaft_line: FloatArray = field(default_factory=lambda: np.empty(0))
     shaft_force: float = math.nan  #: of the 1X force, see `tpjb_ident.check.observation`
@@ -228,7 +229,8 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0, mass: fl
     if not timed:
         return Observation(run, report, digest=digest, speed=speed)
     samples = used[:: max(1, len(used) // _DECIMATED)] if run.kind == "clearance" else np.empty((0, 0))
-    observation = Observation(run, report, live, lines, _spread(used), samples, digest, speed)
+    seconds = length / run.sample_rate
+    observation = Observation(run, report, live, lines, _spread(used), samples, digest, speed, seconds)
     if phasors is None:
         return observation
     shown, stated = phasors.lines.excitation[line].frequency, run.point.excitation_hz

@@ -3,7 +3,7 @@
 import contextlib
 import datetime
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ from rigdata.problem import Problem, RigDataError, RigError
 from rigdata.run import Run
 from rigdata.survey.exports import records_below
 from tpjb_ident.check.campaign import judged
-from tpjb_ident.check.findings import Finding
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.clearance.measure import ClearancePolygon, measure_clearance
 from tpjb_ident.errors import TpjbError
@@ -28,10 +27,7 @@ from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.runs.run_jobs import FileState, RunStore, file_state
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.watch.landing import NewFiles, Unplanned, place_record
-from tpjb_ident.watch.next_steps import CUT, RunStatus, State, Step, judge_states, next_steps, plan_lacks
-
-#: Share of the usual length below which a record was cut off.
-_WHOLE = 0.8
+from tpjb_ident.watch.next_steps import RunStatus, State, Step, judge_states, next_steps, plan_lacks
 
 
 @dataclass(frozen=True)
@@ -76,7 +72,6 @@ class _Record:
     observation: Observation
     landed: str
     digest: str
-    seconds: float
 
 
 @dataclass
@@ -190,7 +185,6 @@ class Watcher:
         records = {run.id: self._records[run.id] for run in runs if run.id in self._records}
         landed = tuple(run for run in runs if run.id in records)
         observations, _ = judged(replace(campaign, runs=landed), [record.observation for record in records.values()])
-        _name_cut_records(observations, [record.seconds for record in records.values()])
         planned = {run.id for run in campaign.runs}
         done = {record.like for record in placed if record.run is not None}
         expected = []
@@ -249,25 +243,9 @@ def _unless_refused(name: str, measure: Callable[[], Any], former: Any) -> tuple
 
 
 def _read(run: Run, path: Path, mark: tuple[Any, ...]) -> _Record:
-    """Read a record: what it shows, when it landed, in ISO form of this place, its SHA-256 and its length [s]."""
+    """Read a record: what it shows, when it landed, in ISO form of this place, and its SHA-256."""
     changed = datetime.datetime.fromtimestamp(1e-9 * mark[0][1], datetime.UTC)
-    digest, seconds = "missing", 0.0
-    with contextlib.suppress(OSError, RigDataError):  # gone or locked again, which its state tells, or damaged
+    digest = "missing"
+    with contextlib.suppress(OSError):  # gone or locked again, which its state tells
         digest = sha256(path)
-        seconds = run.length / run.sample_rate
-    return _Record(mark, observe(run), changed.astimezone().isoformat(timespec="milliseconds"), digest, seconds)
-
-
-def _name_cut_records(observations: Sequence[Observation], lengths: Sequence[float]) -> None:
-    """Note records below `_WHOLE` of the median length of their kind, before everything else that follows from it."""
-    kinds = np.array([observation.run.kind for observation in observations])
-    known = np.array(lengths) > 0.0
-    for observation, length in zip(observations, lengths, strict=True):
-        same_kind = np.array(lengths)[known & (kinds == observation.run.kind)]
-        usual = float(np.median(same_kind)) if len(same_kind) > 2 else 0.0
-        if 0.0 < length < _WHOLE * usual:
-            cure = "Copy it again from the logger, or repeat the run"
-            what = f"{length:.3g} s long, the others of its kind {usual:.3g} s: cut off, or not written to its end"
-            observation.report.note(CUT, "error", "record", what, cure)
-            findings: list[Finding] = observation.report.findings
-            findings.insert(0, findings.pop())
+    return _Record(mark, observe(run), changed.astimezone().isoformat(timespec="milliseconds"), digest)
