@@ -12,13 +12,15 @@ import pandas as pd
 import pytest
 
 import tpjb_ident.report
+from rigdata.operating_point import OperatingPoint
+from rigdata.problem import refuse
 from tests.report.plot_cases import locus
 from tests.report.tags import Page
 from tpjb_ident.report import page as report_page
 from tpjb_ident.report.drawing.picture import add_legend, longest_series, new_picture
 from tpjb_ident.report.figure import Panel, save_panels, svg_text
 from tpjb_ident.report.page import Section, Table, render_page, render_section
-from tpjb_ident.report.sections import coefficient_sections, position_panels
+from tpjb_ident.report.sections import _run_matrix, coefficient_sections, position_panels
 from tpjb_ident.rounding import fixed, percent, signed, with_interval
 
 HOSTILE = "<script>alert(1)</script>\"'& <img src=x onerror=alert(2)> $\\frac{a}{b}$ \x1b[31m\u202e"
@@ -221,6 +223,17 @@ def test_measured_points_have_their_intervals_and_predictions_their_lines():
     (bars,) = axes.containers
     low, high = bars[2][0].get_segments()[0][:, 1]
     assert (low, high) == (0.9 * 4e3 / 1e6, 1.2 * 4e3 / 1e6)
+
+
+def test_a_record_that_cannot_be_read_has_no_rate_in_the_table_of_runs():
+    class Broken:
+        kind, point = "dynamic", OperatingPoint(5000.0, -math.pi / 2)
+
+        @property
+        def sample_rate(self):
+            raise refuse("a.csv", "", "is empty", "Copy it again")
+
+    assert _run_matrix([Broken(), Broken()]).rows == [["dynamic", "5", "-90", "0 (0)", "–", "–", "2"]]
 
 
 def test_positions_need_something_to_show():

@@ -5,6 +5,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -195,7 +196,10 @@ def _run_matrix(runs: Sequence[Run]) -> Table:
         shaft = f"{p.shaft_speed_hz:g} ({60 * p.shaft_speed_hz:.6g})"
         excitation = f"{p.excitation_hz:g}" if p.excitation else "–"
         kind = KINDS_IN_WORDS.get(run.kind, run.kind)
-        counts[kind, load, direction, shaft, excitation, f"{run.sample_rate:g}"] += 1
+        rate = "–"
+        with suppress(RigDataError):  # a record that cannot be read: `check` tells
+            rate = f"{run.sample_rate:g}"
+        counts[kind, load, direction, shaft, excitation, rate] += 1
     columns = ["kind", f"load, {symbol('load')}", "load direction, °", "shaft speed, Hz (rpm)", "excitation, Hz"]
     return Table("Runs", [*columns, "rate, Hz", "runs"], [[*key, str(n)] for key, n in counts.items()])
 
