@@ -66,6 +66,7 @@ def test_check_lists_every_error_and_exits_2(small_campaign, tmp_path):
     with h5py.File(broken, "r+") as file:
         del file["runs/d-02500-25-01/X1A"]
         del file["runs/d-05000-25-02/L1H"]
+        file.attrs["bearing"] = file.attrs["bearing"].replace("\nlength", "\nlenght", 1)
     result = tpjb("check", broken, "--out", tmp_path / "out")
     problems = json.loads((tmp_path / "out" / "check.json").read_text(encoding="utf-8"))["problems"]
     errors = {(p["run"], p["severity"]) for p in problems}
@@ -73,6 +74,7 @@ def test_check_lists_every_error_and_exits_2(small_campaign, tmp_path):
     assert {("d-02500-25-01", "error"), ("d-05000-25-02", "error")} <= errors
     assert "X1A" in result.stdout
     assert "L1H" in result.stdout
+    assert "lenght: unknown key. Did you mean 'length'? Or give --bearing" in " ".join(result.stdout.split())
 
 
 def test_identify_finds_what_was_put_in(identified):

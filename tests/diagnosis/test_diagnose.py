@@ -18,7 +18,7 @@ from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import nuisances
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.next_test import Design, ranked, say, separated
-from tpjb_ident.diagnosis.observations.gap import contradictions, gap, held_out, localise, residuals
+from tpjb_ident.diagnosis.observations.gap import _regions, contradictions, gap, held_out, localise, residuals
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.diagnosis.plan import plan
 from tpjb_ident.diagnosis.planned import dynamic, planned_observations
@@ -110,6 +110,12 @@ def test_localise_finds_the_observable_and_its_pad(observations):
     worst = localise(replace(observations, value=value), observations.value)[0]
     assert (worst.observable, worst.where) == ("dry_compliance", "pad 4")
     assert worst.share > 0.99
+
+
+def test_a_region_of_one_level_is_named_by_it(observations):
+    loads = {e.place("load") for e in observations.elements if e.family == "h"}
+    top = np.array([e.family == "h" and e.place("load") in sorted(loads)[-2:] for e in observations.elements])
+    assert [where for where, _ in _regions(observations.elements, top)] == ["static_load 7500 N", "static_load 8750 N"]
 
 
 @pytest.mark.slow

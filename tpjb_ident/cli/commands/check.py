@@ -104,8 +104,9 @@ def _drawing_problems(c: Command, campaign: Campaign, problems: list[Problem]) -
         return bearing_problems(campaign, c.bearing_of(campaign), problems)
     except BearingError as error:
         file = campaign.bearing_name
-        what = str(error).partition("\n")[0].removeprefix(file).strip(",:. ")
-        return [Problem("warning", file, "", what, "Or give --bearing FILE where one is needed")]
+        what, _, remedy = str(error).partition("\n")[0].removeprefix(file).lstrip(",: ").partition(". ")
+        cure = f"{remedy} Or give --bearing FILE where one is needed".strip()
+        return [Problem("warning", file, "", what.rstrip("."), cure)]
 
 
 def _show_coverage(c: Command, campaign: Campaign) -> None:

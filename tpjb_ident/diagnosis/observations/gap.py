@@ -179,7 +179,7 @@ def _regions(elements: Sequence[Element], mine: BoolArray) -> Iterator[tuple[str
         if len(levels) > 1:
             half = len(levels) // 2
             for part in (levels[:half], levels[half:]):
-                ends = f"{part[0] * factor:.0f}-{part[-1] * factor:.0f}"
-                yield f"{words} {ends} {unit}", mine & np.isin(values, part)
+                ends = dict.fromkeys(f"{end * factor:.0f}" for end in part[[0, -1]])
+                yield f"{words} {'-'.join(ends)} {unit}", mine & np.isin(values, part)
             return
     yield "everywhere", mine

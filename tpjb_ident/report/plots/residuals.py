@@ -147,7 +147,7 @@ def _draw_map(axes: Axes, frame: pd.DataFrame, points: pd.DataFrame, norm: Any, 
             )
     bar = add_colour_bar(axes, image, "(measured - predicted) / sigma")
     ticks = [t for t in (-1000, -100, -30, -10, -2, 0, 2, 10, 30, 100, 1000) if abs(t) <= norm.vmax]
-    bar.set_yticks(ticks, [str(t) for t in ticks])
+    bar.set_yticks(ticks, [plain(t, 0) for t in ticks])
     bar.minorticks_off()
 
 
@@ -231,7 +231,7 @@ def gap(
     shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
     y = np.arange(len(words))
     added = not np.array_equal(before, after)  # else there is no after
-    baseline: Style = {"color": PAPER, "edgecolor": LIGHT["orange"], "hatch": "////", "label": "baseline"}
+    baseline: Style = {"color": PAPER, "edgecolor": LIGHT["orange"], "hatch": "////", "label": "as stated"}
     axes.barh(y - 0.2 * added, before, 0.38, linewidth=0.8, **baseline)
     if added:
         axes.barh(y + 0.2, after, 0.38, color=BLUE, label="with the effects found")

@@ -37,6 +37,7 @@ from tpjb_ident.report.drawing.picture import (
     plot,
     style_of,
 )
+from tpjb_ident.rounding import signed
 
 _LAW_POINTS = 200
 
@@ -160,7 +161,7 @@ def _draw_vectors(axes: Axes, curve: PivotCurve, vectors: FloatArray, off: float
     style = style_of(curve.pad - 1) | {"linestyle": "none"}
     axes.plot(*measured.T, **style, markersize=5.5, markerfacecolor="none")
     axes.plot(*projected.T, **style, markersize=3.0)
-    text = f"#{curve.pad}\n{math.degrees(off):+.1f}°"
+    text = f"#{curve.pad}\n{signed(math.degrees(off))}°"
     axes.annotate(text, tuple(end), tuple(12.0 * axis), textcoords="offset points", ha="center", va="center",
                   fontsize=SMALL)  # fmt: skip
 
