@@ -113,6 +113,13 @@ def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, n
     assert error_of(tmp_path / "out", 5000.0) < 0.02
 
 
+@pytest.mark.slow
+def test_compare_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path):
+    told = ended(0, "compare", spoilt("garbage", RUN), "--pivots", "rigid", "--out", tmp_path / "out")
+    assert f"1 of 6 dynamic runs take no part: {RUN}" in " ".join(told.stdout.split())
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
 def test_a_check_names_every_damaged_run(spoilt):
     for name in DAMAGE:
         path = spoilt(name, RUN)

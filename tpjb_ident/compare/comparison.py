@@ -215,9 +215,10 @@ def compare_campaign(
         ahead = model_side(campaign, bearing, settings, points, report)
     static, predictions = ahead
     frames = {name: rows.loc[points].reset_index(drop=True) for name, rows in predictions.items()}
+    left_out = [c.sentence() for c in identification.conditions if c in ("runs-left-out", "point-lost")]
     return Comparison(
         campaign, bearing, settings, identification, static.curves, static.clearance, static.locus, frames,
-        _loci(static, predictions), _remarks(settings, static, bearing),
+        _loci(static, predictions), (*left_out, *_remarks(settings, static, bearing)),
     )  # fmt: skip
 
 
