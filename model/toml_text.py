@@ -15,7 +15,7 @@ def read_page(path: Path, refuse: type[ModelError], kind: str, missing: str, meg
     except FileNotFoundError as error:
         raise refuse(f"{path}: no such file. {missing}") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise refuse(f"{path}: cannot be read ({error}). Save it as UTF-8 text.") from error
+        raise refuse(f"{path}: cannot be read ({error}). Give a file of UTF-8 text.") from error
     raise refuse(f"{path.name}: larger than {megabytes} MB. {kind}; check the path.")
 
 
