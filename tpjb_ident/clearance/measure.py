@@ -214,7 +214,7 @@ def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotC
     # which of two unequal probes is right is as unknown as how far they are apart
     calibration = [np.hypot(relative_calibration(probes, angle), 0.5 * ratio) for angle in angles]
     polygon = replace(polygon, relative_calibration=np.array(calibration))
-    status = (*_status(fit, polygon), *differ, *_extrapolated(contact.push, curves))
+    status = (*_status(fit, polygon, curves), *differ, *_extrapolated(contact.push, curves, len(angles)))
     return replace(polygon, status=status)
 
 
@@ -283,12 +283,12 @@ def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple
     return ratio, (Condition("probe-gains-differ", detail),)
 
 
-def _extrapolated(push: float, curves: Sequence[PivotCurve]) -> tuple[Condition, ...]:
+def _extrapolated(push: float, curves: Sequence[PivotCurve], count: int) -> tuple[Condition, ...]:
     """The push lies outside what the dry tests measured: true of most sweeps, and to be said."""
     outside = [c for c in curves if c.is_extrapolated(push)]
     lowest = min((c.valid_from for c in outside), default=0.0)
-    pads = "all pads" if len(outside) == len(curves) else "pads " + ", ".join(f"#{c.pad}" for c in outside)
-    detail = f"pushed with {push:.0f} N, the dry tests of {pads} hold from {lowest:.0f} N on; the sweep corrects it"
+    pads = " of all pads" if len(outside) == count else _of_pads([c.pad for c in outside])
+    detail = f"pushed with {push:.0f} N, the dry tests{pads} hold from {lowest:.0f} N on; the sweep corrects it"
     return holding((outside, "give-extrapolated", detail))
 
 
@@ -302,8 +302,14 @@ def coldest_first(runs: Sequence[Run]) -> list[Run]:
     return sorted(runs, key=lambda run: (speeds[run.id], temperature[run.id] > warm, run.point.static_load))
 
 
-def _status(fit: SideFit, polygon: ClearancePolygon) -> tuple[Condition, ...]:
+def _of_pads(numbers: Sequence[int]) -> str:
+    return f" of pads {', '.join(f'#{number}' for number in numbers)}"
+
+
+def _status(fit: SideFit, polygon: ClearancePolygon, curves: Sequence[PivotCurve]) -> tuple[Condition, ...]:
     """Named conditions of the sides and of the clearances."""
+    untested = sorted({*(fit.pads + 1).tolist()} - {curve.pad for curve in curves})
+    pads = "" if len(untested) == len(fit.pads) else _of_pads(untested)
     missing = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(polygon.clearance)))
     disagrees = abs(fit.scale - 1.0) > max(_IRREGULAR * fit.scale_se, _DISAGREES)
     give = f"they deflect {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say"
@@ -317,7 +323,7 @@ def _status(fit: SideFit, polygon: ClearancePolygon) -> tuple[Condition, ...]:
     return holding(
         (missing, "pads-not-reached", missing),
         (inseparable := _inseparable(fit, polygon, len(deviating)), "pads-not-separable", inseparable),
-        (np.isnan(fit.scale), "give-from-sweep", "no pivot curves, zero load extrapolated from the sweep alone"),
+        (untested, "give-from-sweep", f"no pivot curves{pads}, zero load extrapolated from the sweep alone"),
         (disagrees, "pivots-disagree", give),
         (listed, "irregular", f"{listed} from the median of all: worn, damaged or wrongly assembled"),
         (is_turned, "frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"),

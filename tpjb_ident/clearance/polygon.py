@@ -186,6 +186,7 @@ def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, cur
     noise = _noise(used, place)
     r, of_pad = len(pads), (used.pad[:, None] == pads).astype(float)
     full = _pivot_deflection(curves, pads, np.full(r, used.push))
+    unknown = full == 0.0
     carried = _pivot_deflection(curves, used.pad, used.load)
     alone = used.touched.sum(axis=1) == 1
     whitener = _whitener(used, angles, noise, np.hypot(_SLIDING * carried * alone, used.level_error))
@@ -193,23 +194,23 @@ def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, cur
     for error in _LAG_ERRORS:
         late = used.lagging(angles, lag + error)
         late_carried = _pivot_deflection(curves, late.pad, late.load)
-        columns, precision, mean = _pivot_terms(late, of_pad, late_carried, full if curves else None)
+        columns, precision, mean = _pivot_terms(late, of_pad, late_carried, full, curves)
         design = np.hstack([of_pad, -of_pad * place[:, None], columns])
         prior = np.r_[np.zeros(r), np.full(r, _TILT_SPREAD**-2), precision]
         fits.append(_least_squares(whitener, used.along, design, prior, np.r_[np.zeros(2 * r), mean]))
     beta, covariance, misfit = _mixed(fits)
     distance, tilt, pivots = np.split(beta, [r, 2 * r])
     _, tilt_se, errors = np.split(np.sqrt(np.diag(covariance)), [r, 2 * r])
-    distances, deflection, deflection_se = covariance[:r, :r], pivots[:r], errors[:r]
-    distances = distances + used.level_error**2 * np.eye(r)  # a shaft that lies in a corner reads one step for long
-    scale = scale_se = np.nan
-    if curves:
-        scale, scale_se = float(pivots[-1]), float(errors[-1])
-        deflection, deflection_se = scale * full, full * _secant_errors(curves, pads, used.push)
-        # an error of a curve shifts its side by the share of the deflection that the averages carry on the mean
-        mean_carried = of_pad.T @ carried / of_pad.sum(axis=0)
-        share = np.divide(mean_carried, full, out=np.zeros(r), where=full > 0)
-        distances = distances + np.diag((share * deflection_se) ** 2)
+    # a shaft that lies in a corner reads one step for long
+    distances = covariance[:r, :r] + used.level_error**2 * np.eye(r)
+    scale, scale_se = (np.nan, np.nan) if unknown.all() else (float(pivots[-1]), float(errors[-1]))
+    deflection, deflection_se = np.nan_to_num(scale) * full, full * _secant_errors(curves, pads, used.push)
+    # an error of a curve shifts its side by the share of the deflection that the averages carry on the mean
+    mean_carried = of_pad.T @ carried / of_pad.sum(axis=0)
+    share = np.divide(mean_carried, full, out=np.zeros(r), where=full > 0)
+    distances = distances + np.diag((share * deflection_se) ** 2)
+    count = np.count_nonzero(unknown)
+    deflection[unknown], deflection_se[unknown] = pivots[:count], errors[:count]
     return SideFit(
         pads, foot, distance, distances, tilt, tilt_se, deflection, deflection_se, scale, scale_se, noise, misfit
     )  # fmt: skip
@@ -224,20 +225,26 @@ def _secant_errors(curves: Sequence[PivotCurve], pads: IntArray, load: float) ->
 
 
 def _pivot_terms(
-    contact: ContactIntervals, of_pad: FloatArray, carried: FloatArray, full: FloatArray | None
+    contact: ContactIntervals, of_pad: FloatArray, carried: FloatArray, full: FloatArray, curves: Sequence[PivotCurve]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """What the pivots add to the design (m, k), with the precisions and the means (k,) of their prior.
 
     Without curves every pivot's deflection in proportion to its load, and one curvature for all pads; with them (and
-    what they say under the `full` push (r,) [m]) the curves' shape and size, each times one common factor.
+    what they say under the `full` push (r,) [m]) the curves' shape and size, each times one common factor, and the
+    deflection of every pad that has none, in the mean shape of the others.
     """
-    w = np.maximum(contact.load, 0.0) / contact.push
+    load = np.maximum(contact.load, 0.0)
+    w, unknown = load / contact.push, full == 0.0
     bend = np.cbrt(w) ** 2 - w
-    if full is None:
-        precision = np.r_[np.full(of_pad.shape[1], LARGEST_DEFLECTION**-2), _CURVATURE_SPREAD**-2]
-        return np.column_stack([of_pad * w[:, None], bend]), precision, np.zeros(len(precision))
-    columns = np.column_stack([of_pad @ full * bend, carried])
-    return columns, np.array([_SHAPE_SPREAD, _SCALE_SPREAD]) ** -2, np.array([0.0, 1.0])
+    spread, mean = np.full(np.count_nonzero(unknown), LARGEST_DEFLECTION), np.zeros(np.count_nonzero(unknown))
+    if unknown.all():
+        columns = np.column_stack([of_pad * w[:, None], bend])
+        return columns, np.r_[spread, _CURVATURE_SPREAD] ** -2, np.r_[mean, 0.0]
+    shape = np.mean([curve.deflection(load) / curve.deflection(contact.push) for curve in curves], axis=0)
+    free = of_pad[:, unknown] * shape[:, None]
+    usual = np.where(unknown, full[~unknown].mean(), full)
+    columns = np.column_stack([free, of_pad @ usual * bend, carried])
+    return columns, np.r_[spread, _SHAPE_SPREAD, _SCALE_SPREAD] ** -2, np.r_[mean, 0.0, 1.0]
 
 
 def _place_along_side(contact: ContactIntervals, angles: FloatArray, pads: IntArray) -> tuple[FloatArray, FloatArray]:
