@@ -11,7 +11,7 @@ import numpy as np
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.problem import refuse
 from rigdata.vector import directions
-from tpjb_ident.clearance.polygon import SideFit, alike, corners, find_centre, fit_sides, gain_ratio
+from tpjb_ident.clearance.polygon import SideFit, alike, corners, find_centre, fit_sides, gain_ratio, untested
 from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
@@ -308,8 +308,8 @@ def _of_pads(numbers: Sequence[int]) -> str:
 
 def _status(fit: SideFit, polygon: ClearancePolygon, curves: Sequence[PivotCurve]) -> tuple[Condition, ...]:
     """Named conditions of the sides and of the clearances."""
-    untested = sorted({*(fit.pads + 1).tolist()} - {curve.pad for curve in curves})
-    pads = "" if len(untested) == len(fit.pads) else _of_pads(untested)
+    others = (fit.pads[untested(curves, fit.pads)] + 1).tolist()
+    pads = "" if len(others) == len(fit.pads) else _of_pads(others)
     missing = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(polygon.clearance)))
     disagrees = abs(fit.scale - 1.0) > max(_IRREGULAR * fit.scale_se, _DISAGREES)
     give = f"they deflect {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say"
@@ -323,7 +323,7 @@ def _status(fit: SideFit, polygon: ClearancePolygon, curves: Sequence[PivotCurve
     return holding(
         (missing, "pads-not-reached", missing),
         (inseparable := _inseparable(fit, polygon, len(deviating)), "pads-not-separable", inseparable),
-        (untested, "give-from-sweep", f"no pivot curves{pads}, zero load extrapolated from the sweep alone"),
+        (others, "give-from-sweep", f"no pivot curves{pads}, zero load extrapolated from the sweep alone"),
         (disagrees, "pivots-disagree", give),
         (listed, "irregular", f"{listed} from the median of all: worn, damaged or wrongly assembled"),
         (is_turned, "frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"),

@@ -170,12 +170,20 @@ class SideFit:
 
 
 def _pivot_deflection(curves: Sequence[PivotCurve], pad: IntArray, load: FloatArray) -> FloatArray:
-    """Deflection (m,) [m] of pads (m,) (index from 0) at loads (m,) [N]; zero for pads without a curve."""
-    deflection = np.zeros(len(load))
+    """Deflection (m,) [m] of pads (m,) (index from 0) at loads (m,) [N]; of pads without a curve, the mean of all."""
+    deflection, load = np.zeros(len(load)), np.maximum(load, 0.0)
     for curve in curves:
         members = pad == curve.pad - 1
-        deflection[members] = curve.deflection(np.maximum(load[members], 0.0))
+        deflection[members] = curve.deflection(load[members])
+    others = untested(curves, pad)
+    if curves and others.any():
+        deflection[others] = np.mean([curve.deflection(load[others]) for curve in curves], axis=0)
     return deflection
+
+
+def untested(curves: Sequence[PivotCurve], pad: IntArray) -> BoolArray:
+    """Which pads (m,) (index from 0) no curve is of, (m,)."""
+    return ~np.isin(pad, [curve.pad - 1 for curve in curves])
 
 
 def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, curves: Sequence[PivotCurve]) -> SideFit:
@@ -186,7 +194,7 @@ def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, cur
     noise = _noise(used, place)
     r, of_pad = len(pads), (used.pad[:, None] == pads).astype(float)
     full = _pivot_deflection(curves, pads, np.full(r, used.push))
-    unknown = full == 0.0
+    unknown = untested(curves, pads)
     carried = _pivot_deflection(curves, used.pad, used.load)
     alone = used.touched.sum(axis=1) == 1
     whitener = _whitener(used, angles, noise, np.hypot(_SLIDING * carried * alone, used.level_error))
@@ -194,7 +202,7 @@ def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, cur
     for error in _LAG_ERRORS:
         late = used.lagging(angles, lag + error)
         late_carried = _pivot_deflection(curves, late.pad, late.load)
-        columns, precision, mean = _pivot_terms(late, of_pad, late_carried, full, curves)
+        columns, precision, mean = _pivot_terms(late, of_pad, late_carried, full, unknown)
         design = np.hstack([of_pad, -of_pad * place[:, None], columns])
         prior = np.r_[np.zeros(r), np.full(r, _TILT_SPREAD**-2), precision]
         fits.append(_least_squares(whitener, used.along, design, prior, np.r_[np.zeros(2 * r), mean]))
@@ -225,25 +233,22 @@ def _secant_errors(curves: Sequence[PivotCurve], pads: IntArray, load: float) ->
 
 
 def _pivot_terms(
-    contact: ContactIntervals, of_pad: FloatArray, carried: FloatArray, full: FloatArray, curves: Sequence[PivotCurve]
+    contact: ContactIntervals, of_pad: FloatArray, carried: FloatArray, full: FloatArray, unknown: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """What the pivots add to the design (m, k), with the precisions and the means (k,) of their prior.
 
     Without curves every pivot's deflection in proportion to its load, and one curvature for all pads; with them (and
     what they say under the `full` push (r,) [m]) the curves' shape and size, each times one common factor, and the
-    deflection of every pad that has none, in the mean shape of the others.
+    deflection of every pad without one (`unknown` (r,)) in the mean shape of the others.
     """
-    load = np.maximum(contact.load, 0.0)
-    w, unknown = load / contact.push, full == 0.0
+    w = np.maximum(contact.load, 0.0) / contact.push
     bend = np.cbrt(w) ** 2 - w
     spread, mean = np.full(np.count_nonzero(unknown), LARGEST_DEFLECTION), np.zeros(np.count_nonzero(unknown))
     if unknown.all():
         columns = np.column_stack([of_pad * w[:, None], bend])
         return columns, np.r_[spread, _CURVATURE_SPREAD] ** -2, np.r_[mean, 0.0]
-    shape = np.mean([curve.deflection(load) / curve.deflection(contact.push) for curve in curves], axis=0)
-    free = of_pad[:, unknown] * shape[:, None]
-    usual = np.where(unknown, full[~unknown].mean(), full)
-    columns = np.column_stack([free, of_pad @ usual * bend, carried])
+    free = of_pad[:, unknown] * carried[:, None] / full[unknown]
+    columns = np.column_stack([free, of_pad @ full * bend, of_pad @ ~unknown * carried])
     return columns, np.r_[spread, _SHAPE_SPREAD, _SCALE_SPREAD] ** -2, np.r_[mean, 0.0, 1.0]
 
 

@@ -24,7 +24,7 @@ _LOST_SAMPLES = ("clipped", "dead", "empty", "missing", "stuck", "gap", "jitter"
 
 
 #: Key of the finding that a record is cut off, which says nothing of the next one.
-CUT = "short record"
+_CUT = "short record"
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
     steps: list[Step] = []
     stopped: set[str] = set()
     for finding in landed[0].findings if landed else ():
-        if finding.problem.severity == "note" or finding.key == CUT or not finding.key.startswith(_LOST_SAMPLES):
+        if finding.problem.severity == "note" or finding.key == _CUT or not finding.key.startswith(_LOST_SAMPLES):
             continue
         with_it = itertools.takewhile(lambda s: finding.key in {f.key for f in s.findings}, landed)  # noqa: B023 (here)
         runs = tuple(s.run.id for s in with_it)[::-1]

@@ -85,8 +85,7 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
     asked = [f for f in curved if f.own < 0]
     changes = run(path_changes, [(f, _wanted(f, 0.0), 1) for f in asked])
     paths += [path_through(fault, row) for fault, row in zip(asked, changes, strict=True) if row]
-    count = len(problem.nuisances)
-    jobs = [((f,), np.zeros(len(f.width) + count), tuple(range(len(f.width)))) for f in straight]
+    jobs = [((f,), np.zeros(len(f.width) + len(problem.nuisances)), tuple(range(len(f.width)))) for f in straight]
     for fault, found in zip(straight, run(derivatives, jobs), strict=True):
         whole = [column for column in found if column is not None]
         if len(whole) == len(fault.width):

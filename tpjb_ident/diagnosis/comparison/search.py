@@ -100,9 +100,9 @@ class _Search:
             return None
         if not (self.whole or self._passed or any(map(self._comes_first, self.proposals.values()))):
             self._ask_whole_paths()
-        leader, promising = self._leader(), self._waiting()
-        if promising:
+        if promising := self._waiting():
             return self.proposals.pop(max(promising, key=lambda p: (self._comes_first(p), p.estimate)).labels)
+        leader = self._leader()
         if leader is None or leader.posterior.scale > Deciding.right:
             return None
         return self._look_alike(leader) or self._passed_over(leader)
@@ -381,7 +381,7 @@ class _Search:
         tenable = frozenset(fit for fit in rows if _tenable(fit))
         logs = np.array([self._log_probability(fit) for fit in rows])
         counted = np.where([fit in tenable for fit in rows], logs, -np.inf) if tenable else logs
-        waiting = self._waiting()
+        waiting = [start for start in self._waiting() if not start.coarse]  # coarse evidence is another's unit
         total = logsumexp([*counted, *(start.estimate for start in waiting)])
         probabilities = np.exp(counted - total)
         order = np.lexsort((-logs, -probabilities))
