@@ -30,30 +30,39 @@ _MOST_PADS = 6
 
 
 def solve_equilibrium(
-    setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None, patient: bool = True
+    setup: Setup,
+    load: FloatArray,
+    speed: float,
+    start: Equilibrium | None = None,
+    patient: bool = True,
+    near: bool = False,
 ) -> Equilibrium:
     """Find where the journal stands: `load` (2,) [N]; `patient`: by raising load or heat too, where nothing else does.
 
-    That takes some hundred times as long as an equilibrium from a neighbour.
+    That takes some hundred times as long as an equilibrium from a neighbour. `near`: so small a step from `start` that
+    the same pads carry, where they can.
     """
     warm = None
     if start is not None:
         search = Search(setup, load, speed)
         if search.start_from(start):
-            warm = _settled(search, search.run())
+            warm = search.run()
+            if near and warm.converged and np.all(warm.idle == start.idle):
+                return warm
+            warm = _settled(search, warm)
             # where pads are left idle that could carry, another start may leave others
             if warm.converged and not any(warm.loose) and warm.idle.sum() <= np.isnan(search.begun.tilt).sum():
                 return warm
     search = Search(setup, load, speed).stand()
     above, loaded = search.margins(), ~search.pads["idle"]
-    near = np.abs(above) < _NEAR
+    doubtful = np.abs(above) < _doubt(setup)
     result = _settled(search, search.run())
     of_sets = _is_of_sets(setup)
     if of_sets and not result.converged:  # pads near their folds may find no rest where they carry
-        result = _most_loaded(setup, load, speed, result, loaded, near & loaded)
+        result = _most_loaded(setup, load, speed, result, loaded, doubtful & loaded)
     elif of_sets and any(result.loose):
-        near |= np.array(result.loose) | (~loaded & (above > 0.0))
-        return _most_loaded(setup, load, speed, result, ~result.idle, near)
+        doubtful |= np.array(result.loose) | (~loaded & (above > 0.0))
+        return _most_loaded(setup, load, speed, result, ~result.idle, doubtful)
     for attempt in _ATTEMPTS:
         if patient and not result.converged:
             result = attempt(setup, load, speed, result)
@@ -74,6 +83,13 @@ def _is_of_sets(setup: Setup) -> bool:
     """Whether which pads carry is all that can be in doubt, in films that are soon solved."""
     few = len(setup.bearing.pads) <= _MOST_PADS and not setup.flexible_pads and not couples_heat(setup)
     return few and not setup.friction and not setup.rotational_stiffness
+
+
+def _doubt(setup: Setup) -> float:
+    """Share of the clearance within which a curve may be wrong about its fold: a leaning shaft moves its ends off."""
+    bearing, (angle, _) = setup.bearing, setup.misalignment
+    lean = 0.5 * bearing.length * angle / min(pad.pad_clearance for pad in bearing.pads)
+    return lean + (_NEAR_SOFT if setup.flexible_pads or couples_heat(setup) else _NEAR)
 
 
 def _most_loaded(
@@ -129,7 +145,7 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
     if not result.converged:
         return result
     refused = set(held)
-    near = _NEAR_SOFT if search.setup.flexible_pads or couples_heat(search.setup) else _NEAR
+    near = _doubt(search.setup)
     while True:
         above, idle = search.margins(), result.idle
         if not held and np.where(idle, -above, np.abs(above)).min() > near:

@@ -9,9 +9,9 @@ from model.effects import Effect, known_effects
 from model.setup import Mesh
 from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
-from tpjb_ident.diagnosis.comparison.fit import Start, fitted
+from tpjb_ident.diagnosis.comparison.fit import Start, begun, fitted
 from tpjb_ident.diagnosis.comparison.paths import lengthened, path_through
-from tpjb_ident.diagnosis.comparison.search import compare
+from tpjb_ident.diagnosis.comparison.search import _Search, compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import prediction
 from tpjb_ident.diagnosis.diagnose import pose
@@ -41,14 +41,19 @@ def test_a_course_is_asked_on_both_sides_as_far_as_bounds_allow(bounds, size, wa
     fault, asked = SimpleNamespace(width=prior[1], prior=prior), []
 
     def run(task, jobs):
-        asked.extend(jobs)
-        return [[(node, np.array([node])) for node in nodes] for _, nodes in jobs]
+        asked.extend(nodes for _, part, _ in jobs for _, nodes in part)
+        return [[[(node, np.array([node])) for node in nodes] for _, nodes in part] for _, part, _ in jobs]
+
+    run.opened = SimpleNamespace(count=2)
 
     near = 1.5e-9 * (1.0 / 3.0)
     start = path_through(fault, [(near, np.array([near]))])
-    (longer,) = lengthened(run, None, (start,), [size])
+    (longer,) = lengthened(run, ((), None), (start,), [size])
     assert longer.nodes == pytest.approx(sorted([0.0, *wanted]), rel=1e-9)
-    assert [nodes for _, nodes in asked] == [pytest.approx(wanted[1:])]
+    assert asked == [pytest.approx(wanted[1:])]
+    (elsewhere,) = lengthened(run, ((fault,), None), (start,), [size])  # what was known counts from another place
+    assert [sorted(nodes) for nodes in asked[1:]] == [pytest.approx(sorted(wanted))]
+    np.testing.assert_array_equal(elsewhere.nodes, longer.nodes)
 
 
 def values(known, at):
@@ -112,7 +117,7 @@ class Narrow(Forward):
             raise NoEquilibriumError("beyond a degree")
         return super().__call__(effects, change)
 
-    def fresh(self):
+    def fresh(self, near=False):
         return self
 
 
@@ -128,7 +133,9 @@ def test_a_start_without_an_equilibrium_is_taken_nearer_to_what_is_stated():
     jacobian = np.column_stack([np.zeros(len(planned)), problem.scaled(problem.columns)])
     with workers(forward, problem, 1) as run:
         assert next(iter(run(prediction, [((fault,), theta)]))) is None
-        fit = fitted(run, problem, Start((fault,), (theta,), jacobian))
+        start = Start((fault,), (theta,), jacobian)
+        ((_, linear),) = begun(run, problem, start)
+        fit = fitted(run, problem, start, linear)
     assert abs(fit.linear.theta[0]) <= np.radians(1.0)
 
 
@@ -144,12 +151,25 @@ def test_a_fit_goes_on_while_its_steps_pay():
         return straight @ theta + bent @ theta**2
 
     problem = SimpleNamespace(measured=shown(truth), errors=errors, nuisances=nuisances)
-    fit = fitted(lambda task, jobs: [shown(theta) for _, theta in jobs], problem, Start((), (np.zeros(6),), straight))
+    start = Start((), (np.zeros(6),), straight)
+    run = predicts(shown)
+    ((_, linear),) = begun(run, problem, start)
+    fit = fitted(run, problem, start, linear)
     assert fit.linear.theta == pytest.approx(truth, abs=0.05)
     assert fit.posterior.refused < 1.0
 
 
-def test_a_fit_begins_at_the_better_of_its_places_whichever_comes_first():
+def predicts(shown, slopes=None):
+    """Predictions and derivatives of a model of numbers alone."""
+
+    def run(task, jobs):
+        return [shown(job[1]) if task is prediction else [slopes[:, i] for i in job[2]] for job in jobs]
+
+    run.opened = SimpleNamespace(count=1)
+    return run
+
+
+def test_a_fit_ends_at_the_better_of_where_its_places_lead_whichever_comes_first():
     """A jump lies between where nothing is off and the truth; no derivative foretells it."""
     rng = np.random.default_rng(5)
     straight = rng.normal(size=(40, 3))
@@ -164,7 +184,8 @@ def test_a_fit_begins_at_the_better_of_its_places_whichever_comes_first():
     near, far = truth - 0.1, np.zeros(3)
     reached = {}
     for name, places in {"far": (far,), "near": (near,), "both": (near, far), "turned": (far, near)}.items():
-        fit = fitted(lambda task, jobs: [shown(theta) for _, theta in jobs], problem, Start((), places, straight))
-        reached[name] = fit.posterior.total
+        tried = object.__new__(_Search)
+        tried.run, tried.problem, tried.fits, tried.places = predicts(shown, straight), problem, {}, {}
+        reached[name] = tried._reached(Start((), places, straight)).posterior.total
     assert reached["far"] < reached["near"] - 1000.0
     assert reached["both"] == reached["turned"] == reached["near"]

@@ -59,12 +59,12 @@ def test_a_polygon_is_observed_as_the_probes_read_it(as_read):
 def test_load_and_heat_are_raised_only_where_no_solved_neighbour_is_known(monkeypatch):
     asked, place = [], (5000.0, -1.5, 138.0)
 
-    def unsolved(*_, patient):
-        asked.append(patient)
+    def unsolved(*_, patient, near):
+        asked.append((patient, near))
         raise forward.NoEquilibriumError("none")
 
     monkeypatch.setattr(forward, "solve_as_it_runs", unsolved)
-    for known in ({}, {place: object()}):
+    for known, near in (({}, False), ({place: object()}, False), ({place: object()}, True)):
         with pytest.raises(forward.NoEquilibriumError):
-            forward.ModelCache(start=known).ask(rocker_setup(), place, (), (0.75,) * 5)
-    assert asked == [True, False]
+            forward.ModelCache(start=known).copy(near).ask(rocker_setup(), place, (), (0.75,) * 5)
+    assert asked == [(True, False), (False, False), (False, True)]

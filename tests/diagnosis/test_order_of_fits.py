@@ -183,6 +183,22 @@ def test_without_an_effect_in_the_library_none_is_below_the_floor_or_named(campa
     assert (verdict.verdict, verdict.effects, verdict.below_floor) == ("unexplained", (), ())
 
 
+def test_a_fault_that_no_derivative_sizes_is_needed_where_it_alone_makes_the_difference():
+    """A pad that idles without it and carries with any of it: the size says nothing, and the evidence does."""
+    tried = object.__new__(search._Search)
+    whole = SimpleNamespace(
+        labels=frozenset({"a", "b"}), unsized=("b",), p=0.5, on_bound=False, posterior=SimpleNamespace(total=-20.0)
+    )
+    for without, needed in ((None, False), (-20.0 - 2.0 * Deciding.near, True), (-21.0, False)):
+        rest = SimpleNamespace(posterior=SimpleNamespace(total=without))
+        tried.fits = {} if without is None else {frozenset({"a"}): rest}
+        assert tried._is_tenable(whole) == needed
+    whole.unsized, tried.fits = (), {}
+    assert tried._is_tenable(whole)
+    whole.on_bound = True
+    assert not tried._is_tenable(whole)
+
+
 def test_only_what_a_campaign_could_not_tell_from_a_fault_of_the_leader_is_fitted_in_its_place():
     errors, linear, columns = linear_case([1.0])
     rng = np.random.default_rng(5)
@@ -241,10 +257,10 @@ def stub_fit(total, labels=frozenset("b")):
 def test_a_fit_gets_derivatives_of_its_own_where_it_leads_or_is_off_its_score(monkeypatch, total, estimate, renewed):
     asked = []
     tried = stub_search(total=0.0, estimate=0.0)
-    monkeypatch.setattr(search, "fitted", lambda run, problem, start: stub_fit(total))
-    monkeypatch.setattr(search, "refined", lambda run, fit, whole: asked.append(fit) or fit)
+    monkeypatch.setattr(search, "fitted", lambda *_: stub_fit(total))
+    monkeypatch.setattr(search, "refined", lambda run, fit: asked.append(fit) or fit)
     tried.run = tried.problem = None
-    tried._reached(SimpleNamespace(estimate=estimate, coarse=False))
+    tried._led(SimpleNamespace(estimate=estimate, coarse=False), None)
     assert bool(asked) == renewed
 
 
@@ -260,15 +276,15 @@ def test_a_fit_gets_derivatives_of_its_own_where_it_leads_or_is_off_its_score(mo
 def test_after_a_coarse_start_derivatives_are_asked_again_unless_they_were_refused(monkeypatch, total, rise, times):
     asked = []
 
-    def refined(run, fit, whole):
+    def refined(run, fit):
         asked.append(fit)
         return stub_fit(fit.posterior.total + rise)
 
     tried = stub_search(total=0.0, estimate=0.0)
-    monkeypatch.setattr(search, "fitted", lambda run, problem, start: stub_fit(total))
+    monkeypatch.setattr(search, "fitted", lambda *_: stub_fit(total))
     monkeypatch.setattr(search, "refined", refined)
     tried.run = tried.problem = None
-    tried._reached(SimpleNamespace(estimate=-100.0, coarse=True))
+    tried._led(SimpleNamespace(estimate=-100.0, coarse=True), None)
     assert len(asked) == times
 
 

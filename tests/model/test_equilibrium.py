@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
+from model.effects import Effect
 from model.pivots import constant_pivot
 from model.predict import predict
 from model.prediction import Prediction
@@ -258,3 +259,19 @@ def test_of_two_mirror_images_the_last_pad_idles_and_the_other_is_named():
         p = predict(bearing, 598.6525, math.pi / 6.0, 456.4751, pivots=1.979934e8, thermal="adiabatic", mesh=mesh)
         assert p.status == ("another equilibrium exists", "idle pads 5")
         assert p.status[0].pads == (4,)
+
+
+def test_a_pad_lets_go_where_the_shaft_leans_before_its_straight_curve_does():
+    # ends that lean off by a tenth of the clearance: a pad idles where a straight shaft would load it
+    angles = [math.radians(72.0 * k - 90.0) for k in range(5)]
+    size, oil = (0.1005729, 0.08307), (0.0275, 45.47)
+    bearing = ring(angles, size, math.radians(57.82), (73.87e-6, 69.24e-6), oil, 0.464)
+    load = 3349.0, math.radians(150.0), 267.8
+    leaning = [[Effect("misalignment", angle=angle, direction=0.0)] for angle in np.linspace(1e-5, 7e-4, 8)]
+    path = [predict(bearing, *load, pivots=6e8, effects=effects) for effects in leaning]
+    assert all(p.converged for p in path)
+    assert [p.idle_pads for p in path] == [(1, 2)] * 2 + [(1, 2, 3)] * 6
+    assert path[1].pad_load[2] < 0.5 * path[0].pad_load[2]
+    steps = np.diff([p.position for p in path], axis=0)
+    assert np.abs(steps).max() < 2e-6
+    assert np.all(np.linalg.norm(np.diff(steps, axis=0), axis=1) < 0.5e-6)  # it goes on where the pad lets go

@@ -166,7 +166,7 @@ class Emulated(ModelCache):
     _last: tuple[bytes, FloatArray] | None = None
     _setup: tuple[Setup, FloatArray] | None = None
 
-    def copy(self) -> Emulated:
+    def copy(self, near: bool = False) -> Emulated:
         """The same: nothing that is asked changes an answer."""
         return self
 

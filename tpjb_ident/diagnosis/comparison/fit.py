@@ -101,10 +101,14 @@ class Fit:
         return any(out[at].any() for at in unknowns.slices)
 
     @property
-    def shows(self) -> bool:
-        """Whether every fault's size is told from none: its 95 % interval does not hold where nothing happens."""
-        rows = zip(self.amplitudes, self.unknowns.slices, self.errors, strict=True)
-        return all(np.any(np.abs(size - self.unknowns.origin[at]) > 1.96 * error) for size, at, error in rows)
+    def unsized(self) -> tuple[str, ...]:
+        """Labels of faults whose size is not told from none: its 95 % interval holds where nothing happens."""
+        rows = zip(self.faults, self.amplitudes, self.unknowns.slices, self.errors, strict=True)
+        return tuple(
+            fault.label
+            for fault, size, at, error in rows
+            if not np.any(np.abs(size - self.unknowns.origin[at]) > 1.96 * error)
+        )
 
     @property
     def needs_more(self) -> bool:
@@ -167,7 +171,7 @@ class Start:
     """An explanation to be fitted, and where its fit begins, on derivatives known from nearby."""
 
     faults: tuple[Fault, ...]
-    places: tuple[FloatArray, ...] = field(repr=False)  #: the best counts: jumps of K and C may lie between them
+    places: tuple[FloatArray, ...] = field(repr=False)  #: the best end counts: jumps of K and C may lie between them
     jacobian: FloatArray = field(repr=False)
     coarse: bool = False  #: past jumps of K and C first: every element off by itself, tolerances held
     estimate: float = 0.0  #: log p(y, model) to first order [nats]
@@ -178,22 +182,28 @@ class Start:
         return frozenset(fault.label for fault in self.faults)
 
 
-def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
-    """Fit from a start; None where there is no equilibrium."""
+def begun(run: Map, problem: Problem, start: Start) -> list[tuple[float, Linear]]:
+    """A start's places with what they promise, the most first; none: no equilibrium."""
     unknowns = Unknowns(problem, start.faults)
-    begun = [at for place in start.places if (at := _begun(run, unknowns, place, start.jacobian)) is not None]
-    if not begun:
-        return None
-    linear = max(begun, key=lambda at: posterior(problem.errors, at).total)
-    if start.coarse:
-        held = unknowns.width.copy()
-        held[unknowns.tolerances] = Deciding.held
-        coarse = problem.errors.coarse
-        # those from before the jump say nothing behind it; of tolerances that are held little is asked
-        linear = _renewed(run, unknowns, linear, [i for at in unknowns.slices for i in range(at.start, at.stop)])
-        linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
-        linear = _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
-    return _settled(run, unknowns, linear)
+    solved = [_begun(run, unknowns, place, start.jacobian) for place in start.places]
+    places = [(posterior(problem.errors, at).promised, at) for at in solved if at is not None]
+    return sorted(places, key=lambda row: -row[0])
+
+
+def fitted(run: Map, problem: Problem, start: Start, linear: Linear) -> Fit:
+    """Fit from one of a start's places."""
+    unknowns = Unknowns(problem, start.faults)
+    return _settled(run, unknowns, _past_jumps(run, unknowns, linear) if start.coarse else linear)
+
+
+def _past_jumps(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
+    """A coarse start: every element off by itself, tolerances held at first."""
+    held, coarse = unknowns.width.copy(), unknowns.problem.errors.coarse
+    held[unknowns.tolerances] = Deciding.held
+    # those from before the jump say nothing behind it; of tolerances that are held little is asked
+    linear = _renewed(run, unknowns, linear, [i for at in unknowns.slices for i in range(at.start, at.stop)])
+    linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
+    return _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
 
 
 def _begun(run: Map, unknowns: Unknowns, place: FloatArray, jacobian: FloatArray) -> Linear | None:
@@ -206,13 +216,12 @@ def _begun(run: Map, unknowns: Unknowns, place: FloatArray, jacobian: FloatArray
     return None
 
 
-def refined(run: Map, fit: Fit, whole: bool = True) -> Fit:
-    """The same with derivatives of its own, moved on by them; not `whole`: by numbers whose next step shows."""
-    errors, unknowns, linear = fit.problem.errors, fit.unknowns, fit.linear
-    step = np.clip(fit.posterior.mean, unknowns.low, unknowns.high) - linear.theta
-    shown = np.linalg.norm(errors.white(linear.jacobian * step, fit.posterior.leading), axis=0) > 1.0
-    asked = [i for i, reading in enumerate(unknowns.is_reading) if not reading and (whole or shown[i])]
-    return _settled(run, unknowns, _renewed(run, unknowns, linear, asked, fit.posterior.scale <= Deciding.right))
+def refined(run: Map, fit: Fit) -> Fit:
+    """The same with derivatives of its own, moved on by them."""
+    unknowns = fit.unknowns
+    asked = [i for i, reading in enumerate(unknowns.is_reading) if not reading]
+    exact = fit.posterior.scale <= Deciding.right
+    return _settled(run, unknowns, _renewed(run, unknowns, fit.linear, asked, exact))
 
 
 def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
-from tpjb_ident.diagnosis.comparison.unknowns import SLOW, derivatives, path_changes
+from tpjb_ident.diagnosis.comparison.unknowns import SLOW, Place, derivatives, path_changes
 from tpjb_ident.diagnosis.forward.workers import Map
 
 #: A typical size in widths of the prior.
@@ -78,14 +78,15 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
 
     Those without an equilibrium anywhere are left out.
     """
+    stated = np.zeros(len(problem.nuisances))
     curved = [f for f in problem.faults if len(f.width) == 1 and f.name not in SLOW]
     straight = [f for f in problem.faults if f not in curved]
     columns = problem.scaled(problem.columns)
     paths = [path_through(f, [(1.0, columns[:, f.own])]) for f in curved if f.own >= 0]
-    asked = [f for f in curved if f.own < 0]
-    changes = run(path_changes, [(f, _wanted(f, 0.0), 1) for f in asked])
-    paths += [path_through(fault, row) for fault, row in zip(asked, changes, strict=True) if row]
-    jobs = [((f,), np.zeros(len(f.width) + len(problem.nuisances)), tuple(range(len(f.width)))) for f in straight]
+    points = [Path(f, columns[:, :0], np.zeros(1)) for f in curved if f.own < 0]
+    first_sizes = [_NEAR * float(point.fault.width[0]) for point in points]
+    paths += [path for path in lengthened(run, ((), stated), points, first_sizes, 1) if path.columns.size]
+    jobs = [((f,), np.append(np.zeros(len(f.width)), stated), tuple(range(len(f.width)))) for f in straight]
     for fault, found in zip(straight, run(derivatives, jobs), strict=True):
         whole = [column for column in found if column is not None]
         if len(whole) == len(fault.width):
@@ -105,17 +106,25 @@ def _wanted(fault: Fault, size: float) -> list[float]:
     return [node for node in dict.fromkeys([near, back, *beyond]) if node]
 
 
-def lengthened(run: Map, problem: Problem, paths: Sequence[Path], sizes: Sequence[float]) -> tuple[Path, ...]:
-    """Paths with what a size asks for: typical sizes on both sides, and the end towards which it goes beyond them."""
-    jobs, asked = [], []
+def lengthened(
+    run: Map, place: Place, paths: Sequence[Path], sizes: Sequence[float], most: int = 9
+) -> tuple[Path, ...]:
+    """Paths from a place with what a size asks for: typical sizes on both sides, and the end beyond; 0: as it is.
+
+    What is known of a path counts from the baseline, and not from another place.
+    """
+    out, asked = list(paths), []
     for i, (path, size) in enumerate(zip(paths, sizes, strict=True)):
         if size and path.nodes is not None:
-            asked.append((i, path.nodes))
-            jobs.append((path.fault, [node for node in _wanted(path.fault, size) if node not in path.nodes]))
-    out = list(paths)
-    for (i, nodes), row in zip(asked, run(path_changes, jobs), strict=True):
-        known = [(node, paths[i].columns[:, k]) for k, node in enumerate(nodes) if node != 0.0]
-        out[i] = path_through(paths[i].fault, [*known, *row])
+            known = {} if place[0] else {node: path.columns[:, k] for k, node in enumerate(path.nodes) if node}
+            nodes = [node for node in _wanted(path.fault, size) if node not in known]
+            asked.append((i, known, (path.fault, nodes)))
+    parts = [asked[k :: run.opened.count] for k in range(run.opened.count)]
+    jobs = [(place, [job for _, _, job in part], most) for part in parts]
+    for part, rows in zip(parts, run(path_changes, jobs), strict=True):
+        for (i, known, (fault, _)), row in zip(part, rows, strict=True):
+            if known or row:
+                out[i] = path_through(fault, [*known.items(), *row])
     return tuple(out)
 
 

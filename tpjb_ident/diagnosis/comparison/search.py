@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
-from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
+from tpjb_ident.diagnosis.comparison.fit import Fit, Start, begun, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores, separations
@@ -79,6 +79,7 @@ class _Search:
         self.begun: dict[frozenset[str], float] = {}  #: estimates of coarse starts that were fitted
         self.paths: tuple[Path, ...] = ()
         self.exchanged: dict[frozenset[str], list[Start]] = {}  #: look-alikes by the leader that they are held against
+        self.moved: set[frozenset[str]] = set()  #: single faults beside which paths were asked
         self.whole = True  #: whether paths are known as far as jumps of K and C ask for
         self.clear = -math.inf  #: coarse estimate from which a start comes before all others [nats]
         self.places = Counter(name for name, _ in {(fault.name, fault.label) for fault in problem.faults})
@@ -98,8 +99,8 @@ class _Search:
         """The likeliest proposal; None where none comes near the leader."""
         if self.tried >= Deciding.most_fits:
             return None
-        if not (self.whole or self._passed or any(map(self._comes_first, self.proposals.values()))):
-            self._ask_whole_paths()
+        if not (self._passed or any(map(self._comes_first, self.proposals.values()))):
+            self._ask_further_paths()
         if promising := self._waiting():
             return self.proposals.pop(max(promising, key=lambda p: (self._comes_first(p), p.estimate)).labels)
         leader = self._leader()
@@ -161,12 +162,23 @@ class _Search:
         """Whether a start is coarse, and has no clearly better ones: once a fit is past the jumps these have been."""
         return proposal.coarse and (proposal.estimate >= self.clear or (self.whole and not self._passed))
 
-    def _ask_whole_paths(self) -> None:
-        """Ask for every path to both of its ends, where no fit got past the jumps that may lie on them."""
-        self.whole = True
-        for end in (-1.0, 1.0):
-            self._lengthen([end * float(path.fault.width[0]) for path in self.paths])
-        self._propose_alone()
+    def _ask_further_paths(self) -> None:
+        """Ask for paths beside one fault that leads; for every path to both of its ends, where no fit gets past jumps.
+
+        From the baseline they say little of what a second fault does beside a large one.
+        """
+        best = max(self.fits.values(), key=self._log_probability)
+        if len(best.faults) == 1 and best.labels not in self.moved:
+            self.moved.add(best.labels)
+            # tolerances have derivatives there
+            sizes = [0.0 if path.fault.own >= 0 else float(path.fault.width[0]) / 3.0 for path in self.paths]
+            place = best.faults, best.linear.theta
+            self._propose_neighbours(best, lengthened(self.run, place, self.paths, sizes))
+        if not self.whole:
+            self.whole = True
+            for end in (-1.0, 1.0):
+                self._lengthen([end * float(path.fault.width[0]) for path in self.paths])
+            self._propose_alone()
 
     def _promising(self, proposal: Start, leader: Fit) -> bool:
         """Whether a proposal may change the answer: as a rival of a leader, or by a fault beside a right one."""
@@ -184,16 +196,23 @@ class _Search:
             rise = 0.0
         return proposal.estimate > total - near - rise
 
-    def _renewed(self, fit: Fit, whole: bool = True) -> Fit:
+    def _renewed(self, fit: Fit) -> Fit:
         """A fit with derivatives of its own, where these do not make it worse."""
-        again = refined(self.run, fit, whole)
+        again = refined(self.run, fit)
         return again if again.posterior.total > fit.posterior.total - Deciding.better else fit
 
     def _reached(self, start: Start) -> Fit | None:
-        """Where a start leads; steps that fail on derivatives from elsewhere say nothing: what they promise counts."""
-        fit, leader = fitted(self.run, self.problem, start), self._leader()
-        if fit is None:
-            return None
+        """Where a start leads, from each of its places that promises more than was reached."""
+        best: Fit | None = None
+        for promise, linear in begun(self.run, self.problem, start):
+            if best is None or promise > best.posterior.total:
+                fit = self._led(start, linear)
+                best = fit if best is None else max(best, fit, key=lambda end: end.posterior.total)
+        return best
+
+    def _led(self, start: Start, linear: Linear) -> Fit:
+        """Where a place leads; steps that fail on derivatives from elsewhere say nothing: what they promise counts."""
+        fit, leader = fitted(self.run, self.problem, start, linear), self._leader()
         if start.coarse:  # derivatives from before a jump led here, and say little of what lies behind it
             before, fit = fit, self._renewed(fit)
             if fit is before:  # refused once, they would be refused again
@@ -203,13 +222,7 @@ class _Search:
         worth = min(Deciding.worth_derivatives, Deciding.foretold * abs(self._log_probability(fit) - start.estimate))
         nats = Deciding.mistaken if start.coarse else worth if right else 0.0
         tenable_first = right and leader is None  # whether it is tenable tells none that has not arrived
-        if not (tenable_first or self._near(fit, fit.posterior.promised, nats)):
-            return fit
-        if not right and not self._near(fit, fit.posterior.total, 0.0):
-            fit = self._renewed(fit, whole=False)  # where all that is fitted is wrong, most promises are
-            if not self._near(fit, fit.posterior.total, 0.0):
-                return fit
-        return self._renewed(fit)
+        return self._renewed(fit) if tenable_first or self._near(fit, fit.posterior.promised, nats) else fit
 
     def _fit(self, proposal: Start) -> None:
         """Fit a proposal; one that should lead and is wrong, or stopped at a jump, once more with a coarse start."""
@@ -220,10 +233,8 @@ class _Search:
         if fit is None:
             return
         wrong = fit.posterior.refused > Deciding.better or fit.needs_more
-        # what stands beside one that was begun coarsely is past its jumps
-        passed = not fit.faults or any(labels <= proposal.labels for labels in self.begun)
         promised = max(fit.posterior.promised, proposal.estimate - self._log_prior(fit.faults))
-        if wrong and not passed and self._near(fit, promised, 0.0):
+        if wrong and fit.faults and proposal.labels not in self.begun and self._near(fit, promised, 0.0):
             self.begun[proposal.labels] = -math.inf
             coarse = self._reached(Start(fit.faults, (fit.linear.theta,), fit.linear.jacobian, coarse=True))
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
@@ -243,7 +254,14 @@ class _Search:
 
     def _leader(self) -> Fit | None:
         """The most probable tenable fit so far."""
-        return max(filter(_tenable, self.fits.values()), key=self._log_probability, default=None)
+        return max(filter(self._is_tenable, self.fits.values()), key=self._log_probability, default=None)
+
+    def _is_tenable(self, fit: Fit) -> bool:
+        """Whether nothing speaks against a fit; what makes K and C jump can be needed, and of any size."""
+        if fit.p < Deciding.untenable or fit.on_bound:
+            return False
+        without = [self.fits.get(fit.labels - {label}) for label in fit.unsized]
+        return all(rest is not None and rest.posterior.total < fit.posterior.total - Deciding.near for rest in without)
 
     def _log_probability(self, fit: Fit) -> float:
         return fit.posterior.total + self._log_prior(fit.faults)
@@ -264,7 +282,7 @@ class _Search:
             self._propose_alone()
 
     def _lengthen(self, sizes: Sequence[float]) -> None:
-        self.paths = lengthened(self.run, self.problem, self.paths, sizes)
+        self.paths = lengthened(self.run, ((), self._stated.theta), self.paths, sizes)
 
     def _follow(self, leading: Sequence[Score]) -> None:
         """Ask for more of the paths that lead, towards where they lead."""
@@ -299,10 +317,10 @@ class _Search:
             self.clear = max((score.total for score in rough), default=-math.inf) - Deciding.mistaken
         return scale
 
-    def _propose_neighbours(self, fit: Fit) -> None:
-        """One fault more, and one less."""
+    def _propose_neighbours(self, fit: Fit, paths: Sequence[Path] = ()) -> None:
+        """One fault more, by paths from where it is if these are known, and one less."""
         if len(fit.faults) < len(Deciding.prior) - 1:
-            further = [self._beside(path, fit) for path in self.paths if path.fault.label not in fit.labels]
+            further = [self._beside(path, fit) for path in paths or self.paths if path.fault.label not in fit.labels]
             for score in scores(self.problem.errors, fit.linear, further, fit.strain):
                 self._propose(replace(score, total=score.total - fit.posterior.refused), fit.faults, fit.linear)
         for fault in fit.faults:
@@ -378,7 +396,7 @@ class _Search:
     def _weighed(self) -> Comparison:
         """Probabilities among the tenable fits; among all where none is."""
         rows = list(self.fits.values())
-        tenable = frozenset(fit for fit in rows if _tenable(fit))
+        tenable = frozenset(fit for fit in rows if self._is_tenable(fit))
         logs = np.array([self._log_probability(fit) for fit in rows])
         counted = np.where([fit in tenable for fit in rows], logs, -np.inf) if tenable else logs
         waiting = [start for start in self._waiting() if not start.coarse]  # coarse evidence is another's unit
@@ -387,7 +405,3 @@ class _Search:
         order = np.lexsort((-logs, -probabilities))
         rest = tuple(({fault.name for fault in s.faults}, math.exp(s.estimate - total)) for s in waiting)
         return Comparison({rows[i]: float(probabilities[i]) for i in order}, rest, tenable, self.paths)
-
-
-def _tenable(fit: Fit) -> bool:
-    return fit.p >= Deciding.untenable and not fit.on_bound and fit.shows

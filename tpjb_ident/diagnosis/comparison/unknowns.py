@@ -20,6 +20,8 @@ from tpjb_ident.errors import TpjbError
 _SHARE, _DEVIATIONS = 1.0 / 30.0, 0.3
 #: Effects of which one prediction takes seconds: a derivative has to do in place of a path.
 SLOW = frozenset({"pad_bending", "pad_conduction"})
+#: Where an explanation is: its faults and free numbers.
+Place = tuple[tuple[Fault, ...], FloatArray]
 
 
 class Unknowns:
@@ -96,24 +98,38 @@ def _difference(
         there = theta.copy()
         there[index] += signed
         if unknowns.low[index] <= there[index] <= unknowns.high[index]:
-            changed = unknowns.predict(forward.fresh(), there)
+            changed = unknowns.predict(forward.fresh(near=True), there)
             if changed is not None:
                 return np.asarray((changed - at_point) / signed)
     return None
 
 
 def path_changes(
-    forward: Forward, problem: Problem, fault: Fault, nodes: Sequence[float], most: int = 9
+    forward: Forward, problem: Problem, place: Place, asked: Sequence[tuple[Fault, Sequence[float]]], most: int = 9
+) -> list[list[tuple[float, FloatArray]]]:
+    """Job: changes of the prediction from a place along every fault's first amplitude, at `most` of its nodes."""
+    faults, theta = place
+    base = Unknowns(problem, faults).predict(forward, theta)
+    if base is None:
+        return [[] for _ in asked]
+    return [
+        _changes(forward, Unknowns(problem, (*faults, fault)), (theta, base), nodes, most) for fault, nodes in asked
+    ]
+
+
+def _changes(
+    forward: Forward, unknowns: Unknowns, place: tuple[FloatArray, FloatArray], nodes: Sequence[float], most: int
 ) -> list[tuple[float, FloatArray]]:
-    """Job: changes of the prediction along a fault's first amplitude, all else as stated, at `most` of some nodes."""
-    unknowns, base = Unknowns(problem, (fault,)), problem.scaled(problem.base)
-    at = unknowns.slices[0].start
+    """Changes along the first amplitude of the last fault, where there is an equilibrium."""
+    (theta, base), at = place, unknowns.slices[-1].start
+    if len(theta) < len(unknowns.width):
+        theta = np.insert(theta, at, 0.0)
     out: list[tuple[float, FloatArray]] = []
     for node in nodes:
-        theta = np.zeros(len(unknowns.width))
-        theta[at] = node
+        there = theta.copy()
+        there[at] = node
         if len(out) < most and unknowns.low[at] <= node <= unknowns.high[at]:
-            changed = unknowns.predict(forward.fresh(), theta)
+            changed = unknowns.predict(forward.fresh(), there)
             if changed is not None:
                 out.append((node, changed - base))
     return out

@@ -61,11 +61,12 @@ class ModelCache:
 
     solved: dict[Setup, dict[Key, SolvedPoint]] = field(default_factory=dict, repr=False)
     start: dict[StaticPoint, Equilibrium] = field(default_factory=dict, repr=False)
+    near: bool = False  #: whether all that is asked lies a small step from `start`: for derivatives
     _last: tuple[Setup, Setup, dict[Key, SolvedPoint]] | None = field(default=None, repr=False)
 
-    def copy(self) -> ModelCache:
+    def copy(self, near: bool = False) -> ModelCache:
         """Return a memory of its own that begins with the same knowledge."""
-        return ModelCache({setup: dict(points) for setup, points in self.solved.items()}, dict(self.start))
+        return ModelCache({setup: dict(points) for setup, points in self.solved.items()}, dict(self.start), near)
 
     def ask(
         self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]
@@ -89,7 +90,7 @@ class ModelCache:
         force = load * np.array([math.cos(direction), math.sin(direction)])
         start = self.start.get(point)
         # what no solved neighbour and no curve of a pad leads to is too far away: a step is shortened sooner
-        running, equilibrium = solve_as_it_runs(setup, force, speed, start, patient=start is None)
+        running, equilibrium = solve_as_it_runs(setup, force, speed, start, patient=start is None, near=self.near)
         if not equilibrium.converged:
             raise NoEquilibriumError(f"no equilibrium at {load:.0f} N ({', '.join(equilibrium.status)})")
         self.start[point] = equilibrium
@@ -133,9 +134,9 @@ class Forward:
             values += [sides, np.angle(np.exp(1j * (angles - self._drawn)))]
         return np.concatenate(values)[self._rows]
 
-    def fresh(self) -> Forward:
+    def fresh(self, near: bool = False) -> Forward:
         """Return a copy that knows what this one knows now, whatever this one goes on to solve."""
-        return replace(self, cache=self.cache.copy())
+        return replace(self, cache=self.cache.copy(near))
 
     @functools.cached_property
     def _drawn(self) -> FloatArray:
