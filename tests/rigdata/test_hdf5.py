@@ -368,12 +368,10 @@ def test_the_stored_hash_reads_no_attribute_that_stands_elsewhere(path):
 @pytest.mark.parametrize("scale", ["scale_factor", "gain"])
 def test_counts_whose_scale_stands_in_an_attribute_are_refused(path, scale):
     """They were read as if they were volts."""
-    with h5py.File(path, "r+") as file:
-        group = file["runs/c-1"]
-        del group["X1A"]
+    with changed(path, "X1A") as group:
         group["X1A"] = np.arange(N, dtype=np.int16)
         group["X1A"].attrs[scale] = 1e-4
     refused(path, "dataset X1A", f"attribute {scale} is not applied", "physical numbers")
-    with h5py.File(path, "r+") as file:
-        del file["runs/c-1/X1A"].attrs[scale]
+    with changed(path) as group:
+        del group["X1A"].attrs[scale]
     assert reopened(path).record("X1A").values[3] == pytest.approx(3e-6)
