@@ -12,7 +12,7 @@ import time
 
 import pytest
 
-from rigdata.virtual_rig import Fault, write_campaign
+from rigdata.virtual_rig import Fault
 from tests.command_line import ended
 from tests.good_campaigns import rocker_rig
 from tpjb_ident.watch.landing import NewFiles
@@ -23,19 +23,21 @@ DYNAMIC = [f"d-05000-25-0{i}" for i in (1, 2, 3)]
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(campaign_of):
     """The whole campaign as CSV: three dynamic runs, three of the locus, dry tests, a sweep."""
-    folder = tmp_path_factory.mktemp("watch") / "finished"
-    write_campaign(folder, rocker_rig(3), "csv")
-    return folder
+    return campaign_of(rocker_rig(3), "csv")
 
 
 @pytest.fixture(scope="module")
-def clipped(tmp_path_factory):
+def clipped(campaign_of):
     """The same with a probe that clips in the second dynamic run."""
-    folder = tmp_path_factory.mktemp("watch") / "clipped"
-    write_campaign(folder, rocker_rig(3, Fault("clipped", run=DYNAMIC[1], channel="X1B", value=0.6)), "csv")
-    return folder
+    return campaign_of(rocker_rig(3, Fault("clipped", run=DYNAMIC[1], channel="X1B", value=0.6)), "csv")
+
+
+def land(source, live, *runs, name=""):
+    """Copy runs of a finished campaign, or one under another name; the copies may be written to."""
+    for run in runs:
+        shutil.copyfile(source / "runs" / f"{run}.csv", live / "runs" / f"{name or run}.csv")
 
 
 @pytest.fixture
@@ -44,7 +46,7 @@ def live(finished, tmp_path):
     folder = tmp_path / "live"
     (folder / "runs").mkdir(parents=True)
     for path in finished.glob("*.toml"):
-        shutil.copy(path, folder)
+        shutil.copyfile(path, folder / path.name)
     return folder
 
 
@@ -57,11 +59,6 @@ def test_the_page_begins_with_what_was_tested_what_it_gives_and_a_picture(finish
         assert words in first, done.output
     assert "Next: <code>" not in first, "runs are still to come"
     assert not re.search(r"MN/m|kN|µm", page)
-
-
-def land(source, live, *runs):
-    for run in runs:
-        shutil.copy(source / "runs" / f"{run}.csv", live / "runs")
 
 
 def watcher(live, settle: float = 0.0) -> Watcher:
@@ -95,7 +92,7 @@ def test_a_clipped_run_is_to_be_repeated_before_the_load_is_changed(live, finish
     assert step.kind == "repeat"
     assert step.text.startswith(f"Repeat {DYNAMIC[1]} before you change the load: channel X1B")
     assert "clipped" in step.text
-    shutil.copy(finished / "runs" / f"{DYNAMIC[1]}.csv", live / "runs" / f"{DYNAMIC[1]}_2.csv")
+    land(finished, live, DYNAMIC[1], name=f"{DYNAMIC[1]}_2")
     after = watch.look()
     assert states(after)[DYNAMIC[1]] == "replaced"
     assert states(after)[f"{DYNAMIC[1]}_2"] == "good"
@@ -123,7 +120,7 @@ def test_a_file_that_is_being_written_is_neither_judged_nor_missing(live, finish
 
 def test_records_under_other_names_are_placed_by_load_line_and_direction(live, finished):
     watch = watcher(live)
-    shutil.copy(finished / "runs" / f"{DYNAMIC[1]}.csv", live / "runs" / "Record_0017.csv")
+    land(finished, live, DYNAMIC[1], name="Record_0017")
     snapshot = watch.look()
     (placed,) = snapshot.placed
     assert (placed.like, placed.why) == (DYNAMIC[1], f"is {DYNAMIC[1]} by load and line")
@@ -158,9 +155,8 @@ def test_what_is_foreign_away_edited_or_taken_meanwhile_stops_nothing(live, fini
     assert taken.measured.points[0].n_records == 2
 
 
-def test_a_probe_that_is_dead_in_two_records_in_a_row_stops_the_campaign(live, finished, tmp_path):
-    dead = tmp_path / "dead"
-    write_campaign(dead, rocker_rig(3, Fault("dead", run="d-*", channel="X1B")), "csv")
+def test_a_probe_that_is_dead_in_two_records_in_a_row_stops_the_campaign(live, finished, campaign_of):
+    dead = campaign_of(rocker_rig(3, Fault("dead", run="d-*", channel="X1B")), "csv")
     land(finished, live, DYNAMIC[0])
     for i, run in enumerate(DYNAMIC[1:]):
         land(dead, live, run)
