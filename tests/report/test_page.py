@@ -205,6 +205,9 @@ def test_measured_points_have_their_intervals_and_predictions_their_lines():
     (bars,) = axes.containers
     ends = np.array([segment[:, 1] for segment in bars[2][0].get_segments()])
     assert np.allclose(np.sort(ends, axis=0), rigid[["kyy_N_per_m_lo", "kyy_N_per_m_hi"]] / 1e6)
+    value = LOADED["kyy_N_per_m"]
+    wide = LOADED.assign(kyy_N_per_m_lo=0.8 * value, kyy_N_per_m_hi=1.2 * value)
+    assert len(coefficient_panels(wide)["kyy-over-load"].figure.axes) == 1  # no panel of deviations that say nothing
 
 
 def test_a_record_that_cannot_be_read_has_no_rate_in_the_table_of_runs():
