@@ -227,9 +227,3 @@ def test_temperature_of_reading_twenty(unit, zero, kelvin):
     gain = reading_gain("temperature", unit, "1 K/V")
     channel = Channel("T1", "temperature", unit, gain=gain, zero=reading_zero("temperature", unit, zero))
     assert channel.to_si(np.array([20.0])) == pytest.approx([kelvin])
-
-
-def test_readings_are_not_changed():
-    readings = np.array([1.0, 2.0], dtype=np.float32)
-    Channel("X", "displacement", "V", gain=2.0).to_si(readings)
-    assert readings.tolist() == [1.0, 2.0]
