@@ -134,6 +134,16 @@ def located(small_campaign, session_folder) -> Path:
     return once(session_folder / "located", lambda path: ended(0, "locus", small_campaign, "--out", path))
 
 
+@pytest.fixture
+def us() -> Iterator[None]:
+    """Pounds and inches, and back."""
+    from tpjb_ident.columns import use_units
+
+    use_units("us")
+    yield
+    use_units("si")
+
+
 @pytest.fixture(scope="module")
 def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder where the checkout's relative paths hold but nothing is written into the checkout."""

@@ -89,19 +89,13 @@ class Tab:
             raise RuntimeError(json.dumps(result["exceptionDetails"])[:800])
         return result["result"].get("value")
 
-    def size(self, width: int, height: int = 900, mobile: bool = False) -> None:
+    def size(self, width: int, height: int = 900) -> None:
         """Set the window."""
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=mobile)
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
 
     def prefer(self, scheme: str) -> None:
         """Choose the colour scheme, "light" or "dark"."""
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
-
-    def picture(self, path: Path, full: bool = True) -> bytes:
-        """Write a PNG of the page."""
-        data = base64.b64decode(self.call("Page.captureScreenshot", captureBeyondViewport=full, format="png")["data"])
-        path.write_bytes(data)
-        return data
 
     def pdf(self, path: Path, width: float = 8.27, height: float = 11.69) -> None:
         """Print to PDF on paper of so many inches."""

@@ -53,71 +53,66 @@ def report(session_folder):
     return shipped(session_folder).report
 
 
-def test_it_renders_without_errors_and_loads_nothing(chromium, report):
+@pytest.fixture
+def tab(chromium, report):
+    """A tab that shows it."""
     with chromium() as tab:
         tab.size(1280)
         tab.open(report.as_uri())
-        assert tab.logged == []
-        assert [url for url in tab.requested if url != report.as_uri()] == []
-        assert tab.js("document.querySelectorAll('figure svg').length") > 10
-        assert tab.js(
-            "[...document.querySelectorAll('figure svg')].every((s) => s.getBoundingClientRect().height > 80)"
-        )
+        yield tab
+
+
+def test_it_renders_without_errors_and_loads_nothing(tab, report):
+    assert tab.logged == []
+    assert [url for url in tab.requested if url != report.as_uri()] == []
+    assert tab.js("document.querySelectorAll('figure svg').length") > 10
+    assert tab.js("[...document.querySelectorAll('figure svg')].every((s) => s.getBoundingClientRect().height > 80)")
 
 
 @pytest.mark.parametrize("width", [360, 768, 1280])
-def test_nothing_runs_over_the_edge(chromium, report, width):
-    with chromium() as tab:
-        tab.size(width, 800)
-        tab.open(report.as_uri())
-        assert tab.js("document.documentElement.scrollWidth") <= width
-        assert tab.js(OVERFLOW) == []
+def test_nothing_runs_over_the_edge(tab, width):
+    tab.size(width, 800)
+    assert tab.js("document.documentElement.scrollWidth") <= width
+    assert tab.js(OVERFLOW) == []
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_all_text_has_contrast(chromium, report, scheme):
-    with chromium() as tab:
-        tab.size(1280)
-        tab.prefer(scheme)
-        tab.open(report.as_uri())
-        dark = tab.js("parseFloat(getComputedStyle(document.body).backgroundColor.match(/\\d+/)[0]) < 128")
-        assert dark == (scheme == "dark")
-        looked_at, bad = tab.js(CONTRAST)
-        assert looked_at > 300
-        assert bad == []
+def test_all_text_has_contrast(tab, scheme):
+    tab.prefer(scheme)
+    dark = tab.js("parseFloat(getComputedStyle(document.body).backgroundColor.match(/\\d+/)[0]) < 128")
+    assert dark == (scheme == "dark")
+    looked_at, bad = tab.js(CONTRAST)
+    assert looked_at > 300
+    assert bad == []
 
 
-def test_a_screen_reader_finds_names_everywhere(chromium, report):
-    with chromium() as tab:
-        tab.open(report.as_uri())
-        nodes = tab.accessible()
-        named = {"image", "region", "navigation", "table", "button", "link", "heading"}
-        nameless = [n["role"]["value"] for n in nodes
-                    if n["role"]["value"] in named and not n.get("name", {}).get("value", "").strip()]  # fmt: skip
-        assert nameless == []
-        roles = [n["role"]["value"] for n in nodes]
-        assert roles.count("image") == tab.js("document.querySelectorAll('figure svg').length")
-        assert {"main", "navigation", "heading"} <= set(roles)
-        assert tab.js("document.documentElement.lang") == "en"
+def test_a_screen_reader_finds_names_everywhere(tab):
+    nodes = tab.accessible()
+    named = {"image", "region", "navigation", "table", "button", "link", "heading"}
+    nameless = [n["role"]["value"] for n in nodes
+                if n["role"]["value"] in named and not n.get("name", {}).get("value", "").strip()]  # fmt: skip
+    assert nameless == []
+    roles = [n["role"]["value"] for n in nodes]
+    assert roles.count("image") == tab.js("document.querySelectorAll('figure svg').length")
+    assert {"main", "navigation", "heading"} <= set(roles)
+    assert tab.js("document.documentElement.lang") == "en"
 
 
-def test_tables_sort_by_number_and_back(chromium, report):
+def test_tables_sort_by_number_and_back(tab):
     first = (
         "[...document.querySelectorAll('#s7 table, section table')].find((t) => t.caption.textContent === 'Predicted')"
     )
     column = f"[...{first}.tBodies[0].rows].map((r) => parseFloat(r.cells[2].textContent.replace('\\u2212', '-')))"
-    with chromium() as tab:
-        tab.open(report.as_uri())
-        before = tab.js(column)
-        button = f"{first}.tHead.rows[0].cells[2].querySelector('button')"
-        tab.js(f"{button}.click()")
-        assert tab.js(column) == sorted(before)
-        assert tab.js(f"{first}.tHead.rows[0].cells[2].getAttribute('aria-sort')") == "ascending"
-        tab.js(f"{button}.click()")
-        assert tab.js(column) == sorted(before, reverse=True)
-        tab.js(f"{button}.focus(); {button}.click()")
-        assert tab.js(column) == before
-        assert tab.logged == []
+    before = tab.js(column)
+    button = f"{first}.tHead.rows[0].cells[2].querySelector('button')"
+    tab.js(f"{button}.click()")
+    assert tab.js(column) == sorted(before)
+    assert tab.js(f"{first}.tHead.rows[0].cells[2].getAttribute('aria-sort')") == "ascending"
+    tab.js(f"{button}.click()")
+    assert tab.js(column) == sorted(before, reverse=True)
+    tab.js(f"{button}.focus(); {button}.click()")
+    assert tab.js(column) == before
+    assert tab.logged == []
 
 
 def test_it_is_complete_without_javascript(chromium, report):
@@ -135,34 +130,28 @@ def test_it_is_complete_without_javascript(chromium, report):
         assert tab.logged == []
 
 
-def test_points_tell_their_values_and_text_is_text(chromium, report):
-    with chromium() as tab:
-        tab.open(report.as_uri())
-        titles = tab.js("[...document.querySelectorAll('figure svg use title')].map((t) => t.textContent)")
-        assert len(titles) > 100
-        assert any(re.fullmatch(r"measured, 95 %: kxx [\d.]+ ± [\d.]+ MN/m at static load 5 kN", t) for t in titles)
-        words = tab.js("[...document.querySelectorAll('#kxx-over-load svg text')].map((t) => t.textContent)")
-        assert "static load, kN" in words
+def test_points_tell_their_values_and_text_is_text(tab):
+    titles = tab.js("[...document.querySelectorAll('figure svg use title')].map((t) => t.textContent)")
+    assert len(titles) > 100
+    assert any(re.fullmatch(r"measured, 95 %: kxx [\d.]+ ± [\d.]+ MN/m at static load 5 kN", t) for t in titles)
+    words = tab.js("[...document.querySelectorAll('#kxx-over-load svg text')].map((t) => t.textContent)")
+    assert "static load, kN" in words
 
 
-def test_it_prints_on_a_few_pages(chromium, report, tmp_path):
-    with chromium() as tab:
-        tab.open(report.as_uri())
-        tab.pdf(tmp_path / "report.pdf")
+def test_it_prints_on_a_few_pages(tab, report, tmp_path):
+    tab.pdf(tmp_path / "report.pdf")
     pages = len(re.findall(rb"/Type\s*/Page\b", (tmp_path / "report.pdf").read_bytes()))
     assert 3 <= pages <= 10
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 900), (390, 844)])
-def test_the_first_screen_says_what_how_good_and_how_sure(chromium, report, width, height):
+def test_the_first_screen_says_what_how_good_and_how_sure(tab, width, height):
     """What was tested, the verdict with its largest deviation, and K and C with intervals: without a scroll."""
-    with chromium() as tab:
-        tab.size(width, height)
-        tab.open(report.as_uri())
-        shown = tab.js(
-            "[...document.querySelectorAll('h1, .tested div, .first, .next, .answer td, .answer figure svg')]"
-            f".filter((e) => e.getBoundingClientRect().bottom <= {height}).map((e) => e.textContent.trim()).join('|')"
-        )
+    tab.size(width, height)
+    shown = tab.js(
+        "[...document.querySelectorAll('h1, .tested div, .first, .next, .answer td, .answer figure svg')]"
+        f".filter((e) => e.getBoundingClientRect().bottom <= {height}).map((e) => e.textContent.trim()).join('|')"
+    )
     for words in ("22 Hz (1320 rpm)", "2.5 to 7.5 kN", "58 (42 dynamic", "0-peak", "The records are computed",
                   "largest single deviation", "inside their interval", "tpjb init", "66.00\u00a0±",
                   "26 of 28"):  # fmt: skip
@@ -170,35 +159,27 @@ def test_the_first_screen_says_what_how_good_and_how_sure(chromium, report, widt
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-def test_no_column_of_the_first_screen_is_cut(chromium, report, width):
-    with chromium() as tab:
-        tab.size(width, 844)
-        tab.open(report.as_uri())
-        wide = (
-            "[...document.querySelectorAll('.answer .scroll')].filter((e) => e.scrollWidth > e.clientWidth + 1).length"
-        )
-        assert tab.js(wide) == 0
+def test_no_column_of_the_first_screen_is_cut(tab, width):
+    tab.size(width, 844)
+    wide = "[...document.querySelectorAll('.answer .scroll')].filter((e) => e.scrollWidth > e.clientWidth + 1).length"
+    assert tab.js(wide) == 0
 
 
-def test_every_picture_names_its_curves_once(chromium, report):
+def test_every_picture_names_its_curves_once(tab):
     """Each can be cut out of the page and still be read."""
-    with chromium() as tab:
-        tab.open(report.as_uri())
-        figures = tab.js("document.querySelectorAll('figure svg').length")
-        labels = tab.js(
-            "[...document.querySelectorAll('figure svg text')]"
-            ".filter((t) => getComputedStyle(t).visibility !== 'hidden').map((t) => t.textContent)"
-        )
+    figures = tab.js("document.querySelectorAll('figure svg').length")
+    labels = tab.js(
+        "[...document.querySelectorAll('figure svg text')]"
+        ".filter((t) => getComputedStyle(t).visibility !== 'hidden').map((t) => t.textContent)"
+    )
     assert 2 < labels.count("Kirk pivots") <= figures
     assert labels.count("deviation, %") >= 4
 
 
-def test_a_printed_page_is_signed_numbered_and_legible(chromium, report, tmp_path):
+def test_a_printed_page_is_signed_numbered_and_legible(tab, tmp_path):
     pdf = shutil.which("pdftotext")
-    with chromium() as tab:
-        tab.open(report.as_uri())
-        for name, size in (("a4", (8.27, 11.69)), ("letter", (8.5, 11.0))):
-            tab.pdf(tmp_path / f"{name}.pdf", *size)
+    for name, size in (("a4", (8.27, 11.69)), ("letter", (8.5, 11.0))):
+        tab.pdf(tmp_path / f"{name}.pdf", *size)
     if pdf is None:
         pytest.skip("no pdftotext")
     for name in ("a4", "letter"):
@@ -224,12 +205,10 @@ SMALL = """
 """
 
 
-def test_no_printed_text_is_under_six_points(chromium, report):
-    with chromium() as tab:
-        tab.call("Emulation.setEmulatedMedia", media="print")
-        tab.size(695, 1000)
-        tab.open(report.as_uri())
-        assert tab.js(SMALL) == []
+def test_no_printed_text_is_under_six_points(tab):
+    tab.call("Emulation.setEmulatedMedia", media="print")
+    tab.size(695, 1000)
+    assert tab.js(SMALL) == []
 
 
 def test_a_hostile_campaign_stays_text(chromium, tmp_path):

@@ -17,7 +17,7 @@ from rigdata.virtual_rig import ClearanceSweep, DryTest, Fault, Noise, RigPlan
 from tests.clearance.cases import ANGLES, CLEARANCE, OtherRun, bearing_centre, rig, sphere
 from tpjb_ident.clearance import measure
 from tpjb_ident.clearance.measure import _inseparable, coldest_first, measure_clearance, measure_run, pairs_frame
-from tpjb_ident.clearance.polygon import corners, find_centre
+from tpjb_ident.clearance.polygon import find_centre
 from tpjb_ident.clearance.sweep import _settled
 from tpjb_ident.compare.static_tests import bearing_problems
 from tpjb_ident.conditions import sentences
@@ -299,10 +299,3 @@ def test_of_four_pads_any_may_be_off_and_the_error_reaches_to_each(degrees, pad)
 def test_pads_that_do_not_surround_the_shaft_are_refused(angles):
     with pytest.raises(ValueError, match="around the shaft"):
         find_centre(angles, np.full(len(angles), 80e-6), np.eye(len(angles)) * 1e-16)
-
-
-def test_corners_of_a_regular_pentagon():
-    found = corners(ANGLES, np.full(5, 80e-6))
-    assert np.hypot(*found.T) == pytest.approx(80e-6 / np.cos(np.pi / 5), rel=1e-12)
-    between = np.degrees(np.arctan2(found[:, 1], found[:, 0])) % 360
-    assert between == pytest.approx([306.0, 18.0, 90.0, 162.0, 234.0])

@@ -7,11 +7,11 @@ import shlex
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from rigdata.operating_point import ROTATIONS
+from tests.cli.test_init import record
 from tests.command_line import ended, tpjb
 from tpjb_ident.cli.commands.app import app
 from tpjb_ident.cli.commands.show import BARS, sparkline
@@ -151,22 +151,9 @@ def test_completion_scripts_can_be_shown(shell):
 
 @pytest.fixture
 def folder(tmp_path):
-    time = np.arange(2000) / 1000.0
-    rows = ["Time [s];X1 [V];F1 [N]"]
-    rows += [f"{t:.3f};{np.sin(157 * t):.5f};{2000 * np.cos(157 * t):.2f}" for t in time]
     (tmp_path / "a").mkdir()
-    (tmp_path / "a" / "test-5kN.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    record(tmp_path / "a" / "test-5kN.csv")
     return tmp_path / "a"
-
-
-def test_init_writes_a_draft_that_check_can_work_on(folder):
-    ended(0, "init", folder)
-    text = (folder / "campaign.toml").read_text(encoding="utf-8")
-    assert 'static_load = "5 kN"' in text
-    assert 'excitation_frequency = "25 Hz"' in text
-    assert "??" in text
-    checked = ended(2, "check", folder, "--out", folder.parent / "o")
-    assert "sensitivity" in checked.stdout
 
 
 def test_init_never_replaces_a_manifest(folder):

@@ -13,10 +13,10 @@ from tests.manifests import PROBE, SWEEP, manifest
 TIME = np.arange(2000) / 1000.0
 
 
-def record(path, names, frequency=25.0, load=5000.0):
+def record(path, names=("Time", "X1", "X2", "FH [N]", "FV [N]"), frequency=25.0):
     """Two probes in volts and two cells in newtons; the cells swing at a frequency."""
     swing = np.cos(2 * np.pi * frequency * TIME)
-    columns = [TIME, 0.1 * swing, 0.2 * swing + 0.02 * np.sin(2 * np.pi * 22 * TIME), 300 * swing, 400 * swing - load]
+    columns = [TIME, 0.1 * swing, 0.2 * swing + 0.02 * np.sin(2 * np.pi * 22 * TIME), 300 * swing, 400 * swing - 5e3]
     rows = [";".join(f"{v:.6f}" for v in row) for row in np.stack(columns, axis=1)]
     head = [";".join(names)] if names else []
     path.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
@@ -28,6 +28,13 @@ def folder(tmp_path):
     return tmp_path / "a"
 
 
+def drafted(folder, name, *names):
+    """Manifest that `init` drafts of one record."""
+    record(folder / name, *names)
+    ended(0, "init", folder)
+    return folder / "campaign.toml"
+
+
 def edit(path, *pairs):
     text = path.read_text("utf-8")
     for old, new in pairs:
@@ -37,9 +44,7 @@ def edit(path, *pairs):
 
 
 def test_columns_without_names_are_named_by_hand_and_guessed_anew(folder):
-    record(folder / "test-5kN-1320rpm.csv", ())
-    assert tpjb("init", folder).exit_code == 0
-    manifest = folder / "campaign.toml"
+    manifest = drafted(folder, "test-5kN-1320rpm.csv", ())
     text = manifest.read_text("utf-8")
     assert 'names = ["column1", "column2", "column3", "column4", "column5"]' in text
     assert '[channels.column1]\nquantity = "time"' in text
@@ -61,9 +66,7 @@ def test_columns_without_names_are_named_by_hand_and_guessed_anew(folder):
 
 
 def test_a_channel_that_was_given_its_quantity_gets_the_entries_that_it_lacks(folder):
-    record(folder / "test-5kN.csv", ("Time", "Dev1_ai0", "Dev1_ai1", "FH [N]", "FV [N]"))
-    tpjb("init", folder)
-    manifest = folder / "campaign.toml"
+    manifest = drafted(folder, "test-5kN.csv", ("Time", "Dev1_ai0", "Dev1_ai1", "FH [N]", "FV [N]"))
     why = 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, ..'
     edit(manifest, (why, 'quantity = "displacement"'))
     result = tpjb("init", folder, "--update")
@@ -76,9 +79,7 @@ def test_a_channel_that_was_given_its_quantity_gets_the_entries_that_it_lacks(fo
 
 def test_axes_by_a_name_stay_guesses_until_they_are_confirmed(folder):
     """LC_H is a hint, and what is concluded from such cells no better than it, also when a draft is carried on."""
-    record(folder / "d-5kN-25Hz.csv", ("Time", "Probe 45", "Probe 135", "LC_H [mV]", "LC_V [mV]"))
-    assert tpjb("init", folder).exit_code == 0
-    manifest = folder / "campaign.toml"
+    manifest = drafted(folder, "d-5kN-25Hz.csv", ("Time", "Probe 45", "Probe 135", "LC_H [mV]", "LC_V [mV]"))
     guesses = ('axis = "0 deg"   # (guess) its name', 'axis = "90 deg"   # (guess) its name', "if their axes hold")
     text = manifest.read_text("utf-8")
     assert all(guess in text for guess in guesses)
@@ -94,13 +95,11 @@ def test_axes_by_a_name_stay_guesses_until_they_are_confirmed(folder):
 
 
 def test_what_was_changed_by_hand_stays_and_new_records_become_runs(folder):
-    record(folder / "dyn-5kN-25Hz.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"))
-    tpjb("init", folder)
-    manifest = folder / "campaign.toml"
+    manifest = drafted(folder, "dyn-5kN-25Hz.csv")
     load = 'static_load = "5 kN"'  # read from the file's name: no mark
     edit(manifest, (load, 'static_load = "4.9 kN"'),
          ('mass = "?? kg"   # stator mass between oil film and load cells', 'mass = "31 kg"  # weighed'))  # fmt: skip
-    record(folder / "dyn-5kN-30Hz.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"), frequency=30.0)
+    record(folder / "dyn-5kN-30Hz.csv", frequency=30.0)
     result = tpjb("init", folder, "--update")
     text = manifest.read_text("utf-8")
     assert "run dyn-5kN-30Hz.csv: new" in result.stdout
@@ -110,9 +109,7 @@ def test_what_was_changed_by_hand_stays_and_new_records_become_runs(folder):
 
 
 def test_filling_in_a_unit_leaves_what_is_like_it_and_a_valid_manifest_valid(folder):
-    record(folder / "dyn-5kN-1320rpm.csv", ("Time", "Prox A", "Prox B", "FH [N]", "FV [N]"))
-    tpjb("init", folder)
-    manifest = folder / "campaign.toml"
+    manifest = drafted(folder, "dyn-5kN-1320rpm.csv", ("Time", "Prox A", "Prox B", "FH [N]", "FV [N]"))
     edit(manifest, ('"?? kg"', '"30 kg"'), ('unit = "??"', 'unit = "um"'), ('sensitivity = "??"', "# typed"))
     text = manifest.read_text("utf-8").replace('axis = "?? deg"', 'axis = "45 deg"', 1)
     manifest.write_text(text.replace('axis = "?? deg"', 'axis = "135 deg"   # by the drawing'), "utf-8")
@@ -139,15 +136,13 @@ def test_open_places_are_one_line_and_the_last_one_the_next_command(folder):
 
 
 def test_update_without_a_manifest_says_so(folder):
-    record(folder / "a.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"))
+    record(folder / "a.csv")
     result = ended(2, "init", folder, "--update")
     assert "nothing to carry on" in result.stderr
 
 
 def test_the_draft_of_the_bearing_explains_every_entry_and_is_refused_by_name_until_it_is_filled_in(folder):
-    record(folder / "a.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"))
-    tpjb("init", folder)
-    draft = folder / "bearing.toml"
+    draft = drafted(folder, "a.csv").with_name("bearing.toml")
     with pytest.raises(BearingError, match=r"bearing\.toml.*diameter"):
         load_bearing(draft)
     values = {"diameter": "100", "length": "70", "assembled_clearance": "0.08", "pad_clearance": "0.13",

@@ -59,6 +59,9 @@ def test_sentences_break_at_spaces_and_paths_stay_whole():
         (32.31, 0.28, "32.3 ±0.3"),
         (1315.2, 11.4, "1315 ±11"),
         (math.nan, math.nan, "no answer"),
+        (math.nan, 1.0, "no answer"),
+        (0.0, math.nan, "no answer"),
+        (0.0, 1.0, "0 ±1"),
         (5.0, math.nan, "5 ±?"),
     ],
 )
@@ -111,41 +114,33 @@ def test_a_long_table_ends_with_the_file_that_has_all_of_it(capsys, file):
     assert "more rows" not in capsys.readouterr().out
 
 
-@pytest.fixture
-def lines(monkeypatch):
+#: Looks at a step: seconds, what is done of how many, and the line that is printed.
+LOOKS = {
+    "what is quickly done says nothing": [(done, done, 20, "") for done in range(1, 20)],
+    "time left is told from the speed of this step": [
+        (0.0, 0, 1000, ""),
+        (40.0, 100, 1000, "100 of 1000, about 6 min left"),
+        (400.0, 0, 100, ""),
+        (440.0, 80, 100, "80 of 100, about 10 s left"),
+    ],
+    "the first of many foretells nothing": [(0.0, 0, 334, ""), (100.0, 1, 334, "1 of 334")],
+    "what the first one had to compile is not foretold of the rest": [
+        (0.0, 0, 14, ""),
+        (60.0, 1, 14, "1 of 14"),
+        (92.0, 5, 14, "5 of 14, about 1 min left"),
+    ],
+}
+
+
+@pytest.mark.parametrize("looks", LOOKS.values(), ids=LOOKS)
+def test_progress_is_a_line_now_and_then(looks, monkeypatch):
     clock, printed = [0.0], []
     monkeypatch.setattr(terminal.time, "monotonic", lambda: clock[0])
     progress = terminal.ProgressLines("identifying", printed.append)
-
-    def at(seconds: float, done: int, total: int) -> list[str]:
-        clock[0] = seconds
+    for seconds, done, total, says in looks:
+        clock[0], before = seconds, len(printed)
         progress.show("d-1", done, total)
-        return printed
-
-    return at
-
-
-def test_what_is_quickly_done_says_nothing(lines):
-    for done in range(1, 20):
-        assert lines(done, done, 20) == []
-
-
-def test_time_left_is_told_from_the_speed_of_this_step(lines):
-    lines(0.0, 0, 1000)
-    assert lines(40.0, 100, 1000) == ["identifying: 100 of 1000, about 6 min left (d-1)"]
-    lines(400.0, 0, 100)  # the next step
-    assert lines(440.0, 80, 100)[-1] == "identifying: 80 of 100, about 10 s left (d-1)"
-
-
-def test_the_first_of_many_foretells_nothing(lines):
-    lines(0.0, 0, 334)
-    assert lines(100.0, 1, 334) == ["identifying: 1 of 334 (d-1)"]
-
-
-def test_what_the_first_one_had_to_compile_is_not_foretold_of_the_rest(lines):
-    lines(0.0, 0, 14)
-    assert lines(60.0, 1, 14) == ["identifying: 1 of 14 (d-1)"]
-    assert lines(92.0, 5, 14)[-1] == "identifying: 5 of 14, about 1 min left (d-1)"
+        assert printed[before:] == ([f"identifying: {says} (d-1)"] if says else [])
 
 
 @pytest.mark.slow

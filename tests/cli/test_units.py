@@ -8,19 +8,11 @@ import pytest
 
 from tests.command_line import ended, tpjb
 from tests.good_campaigns import rocker_rig
-from tpjb_ident.columns import SYSTEMS, amount, degrees, place_of, use_units
+from tpjb_ident.columns import SYSTEMS, amount, degrees, place_of
 from tpjb_ident.compare.effect_words import shown_unit
 from tpjb_ident.presentation import us_table
 from tpjb_ident.report.drawing.picture import axis_label
 from tpjb_ident.schema import DAMPING, STIFFNESS, TABLES
-
-
-@pytest.fixture
-def us():
-    """Pounds and inches, and back."""
-    use_units("us")
-    yield
-    use_units("si")
 
 
 def test_both_systems_know_the_same_quantities():

@@ -380,13 +380,6 @@ def test_dyrobes_and_ansys_files_have_their_fields_in_place(tmp_path):
 LBF_PER_INCH = 4.4482216152605 / 0.0254
 
 
-@pytest.fixture
-def us():
-    use_units("us")
-    yield
-    use_units("si")
-
-
 def rows_of_a_rotor_program(path, to):
     """Speeds and coefficients of a file, and what it says of its units."""
     lines = path.read_text(encoding="utf-8").splitlines()

@@ -1,11 +1,12 @@
 """Noise and mains pick-up where the sums are known: single kinds of noise, exact invariants, pure tones."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from tests.pivot.test_assemble import record as assembled
 from tpjb_ident.phasors.slow_noise import DRIFT_OVER_FLICKER, NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 from tpjb_ident.pivot.blocks import Blocks
 from tpjb_ident.pivot.dry_record import pooled_noise
@@ -130,19 +131,6 @@ def test_levels_are_recovered():
         assert 0.6 < ratio < 1.6, name
 
 
-@dataclass
-class Record:
-    """What noise is learnt from, of a dry record."""
-
-    blocks: Blocks
-    good: np.ndarray
-    holds: tuple
-
-    @property
-    def used(self):
-        return self.blocks.take(self.good)
-
-
 def record(seed, held=True, sigma=1e-8, levels=6, per_level=8):
     """A staircase of blocks with white noise about a curve, or a ramp where nothing is held."""
     rng = np.random.default_rng(seed)
@@ -154,7 +142,8 @@ def record(seed, held=True, sigma=1e-8, levels=6, per_level=8):
     deflection = 4e-9 * load + sigma * rng.standard_normal(n)
     across, branch = sigma * rng.standard_normal(n), np.ones(n, dtype=int)
     blocks = Blocks(time, np.full(n, BLOCK), load, zeros, deflection, across, zeros, zeros, hold, branch)
-    return Record(blocks, np.ones(n, dtype=bool), tuple(range(levels)) if held else ())
+    holds = tuple(range(levels)) if held else ()
+    return replace(assembled(), blocks=blocks, good=np.ones(n, dtype=bool), holds=holds)
 
 
 def moved(one, shift):

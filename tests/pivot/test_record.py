@@ -337,12 +337,6 @@ def test_every_hold_is_found_and_nothing_else(name):
         assert hold.level == pytest.approx(level, rel=0.01, abs=8.0)
 
 
-def test_a_continuous_ramp_has_no_holds():
-    time = np.arange(6000) / RATE
-    load = 250.0 + 400.0 * time + np.random.default_rng(1).normal(0.0, 2.6, len(time))
-    assert find_holds(time, load) == ()
-
-
 def test_jitter_and_a_gap_in_time_do_no_harm():
     time, load, _ = programme(**CASES["up"])
     rng = np.random.default_rng(7)

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-import pandas as pd
 import pytest
 
 import tpjb_ident.report
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import refuse
-from tests.report.plot_cases import locus
+from tests.report.plot_cases import comparison, locus
 from tests.report.tags import Page
 from tpjb_ident.report import page as report_page
 from tpjb_ident.report.drawing.picture import add_legend, longest_series, new_picture
@@ -23,6 +22,7 @@ from tpjb_ident.report.page import Section, Table, render_page, render_section
 from tpjb_ident.report.sections import _run_matrix, coefficient_sections, position_panels
 from tpjb_ident.rounding import fixed, percent, signed, with_interval
 
+ENTRIES = ("xx", "xy", "yx", "yy")
 HOSTILE = "<script>alert(1)</script>\"'& <img src=x onerror=alert(2)> $\\frac{a}{b}$ \x1b[31m\u202e"
 
 
@@ -175,54 +175,39 @@ def test_signs():
     assert fixed(math.inf) == "–"
 
 
-NAMES = [f"{s}{e}_{u}" for s, u in (("k", "N_per_m"), ("c", "Ns_per_m")) for e in ("xx", "xy", "yx", "yy")]
+#: Six loads at one frequency, in no order.
+LOADED = comparison().query("excitation_Hz == 25.0")[::-1]
 
 
-def table(points, variants=("rigid", "kirk")):
-    rows = []
-    for variant in variants:
-        for load, frequency in points:
-            row = {"pivots": variant, "static_load_N": load, "static_load_direction_deg": -90.0,
-                   "shaft_speed_Hz": 22.0, "excitation_Hz": frequency}  # fmt: skip
-            for i, name in enumerate(NAMES):
-                value = (i + 1) * load
-                row |= {
-                    name: value,
-                    f"{name}_lo": 0.9 * value,
-                    f"{name}_hi": 1.2 * value,
-                    f"{name}_predicted": 2 * value,
-                }
-            rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def coefficient_panels(points):
-    return [panel for section in coefficient_sections(table(points)) for panel in section.panels]
+def coefficient_panels(table):
+    return {panel.name: panel for section in coefficient_sections(table) for panel in section.panels}
 
 
 def test_the_longest_series_is_taken():
-    frame = table([(1e3, 25.0), (2e3, 25.0), (3e3, 25.0), (2e3, 10.0), (3e3, 10.0)])
-    over_load = longest_series(frame, "load")
+    over_load, over_frequency = (longest_series(comparison(), axis) for axis in ("load", "frequency"))
     assert set(over_load["excitation_Hz"]) == {25.0}
-    assert over_load["static_load_N"].nunique() == 3
-    over_frequency = longest_series(frame, "frequency")
-    assert over_frequency["excitation_Hz"].nunique() == 2
+    assert over_load["static_load_N"].nunique() == 6
+    assert set(over_frequency["static_load_N"]) == {5e3}
+    assert over_frequency["excitation_Hz"].nunique() == 4
 
 
 def test_nothing_is_drawn_over_what_does_not_vary():
-    panels = coefficient_panels([(1e3, 25.0), (2e3, 25.0)])
-    assert {p.name for p in panels} == {f"{n[:3]}-over-load" for n in NAMES}
-    assert coefficient_panels([(1e3, 25.0)]) == []
+    assert set(coefficient_panels(LOADED)) == {f"{part}{entry}-over-load" for part in "kc" for entry in ENTRIES}
+    assert coefficient_panels(LOADED[:1]) == {}
 
 
 def test_measured_points_have_their_intervals_and_predictions_their_lines():
-    panel = next(p for p in coefficient_panels([(2e3, 25.0), (1e3, 25.0)]) if p.name == "kyy-over-load")
-    (axes,) = panel.figure.axes
+    axes, _ = coefficient_panels(LOADED)["kyy-over-load"].figure.axes
+    rigid = LOADED.query("pivots == 'rigid'").sort_values("static_load_N")
     lines = {line.get_label(): line for line in axes.get_lines()}
-    assert np.allclose(lines["rigid pivots"].get_xydata(), [[1.0, 8e3 / 1e6], [2.0, 16e3 / 1e6]])
+    drawn = np.column_stack([rigid["static_load_N"] / 1e3, rigid["kyy_N_per_m_predicted"] / 1e6])
+    assert np.allclose(lines["rigid pivots"].get_xydata(), drawn)
     (bars,) = axes.containers
-    low, high = bars[2][0].get_segments()[0][:, 1]
-    assert (low, high) == (0.9 * 4e3 / 1e6, 1.2 * 4e3 / 1e6)
+    ends = np.array([segment[:, 1] for segment in bars[2][0].get_segments()])
+    assert np.allclose(np.sort(ends, axis=0), rigid[["kyy_N_per_m_lo", "kyy_N_per_m_hi"]] / 1e6)
+    value = LOADED["kyy_N_per_m"]
+    wide = LOADED.assign(kyy_N_per_m_lo=0.8 * value, kyy_N_per_m_hi=1.2 * value)
+    assert len(coefficient_panels(wide)["kyy-over-load"].figure.axes) == 1  # no panel of deviations that say nothing
 
 
 def test_a_record_that_cannot_be_read_has_no_rate_in_the_table_of_runs():

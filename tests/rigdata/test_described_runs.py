@@ -19,11 +19,12 @@ def parsed(extra: str = "", channels: object = CHANNELS, **tables: object) -> Ma
     return parse_manifest(manifest(channels, *RUNS, **tables) + extra)
 
 
-def refused(*says: str, extra: str = "", channels: object = CHANNELS, **tables: object) -> None:
+def refused(*says: str, extra: str = "", channels: object = CHANNELS, **tables: object) -> RigDataError:
     with pytest.raises(RigDataError) as caught:
         parsed(extra, channels, **tables)
     for part in says:
         assert part in str(caught.value)
+    return caught.value
 
 
 def test_shaft_housing_planes_and_temperatures(tmp_path):
@@ -159,11 +160,8 @@ def test_another_sensitivity_or_uncertainty_and_another_channel_are_another_cali
 def test_wrong_entries_are_named_with_their_line(entry, says):
     extra = f"{FOR}{entry}\n"
     last = (manifest(CHANNELS, *RUNS) + extra).count("\n")
-    refused(says, "[[channels.X1A.for]] no. 1", extra=extra)
-    with pytest.raises(RigDataError) as caught:
-        parsed(extra)
-    lines = [problem.place.partition(",")[0] for problem in caught.value.problems]
-    assert lines[0] in (f"line {last}", f"line {last - 1}")
+    (first, *_) = refused(says, "[[channels.X1A.for]] no. 1", extra=extra).problems
+    assert first.place.partition(",")[0] in (f"line {last}", f"line {last - 1}")
 
 
 @pytest.mark.slow

@@ -20,7 +20,6 @@ TIME = {"quantity": "time", "unit": "s"}
 RUN = {"id": "r", "kind": "dynamic", "excitation_frequency": "25 Hz", **SET_POINT}
 FAST, FORCES = {"X1A": X, "X1B": Y}, {"L1H": F, "L1V": -F}
 TEXTS = ("r.csv", "r.asc", "r.parquet")
-TABLES = (*TEXTS, "r.mat")
 #: Time columns of both devices; a MATLAB name holds no blank.
 NAMES = dict.fromkeys((*TEXTS, "r.h5"), ("Time", "Time 2")) | {"r.mat": ("t", "time")}
 

@@ -13,7 +13,7 @@ from rigdata import RigDataError, load_campaign
 from rigdata.readers import series
 from rigdata.readers.base import FORMATS, ReadingCache
 from rigdata.readers.file_reader import FileReader
-from rigdata.readers.series import Contents, Series, equidistant, is_time, seconds, with_unique_names
+from rigdata.readers.series import Series, equidistant, is_time, seconds, with_unique_names
 from tests.foreign_files import read_series, write_columns, write_data_set, write_groups, write_mat73
 from tests.manifests import PROBE, SET_POINT, manifest, write_files
 from tpjb_ident.check.campaign import check_campaign
@@ -156,26 +156,6 @@ def test_a_cache_lets_go_of_old_runs():
     for i in [0, 1, 2, 3, 4, 4, 3, 0, 3]:  # 3 was asked for after 4
         cache.get((i,), lambda i=i: made.append(i) or np.zeros(100))
     assert made == [0, 1, 2, 3, 4, 0]
-
-
-def arranged(*channels: Series):
-    return FileReader(Path("f"), "f", "r")._arranged(Contents(channels))
-
-
-def test_a_channel_of_another_length_without_times_is_a_fault_of_that_channel():
-    layout = arranged(*(Series(name, "", np.zeros(4 if name == "a" else 5)) for name in "abc"))
-    assert layout.grids[0].channels == ["b", "c"]
-    assert "has 4 samples and no times, the others have 5" in str(layout.faults["a"])
-
-
-def test_slow_channels_stay_at_their_own_times():
-    fast = Series("a", "V", np.arange(11.0), 0.1 * np.arange(11))
-    slow = Series("b", "K", np.array([0.0, 1.0]), np.array([0.2, 0.8]))
-    layout = arranged(slow, fast)
-    first, second = layout.grids
-    assert (first.length, first.rate, second.length) == (11, 10.0, 2)
-    np.testing.assert_array_equal(layout.times[second.clock], slow.time)
-    np.testing.assert_array_equal(layout.values["b"], slow.values)
 
 
 @pytest.mark.parametrize(("groups", "names"), [(("g1", "g2"), ["g1.a", "g2.a"]), (("", ""), ["a", "a_2"])])

@@ -19,6 +19,7 @@ from tests.manifests import PROBES, SWEEP, manifest, write_hdf5
 from tpjb_ident.check.campaign import check_campaign
 
 MANIFEST = manifest(PROBES, SWEEP, acquisition={"sample_rate": "10 Hz"})
+CLOCK = {"quantity": "time", "unit": "ms"}
 N = 1000
 COLUMNS = {"X1A": np.arange(N, dtype="f4"), "X1B": np.arange(N, dtype="f4") * 2}
 
@@ -85,27 +86,21 @@ def test_attribute_wins_over_run_which_wins_over_acquisition(tmp_path, of_run, a
     assert make(tmp_path / "a.h5", text, rate=attribute).sample_rate == rate
 
 
-def test_time_dataset(tmp_path):
-    clock = MANIFEST.replace("[[runs]]", '[channels.t]\nquantity = "time"\nunit = "ms"\n[[runs]]')
+@pytest.mark.parametrize(("name", "described"), [("t", {"t": CLOCK}), ("Time", {})])
+def test_a_time_dataset_counts_as_described_or_by_its_name_where_no_rate_is_stated(tmp_path, name, described):
     path = tmp_path / "c.h5"
-    assert make(path, clock).record("X1A").time[1] == pytest.approx(1 / 500)
+    make(path, manifest(PROBES | described, SWEEP), rate=None)
     with changed(path) as group:
-        group["t"] = np.arange(N) * 4.0 + 1.0
-        del group.attrs["sample_rate_hz"]
+        group[name] = np.arange(N) * 4.0 + 1.0
+        group[name].attrs.update({} if described else {"unit": "ms"})
     run = reopened(path)
     assert run.sample_rate == pytest.approx(250.0)
     assert run.record("X1A", 0, 2).time == pytest.approx([0.001, 0.005])
 
 
-def test_a_time_dataset_that_nobody_describes_counts_by_its_name_where_no_rate_is_stated(tmp_path):
+def test_a_stated_rate_counts_where_the_time_dataset_is_missing_or_nobody_describes_it(tmp_path):
     path = tmp_path / "c.h5"
-    make(path, manifest(PROBES, SWEEP), rate=None)
-    with changed(path) as group:
-        group["Time"] = np.arange(N) * 4.0 + 1.0
-        group["Time"].attrs["unit"] = "ms"
-    run = reopened(path)
-    assert run.sample_rate == pytest.approx(250.0)
-    assert run.record("X1A", 0, 2).time == pytest.approx([0.001, 0.005])
+    assert make(path, manifest(PROBES | {"t": CLOCK}, SWEEP)).record("X1A").time[1] == pytest.approx(1 / 500)
     assert reopened(write_hdf5(path, MANIFEST, COLUMNS | {"Time": np.zeros(N)}, None)).sample_rate == 10.0
 
 
@@ -368,12 +363,10 @@ def test_the_stored_hash_reads_no_attribute_that_stands_elsewhere(path):
 @pytest.mark.parametrize("scale", ["scale_factor", "gain"])
 def test_counts_whose_scale_stands_in_an_attribute_are_refused(path, scale):
     """They were read as if they were volts."""
-    with h5py.File(path, "r+") as file:
-        group = file["runs/c-1"]
-        del group["X1A"]
+    with changed(path, "X1A") as group:
         group["X1A"] = np.arange(N, dtype=np.int16)
         group["X1A"].attrs[scale] = 1e-4
     refused(path, "dataset X1A", f"attribute {scale} is not applied", "physical numbers")
-    with h5py.File(path, "r+") as file:
-        del file["runs/c-1/X1A"].attrs[scale]
+    with changed(path) as group:
+        del group["X1A"].attrs[scale]
     assert reopened(path).record("X1A").values[3] == pytest.approx(3e-6)

@@ -13,7 +13,6 @@ from rigdata.units import (
     UnitError,
     common_units,
     from_pint,
-    is_signal,
     parse_quantity,
     parse_unit,
     sensitivity_gain,
@@ -145,17 +144,6 @@ def test_sensitivities(sensitivity, signal, dimension, gain):
     assert sensitivity_gain(sensitivity, signal, dimension) == pytest.approx(gain, rel=1e-12)
 
 
-@pytest.mark.parametrize("bad", ["0 mV/um", "-7.78 mV/um", "7.78 mV/g", "7.78 um", "7.78"])
-def test_sensitivity_refused(bad):
-    with pytest.raises(UnitError):
-        sensitivity_gain(bad, "V", "length")
-
-
-def test_signals_and_engineering_units():
-    assert all(is_signal(u) for u in ("V", "mV", "mA", "mV/V"))
-    assert not any(is_signal(u) for u in ("um", "N", "m/s^2", "degC", "Hz", "%"))
-
-
 @pytest.mark.slow
 @given(st.text(max_size=60), st.sampled_from(sorted(SI_UNITS)))
 @settings(max_examples=80, deadline=None)
@@ -178,12 +166,6 @@ def test_quotients_and_powers_follow_algebra(a, b, c, power):
     assert parse_unit(f"({a})/({b})*({c})").factor == pytest.approx((one * two**-1 * three).factor, rel=1e-12)
     assert parse_unit(f"{a.split('/')[0].rstrip('^2')}").factor > 0
     assert parse_unit(f"kN^{power}").factor == pytest.approx(1000.0**power, rel=1e-12)
-
-
-@given(st.floats(-1e12, 1e12, allow_subnormal=False))
-@settings(max_examples=80, deadline=None)
-def test_numbers_survive_printing(number):
-    assert parse_quantity(f"{number!r} N", "force") == pytest.approx(number, rel=1e-15)
 
 
 def test_si_units_are_their_own_unit():
@@ -217,6 +199,7 @@ def test_pint_quantities():
         (("force", "mV", "2.0 mV/V", "20 kN", "5 V"), 2000.0),  # reading / (sensitivity * excitation) * full scale
         (("force", "mV/V", "2.0 mV/V", "20 kN"), 10_000.0),  # a bridge amplifier that needs no supply
         (("acceleration", "V", "10 mV/g"), 980.665),  # g is standard gravity
+        (("displacement", "mA", "1.6 mA/mm"), 1e-3 / 1.6),  # a current loop
         (("displacement", "um", "7.78 mV/um"), 1e-6),  # an engineering unit is already converted
         (("speed", "rpm", None), 2 * np.pi / 60),
     ],
@@ -244,23 +227,3 @@ def test_temperature_of_reading_twenty(unit, zero, kelvin):
     gain = reading_gain("temperature", unit, "1 K/V")
     channel = Channel("T1", "temperature", unit, gain=gain, zero=reading_zero("temperature", unit, zero))
     assert channel.to_si(np.array([20.0])) == pytest.approx([kelvin])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (("force", "mV", None), "needs a sensitivity"),
-        (("force", "mV", "2 mV/V", "20 um", "5 V"), "not one of force"),
-        (("force", "mV", "2 mV/V", "20 kN", "0 V"), "above zero"),
-        (("displacement", "N", None), "not one of length"),
-    ],
-)
-def test_incomplete_chains_are_refused(arguments, says):
-    with pytest.raises(UnitError, match=says):
-        reading_gain(*arguments)
-
-
-def test_readings_are_not_changed():
-    readings = np.array([1.0, 2.0], dtype=np.float32)
-    Channel("X", "displacement", "V", gain=2.0).to_si(readings)
-    assert readings.tolist() == [1.0, 2.0]

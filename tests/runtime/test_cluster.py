@@ -108,13 +108,6 @@ def tables(out: Path) -> list[bytes]:
     return [(out / f"{name}.csv").read_bytes() for name in ("coefficients", "estimators", "windows")]
 
 
-def test_the_command_line_works_on_a_cluster(cluster, small_campaign, tmp_path):
-    wait_for(str(cluster.file), 1)
-    for name, options in (("spread", ["--scheduler", str(cluster.file)]), ("alone", ["--workers", "1"])):
-        ended(0, "identify", small_campaign, "--out", tmp_path / name, *options)
-    assert tables(tmp_path / "spread") == tables(tmp_path / "alone")
-
-
 def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign_file, tmp_path, monkeypatch):
     wait_for(str(cluster.file), 1)
     out = tmp_path / "out"

@@ -3,6 +3,7 @@
 An example is given `np`, `ti`, and the paths `demo` (the bundled campaign) and `rocker` (a bearing file).
 """
 
+import ast
 import doctest
 import functools
 import importlib
@@ -25,14 +26,9 @@ SHOWN_ELSEWHERE = ("tpjb_ident/report/plots/", "tpjb_ident/exports/", "rigdata/r
 def described() -> Iterator[tuple[str, str, str]]:
     """File, name and docstring of everything at the top of a file, and of the public methods of faces."""
     for path, name, node, face in definitions():
-        text = (node.body[0].value.value if _has_docstring(node) else "") if node.body else ""
+        text = ast.get_docstring(node, clean=False) or ""
         if face or ">>>" in text:
             yield path, name, text
-
-
-def _has_docstring(node) -> bool:
-    first = node.body[0]
-    return hasattr(first, "value") and isinstance(getattr(first.value, "value", None), str)
 
 
 @pytest.fixture(scope="module", autouse=True)

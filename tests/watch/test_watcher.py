@@ -12,7 +12,7 @@ import time
 
 import pytest
 
-from rigdata.virtual_rig import Fault, write_campaign
+from rigdata.virtual_rig import Fault
 from tests.command_line import ended
 from tests.good_campaigns import rocker_rig
 from tpjb_ident.watch.landing import NewFiles
@@ -23,19 +23,21 @@ DYNAMIC = [f"d-05000-25-0{i}" for i in (1, 2, 3)]
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(campaign_of):
     """The whole campaign as CSV: three dynamic runs, three of the locus, dry tests, a sweep."""
-    folder = tmp_path_factory.mktemp("watch") / "finished"
-    write_campaign(folder, rocker_rig(3), "csv")
-    return folder
+    return campaign_of(rocker_rig(3), "csv")
 
 
 @pytest.fixture(scope="module")
-def clipped(tmp_path_factory):
+def clipped(campaign_of):
     """The same with a probe that clips in the second dynamic run."""
-    folder = tmp_path_factory.mktemp("watch") / "clipped"
-    write_campaign(folder, rocker_rig(3, Fault("clipped", run=DYNAMIC[1], channel="X1B", value=0.6)), "csv")
-    return folder
+    return campaign_of(rocker_rig(3, Fault("clipped", run=DYNAMIC[1], channel="X1B", value=0.6)), "csv")
+
+
+def land(source, live, *runs, name=""):
+    """Copy runs of a finished campaign, or one under another name; the copies may be written to."""
+    for run in runs:
+        shutil.copyfile(source / "runs" / f"{run}.csv", live / "runs" / f"{name or run}.csv")
 
 
 @pytest.fixture
@@ -44,7 +46,7 @@ def live(finished, tmp_path):
     folder = tmp_path / "live"
     (folder / "runs").mkdir(parents=True)
     for path in finished.glob("*.toml"):
-        shutil.copy(path, folder)
+        shutil.copyfile(path, folder / path.name)
     return folder
 
 
@@ -59,21 +61,17 @@ def test_the_page_begins_with_what_was_tested_what_it_gives_and_a_picture(finish
     assert not re.search(r"MN/m|kN|µm", page)
 
 
-def land(source, live, *runs):
-    for run in runs:
-        shutil.copy(source / "runs" / f"{run}.csv", live / "runs")
-
-
-def watcher(live, settle: float = 0.0) -> Watcher:
-    return Watcher(live, NewFiles(settle))
+@pytest.fixture
+def watch(live) -> Watcher:
+    """Looks at it, every file taken for written at once."""
+    return Watcher(live, NewFiles(0.0))
 
 
 def states(snapshot) -> dict[str, str]:
     return {s.run.id: s.state for s in snapshot.states if s.state != "to run"}
 
 
-def test_records_are_judged_as_they_land_and_identified_with_the_second_direction(live, finished):
-    watch = watcher(live)
+def test_records_are_judged_as_they_land_and_identified_with_the_second_direction(watch, live, finished):
     first = watch.look()
     assert states(first) == {}
     assert first.steps[-1].text.startswith("Next: d-05000-25-01, 5 kN at -90 deg, shaft 22 Hz, excited at 25 Hz")
@@ -87,23 +85,21 @@ def test_records_are_judged_as_they_land_and_identified_with_the_second_directio
     assert second.steps[-1].runs == (DYNAMIC[2],)
 
 
-def test_a_clipped_run_is_to_be_repeated_before_the_load_is_changed(live, finished, clipped):
-    watch = watcher(live)
+def test_a_clipped_run_is_to_be_repeated_before_the_load_is_changed(watch, live, finished, clipped):
     land(finished, live, DYNAMIC[0])
     land(clipped, live, DYNAMIC[1])
     step = watch.look().steps[0]
     assert step.kind == "repeat"
     assert step.text.startswith(f"Repeat {DYNAMIC[1]} before you change the load: channel X1B")
     assert "clipped" in step.text
-    shutil.copy(finished / "runs" / f"{DYNAMIC[1]}.csv", live / "runs" / f"{DYNAMIC[1]}_2.csv")
+    land(finished, live, DYNAMIC[1], name=f"{DYNAMIC[1]}_2")
     after = watch.look()
     assert states(after)[DYNAMIC[1]] == "replaced"
     assert states(after)[f"{DYNAMIC[1]}_2"] == "good"
     assert [s.kind for s in after.steps] == ["next"]
 
 
-def test_a_record_that_was_cut_off_is_named_and_mends_itself_when_the_rest_comes(live, finished):
-    watch = watcher(live)
+def test_a_record_that_was_cut_off_is_named_and_mends_itself_when_the_rest_comes(watch, live, finished):
     land(finished, live, *DYNAMIC)
     whole = (finished / "runs" / f"{DYNAMIC[2]}.csv").read_bytes()
     (live / "runs" / f"{DYNAMIC[2]}.csv").write_bytes(whole[: len(whole) // 3])
@@ -115,15 +111,14 @@ def test_a_record_that_was_cut_off_is_named_and_mends_itself_when_the_rest_comes
 
 
 def test_a_file_that_is_being_written_is_neither_judged_nor_missing(live, finished):
-    watch = watcher(live, settle=60.0)
+    watch = Watcher(live, NewFiles(60.0))
     land(finished, live, DYNAMIC[0])
     assert states(watch.look()) == {DYNAMIC[0]: "being written"}
     assert watch.waits
 
 
-def test_records_under_other_names_are_placed_by_load_line_and_direction(live, finished):
-    watch = watcher(live)
-    shutil.copy(finished / "runs" / f"{DYNAMIC[1]}.csv", live / "runs" / "Record_0017.csv")
+def test_records_under_other_names_are_placed_by_load_line_and_direction(watch, live, finished):
+    land(finished, live, DYNAMIC[1], name="Record_0017")
     snapshot = watch.look()
     (placed,) = snapshot.placed
     assert (placed.like, placed.why) == (DYNAMIC[1], f"is {DYNAMIC[1]} by load and line")
@@ -131,8 +126,7 @@ def test_records_under_other_names_are_placed_by_load_line_and_direction(live, f
     assert DYNAMIC[1] not in {s.run.id for s in snapshot.states}
 
 
-def test_what_is_foreign_away_edited_or_taken_meanwhile_stops_nothing(live, finished):
-    watch = watcher(live)
+def test_what_is_foreign_away_edited_or_taken_meanwhile_stops_nothing(watch, live, finished):
     land(finished, live, *DYNAMIC)
     notes, manifest = live / "runs" / "notes.csv", live / "campaign.toml"
     notes.write_text("this is no record\n")
@@ -158,14 +152,13 @@ def test_what_is_foreign_away_edited_or_taken_meanwhile_stops_nothing(live, fini
     assert taken.measured.points[0].n_records == 2
 
 
-def test_a_probe_that_is_dead_in_two_records_in_a_row_stops_the_campaign(live, finished, tmp_path):
-    dead = tmp_path / "dead"
-    write_campaign(dead, rocker_rig(3, Fault("dead", run="d-*", channel="X1B")), "csv")
+def test_a_probe_that_is_dead_in_two_records_in_a_row_stops_the_campaign(watch, live, finished, campaign_of):
+    dead = campaign_of(rocker_rig(3, Fault("dead", run="d-*", channel="X1B")), "csv")
     land(finished, live, DYNAMIC[0])
     for i, run in enumerate(DYNAMIC[1:]):
         land(dead, live, run)
         os.utime(live / "runs" / f"{run}.csv", (time.time() + i + 1,) * 2)
-    stop = watcher(live).look().steps[0]
+    stop = watch.look().steps[0]
     assert stop.kind == "stop"
     assert stop.text.startswith("Stop: channel X1B: is dead")
     assert stop.runs == tuple(DYNAMIC[1:])
@@ -219,8 +212,7 @@ def test_killed_again_and_again_while_records_are_being_written_it_ends_with_the
 
 
 @pytest.mark.parametrize("name", [f"{DYNAMIC[0]}.csv", f"{DYNAMIC[0]}_2.csv", "unplanned.csv"])
-def test_a_link_that_appears_later_and_leads_out_is_never_opened(live, finished, tmp_path, name, monkeypatch):
-    watch = watcher(live)
+def test_a_link_that_appears_later_and_leads_out_is_never_opened(watch, live, finished, tmp_path, name, monkeypatch):
     watch.look()
     outside = tmp_path / "secret.csv"
     shutil.copy(finished / "runs" / f"{DYNAMIC[0]}.csv", outside)
@@ -244,8 +236,7 @@ def test_a_link_that_appears_later_and_leads_out_is_never_opened(live, finished,
     assert states(watch.look()) == {DYNAMIC[0]: "good"}
 
 
-def test_a_manifest_that_becomes_a_link_is_not_read(live, tmp_path):
-    watch = watcher(live)
+def test_a_manifest_that_becomes_a_link_is_not_read(watch, live, tmp_path):
     watch.look()
     manifest = live / "campaign.toml"
     moved = tmp_path / "outside.toml"
