@@ -1,10 +1,10 @@
 """Effects: neutral values change nothing, the others exactly what each says of itself; messages; files; one's own."""
 
-from __future__ import annotations
-
 import math
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +13,7 @@ from model.bearing import Bearing
 from model.effects import (
     Effect,
     EffectError,
-    EffectKind,
     EffectWords,
-    Parameter,
     apply_effects,
     known_effects,
     load_effects,
@@ -28,9 +26,10 @@ from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
 from model.static_tests import dry_curve
+from tests.model import points
+from tests.model.points import DOWN, LOAD, OMEGA, SPEED
 from tests.rigs.bearings import changed_pads
 
-SPEED, OMEGA, LOAD, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, 5000.0, -math.pi / 2
 NAMES = {
     "pivot_flexibility", "soft_pivot", "pad_offset", "thermal_growth", "preload_error", "oil_viscosity",
     "supply_temperature", "hot_oil_carryover", "pad_bending", "housing_flexibility", "fluid_inertia",
@@ -48,10 +47,8 @@ def base(rocker) -> Prediction:
     return run(rocker)
 
 
-def run(bearing: Bearing, *effects: Effect, pivots: object = "kirk", load: float = LOAD) -> Prediction:
-    p = predict(bearing, load, DOWN, SPEED, OMEGA, pivots=pivots, effects=effects)
-    assert p.converged
-    return p
+def run(bearing: Bearing, *effects: Effect, **more: Any) -> Prediction:
+    return points.run(bearing, *effects, excitation=OMEGA, **more)
 
 
 def same(p: Prediction, q: Prediction, tolerance: float = 1e-10) -> None:
@@ -88,11 +85,7 @@ def test_an_effect_is_the_same_from_a_start_without_it(rocker, base, name):
     if known_effects()[name].missing(rocker):
         pytest.skip("the bearing cannot have it")
     effect = typical(name)
-    cold = predict(rocker, LOAD, DOWN, SPEED, OMEGA, effects=[effect])
-    warm = predict(rocker, LOAD, DOWN, SPEED, OMEGA, effects=[effect], start=base)
-    assert cold.converged
-    assert warm.converged
-    same(warm, cold, 2e-6)
+    same(run(rocker, effect, start=base), run(rocker, effect), 2e-6)
 
 
 def test_library_has_every_name_that_users_know():
@@ -123,25 +116,37 @@ def test_pivot_flexibility_and_soft_pivot(rocker):
     np.testing.assert_allclose(one.deflection, expected, rtol=1e-5)
 
 
-def test_geometry_effects_are_other_bearings(rocker):
-    pad = rocker.pads[3]
-    moved = [*rocker.pads]
-    moved[3] = replace(pad, assembled_clearance=pad.assembled_clearance + 12e-6)
-    same(run(rocker, Effect("pad_offset", pad=4, radial_offset=12e-6)), run(rocker.with_pads(tuple(moved))))
-    wider = changed_pads(rocker, assembled_clearance=pad.assembled_clearance + 9e-6)
-    same(run(rocker, Effect("thermal_growth", clearance_change=9e-6)), run(wider), 1e-9)
-    # ... but it is a matter of running: the drawing, and with it the dry tests, keep their clearance
+def oil(**changes: float) -> Callable[[Bearing], Bearing]:
+    return lambda bearing: replace(bearing, oil=replace(bearing.oil, **changes))
+
+
+def moved(bearing: Bearing) -> Bearing:
+    pads = [*bearing.pads]
+    pads[3] = replace(pads[3], assembled_clearance=92e-6)
+    return bearing.with_pads(tuple(pads))
+
+
+OTHERS = {
+    "pad_offset": ({"pad": 4, "radial_offset": 12e-6}, moved),
+    "thermal_growth": ({"clearance_change": 9e-6}, lambda b: changed_pads(b, assembled_clearance=89e-6)),
+    "uneven_pads": ({f"offset_{k}": 4e-6 for k in range(1, 6)}, lambda b: changed_pads(b, assembled_clearance=84e-6)),
+    "preload_error": ({"pad_clearance_change": 10e-6}, lambda b: changed_pads(b, pad_clearance=140e-6)),
+    "oil_viscosity": ({"factor": 1.2}, oil(viscosity_40=1.2 * 0.0396)),
+    "supply_temperature": ({"change": 7.0}, oil(supply_temperature=47.0)),
+    # heat that is lost is oil that takes up more
+    "heat_loss": ({"share": 0.3}, oil(specific_heat=2000.0 / 0.7, conductivity=0.13 / 0.7)),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_an_effect_on_geometry_or_oil_is_another_bearing(rocker, name):
+    parameters, other = OTHERS[name]
+    same(run(rocker, Effect(name, **parameters)), run(other(rocker)), 1e-9)
+
+
+def test_growth_is_a_matter_of_running_the_drawing_and_with_it_the_dry_tests_keep_their_clearance(rocker):
     setup = apply_effects(Setup(rocker, pivot_laws("kirk", rocker)), [Effect("thermal_growth", clearance_change=9e-6)])
     assert setup.bearing == rocker
-    bored = changed_pads(rocker, pad_clearance=pad.pad_clearance + 10e-6)
-    same(run(rocker, Effect("preload_error", pad_clearance_change=10e-6)), run(bored))
-
-
-def test_oil_effects_are_other_oils(rocker):
-    thick = replace(rocker, oil=replace(rocker.oil, viscosity_40=1.2 * rocker.oil.viscosity_40))
-    same(run(rocker, Effect("oil_viscosity", factor=1.2)), run(thick))
-    hot = replace(rocker, oil=replace(rocker.oil, supply_temperature=47.0))
-    same(run(rocker, Effect("supply_temperature", change=7.0)), run(hot))
 
 
 def test_a_measured_curve_does_not_hold_the_housing_twice(rocker):
@@ -181,8 +186,7 @@ def test_parallel_terms_add_to_what_the_records_show(rocker, base):
 def test_a_series_compliance_alike_in_all_directions_is_the_flexible_housing(rocker):
     series = run(rocker, Effect("series_compliance", xx=1e-9, xy=0.0, yy=1e-9))
     housing = run(rocker, Effect("housing_flexibility", stiffness=1e9))
-    assert np.allclose(series.h, housing.h)
-    assert np.allclose(series.position, housing.position)
+    same(series, housing)
 
 
 def test_fluid_inertia(rocker, base):
@@ -333,28 +337,11 @@ def test_pad_beyond_the_bearing_is_refused(rocker):
 
 def test_effects_are_values():
     one, two = (Effect("soft_pivot", pad=5, stiffness_factor=0.3) for _ in range(2))
-    assert one == two
-    assert hash(one) == hash(two)
+    assert len({one, two}) == 1
     assert pickle.loads(pickle.dumps(one)) == one
     assert repr(one) == "Effect('soft_pivot', pad=5, stiffness_factor=0.3)"
     with pytest.raises(TypeError):
         one.parameters["pad"] = 1
-
-
-def test_ones_own_effect(rocker, base, monkeypatch):
-    monkeypatch.setattr("model.effects.registry._registered", {})  # other tests know the bundled ones only
-
-    def apply(setup: Setup, share: float) -> Setup:
-        return setup.change(added_mass=setup.added_mass + 100.0 * share)
-
-    kind = EffectKind("sloshing", "structure", (Parameter("share", "1", "ratio", 0.0, 0.0, 1.0),), apply, "a guess")
-    register(kind)
-    p = run(rocker, Effect("sloshing", share=0.1))
-    np.testing.assert_allclose(p.h, base.h - OMEGA**2 * 10.0 * np.eye(2), rtol=1e-10)
-    with pytest.raises(EffectError, match="is bundled"):
-        register(replace(kind, name="soft_pivot"))
-    with pytest.raises(EffectError, match="its words name amount, no parameter"):
-        register(replace(kind, words=EffectWords("oil sloshes by {amount}", "", "", "")))
 
 
 def test_file(tmp_path):
@@ -393,16 +380,20 @@ def test_broken_file(tmp_path, text, message):
 OWN = """
 from model.effects import EffectKind, Parameter
 KIND = EffectKind("{name}", "bearing", (Parameter("share", "1", "ratio", 0.0, 0.0, 1.0, 0.1),),
-                  lambda setup, share: setup, "made up")
+                  lambda setup, share: setup.change(added_mass=setup.added_mass + 100.0 * share), "made up")
 """
 
 
-def test_effects_of_ones_own_are_registered_from_a_file(tmp_path, monkeypatch):
+def test_effects_of_ones_own_are_registered_from_a_file(rocker, base, tmp_path, monkeypatch):
     monkeypatch.setattr("model.effects.registry._registered", {})  # other tests know the bundled ones only
     path = tmp_path / "own.py"
-    path.write_text(OWN.format(name="of_ones_own"))
-    assert [k.name for k in load_library(path)] == ["of_ones_own"]
-    assert Effect("of_ones_own", share=0.5).parameters["share"] == 0.5
+    path.write_text(OWN.format(name="sloshing"))
+    (kind,) = load_library(path)
+    assert kind.name == "sloshing"
+    p = run(rocker, Effect("sloshing", share=0.1))
+    np.testing.assert_allclose(p.h, base.h - OMEGA**2 * 10.0 * np.eye(2), rtol=1e-10)
+    with pytest.raises(EffectError, match="its words name amount, no parameter"):
+        register(replace(kind, words=EffectWords("oil sloshes by {amount}", "", "", "")))
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """The film's heat: balance, order, limits, carry-over, power."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -9,32 +7,25 @@ import numpy as np
 import pytest
 
 from model.film.energy import dissipated, solve_energy
-from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import Running
-from model.film.reynolds import solve_film
-from model.predict import predict
+from model.options import Options
 from model.statics.pad_flow import outlet_temperature
+from tests.model.points import plain_film, run, solved
 
-SPEED = 2 * math.pi * 22.0
-DOWN = -math.pi / 2
 MU, RHO, HEAT, CONDUCTIVITY, SURFACE, CLEARANCE = 0.03, 850.0, 2000.0, 0.13, 7.0, 1e-4
+TURBULENT = {"load": 2000.0, "speed": 2 * math.pi * 150.0, "options": Options(turbulence="ng-pan")}
 
 
 def full_film(
     shape: tuple[int, int],
     wedge: tuple[float, float] = (0.0, 0.5),
-    length: float = 0.07,
-    conductivity: float = CONDUCTIVITY,
 ) -> tuple[FilmGrid, FilmWork, np.ndarray]:
     """A film that converges over its whole arc (no rupture), and its temperature for constant oil."""
-    grid = film_grid(-0.5, 0.5, 0.05, length, shape, True)
-    work = film_work(grid, 40.0)
-    work.viscosity[:] = MU
-    work.density[:] = RHO
-    a, b = wedge
-    assert solve_film(grid, work, (CLEARANCE, a * CLEARANCE, b * CLEARANCE), SURFACE, False).steps > 0
+    grid, work = plain_film(shape)
+    solved((grid, work), wedge)
     temperature = np.empty_like(work.temperature)
-    running = Running(SURFACE, (MU, 0.0, RHO, 0.0), (HEAT, conductivity))
+    running = Running(SURFACE, (MU, 0.0, RHO, 0.0), (HEAT, CONDUCTIVITY))
     assert solve_energy(grid, work, 40.0, running, temperature) == 0.0
     return grid, work, temperature
 
@@ -92,31 +83,34 @@ def test_couette_flow_heats_linearly():
 
 
 def test_isothermal_is_isothermal(rocker):
-    p = predict(rocker, 5000.0, DOWN, SPEED, thermal="isothermal")
+    p = run(rocker, thermal="isothermal")
     assert all((t == 40.0).all() for t in p.temperature)
     assert p.max_temperature == 40.0
 
 
 def test_no_viscosity_exponent_leaves_only_the_density(rocker):
     oil = replace(rocker.oil, viscosity_exponent=0.0, thermal_expansion=0.0)
-    hot = predict(replace(rocker, oil=oil), 5000.0, DOWN, SPEED)
-    cold = predict(replace(rocker, oil=oil), 5000.0, DOWN, SPEED, thermal="isothermal")
+    hot, cold = (run(replace(rocker, oil=oil), thermal=thermal) for thermal in ("adiabatic", "isothermal"))
     assert hot.max_temperature > 44.0
     np.testing.assert_allclose(hot.k, cold.k, atol=1e-7 * cold.kyy)
 
 
-def test_power_loss_is_what_heats_the_oil(rocker):
-    p = predict(rocker, 3000.0, DOWN, SPEED)
+@pytest.mark.parametrize(("share", "more", "limit"), [(1.0, {"load": 3000.0}, 0.005), (0.05, TURBULENT, 0.01)])
+def test_power_loss_is_what_heats_the_oil(rocker, share, more, limit):
+    oil = replace(rocker.oil, viscosity_40=share * rocker.oil.viscosity_40)
+    p = run(replace(rocker, oil=oil), **more)
     total = 0.0
     for film in p.equilibrium.films:
-        assert not film.work.ruptured.any()  # then flows are those of a full film everywhere
-        total += 2.0 * rocker.oil.specific_heat * float(film.work.flow_x[-1] @ (film.work.temperature[-1] - 40.0))
-        total += 2.0 * rocker.oil.specific_heat * float(side_flow(film.work) @ (film.work.temperature[:, -1] - 40.0))
-    assert p.power_loss == pytest.approx(total, rel=0.005)
+        work, rise = film.work, film.work.temperature - 40.0
+        assert not work.ruptured.any()  # then flows are those of a full film everywhere
+        total += 2.0 * oil.specific_heat * float(work.flow_x[-1] @ rise[-1] + side_flow(work) @ rise[:, -1])
+    assert p.power_loss == pytest.approx(total, rel=limit)
+    if "options" in more:
+        assert p.power_loss > 1.5 * run(replace(rocker, oil=oil), **more | {"options": Options()}).power_loss
 
 
 def test_outlet_temperature_is_weighted_with_the_flow(rocker):
-    film = predict(rocker, 5000.0, DOWN, SPEED).equilibrium.films[0]
+    film = run(rocker).equilibrium.films[0]
     flow, t = film.work.flow_x[-1], film.work.temperature[-1]
     assert outlet_temperature(film) == pytest.approx(float(np.average(t, weights=flow)), rel=1e-12)
     assert t.min() < outlet_temperature(film) < t.max()

@@ -1,32 +1,20 @@
 """Heat that leaves the film: into the pads, through the journal, to the next pad."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 
-from model.bearing import Bearing
 from model.effects import Effect
 from model.film.energy import solve_energy
 from model.film.oil_state import Running
 from model.growth import Growth, grown
 from model.options import Options
-from model.predict import predict
-from model.prediction import Prediction
-
-SPEED = 2 * math.pi * 22
-
-
-def run(bearing: Bearing, options: Options | None = None, **more: object) -> Prediction:
-    p = predict(bearing, 5000.0, speed=SPEED, options=options, **more)  # type: ignore[arg-type]
-    assert p.converged, p.status
-    return p
+from tests.model.points import SPEED, close, run
 
 
 def test_a_journal_of_one_temperature_keeps_no_heat(rocker):
-    p = run(rocker, Options(isothermal_journal=True))
+    p = run(rocker, options=Options(isothermal_journal=True))
     taken = given = 0.0
     for film in p.equilibrium.films:
         exchange = 3.0 * rocker.oil.conductivity / film.work.thickness * film.grid.dx * film.grid.height
@@ -41,7 +29,7 @@ def test_a_journal_of_one_temperature_keeps_no_heat(rocker):
 
 
 def test_the_pad_s_face_is_hotter_than_the_film_by_the_parabola(rocker):
-    p = run(rocker, Options(isothermal_journal=True))
+    p = run(rocker, options=Options(isothermal_journal=True))
     journal = p.equilibrium.journal_temperature
     # T(y) = Tj + 1.5 (T - Tj) (1 - (1 - y/h)^2): flat at the pad, mean T, wall gradient 3 (T - Tj) / h
     y = (np.arange(1000) + 0.5) / 1000.0
@@ -56,21 +44,21 @@ def test_the_pad_s_face_is_hotter_than_the_film_by_the_parabola(rocker):
 @pytest.mark.slow
 def test_all_paths_together_converge_with_few_steps(rocker):
     options = Options(conduction=True, isothermal_journal=True, growth=Growth(housing=48.0))
-    p = run(rocker, options, thermal="tehd", effects=[Effect("hot_oil_carryover", fraction=0.7)])
+    p = run(rocker, Effect("hot_oil_carryover", fraction=0.7), thermal="tehd", options=options)
     assert p.equilibrium.iterations < 30
     assert p.status == ()
 
 
 def test_isothermal_films_exchange_nothing(rocker):
-    a = run(rocker, thermal="isothermal")
-    b = run(rocker, Options(conduction=True, isothermal_journal=True), thermal="isothermal")
+    options = Options(), Options(conduction=True, isothermal_journal=True)
+    plain, all_paths = (run(rocker, thermal="isothermal", options=o) for o in options)
     # to rounding: where arrays lie in memory decides the order of a library's sums
-    np.testing.assert_allclose(a.h, b.h, rtol=0.0, atol=1e-12 * np.abs(a.h).max())
+    close(all_paths.h, plain.h, 1e-12)
 
 
 def test_what_pads_conduct_is_what_films_lose(rocker):
     # the temperatures at rest fulfil the energy equation with the heat that the face's own temperature drives in
-    p = run(rocker, Options(conduction=True))
+    p = run(rocker, options=Options(conduction=True))
     oil, surface = rocker.oil, SPEED * rocker.journal_radius
     for film in p.equilibrium.films:
         pad, work, grid = film.deformation, film.work, film.grid
@@ -84,51 +72,38 @@ def test_what_pads_conduct_is_what_films_lose(rocker):
         np.testing.assert_allclose(fresh, work.temperature, atol=1e-3)
 
 
-class TestGrowth:
-    def test_clearances_by_hand(self, rocker):
-        growth = Growth(reference=20.0, housing=48.0, expansion=(11e-6, 12e-6))
-        pad, new = rocker.pads[0], grown(rocker, growth, 40.0, 50.0).pads[0]
-        seat = rocker.journal_radius + pad.pad_clearance + pad.thickness
-        journal = 11e-6 * rocker.journal_radius * 30
-        thicker = pad.backing.thermal_expansion * pad.thickness * 20
-        wider = pad.backing.thermal_expansion * (rocker.journal_radius + pad.pad_clearance) * 20
-        assert new.assembled_clearance - pad.assembled_clearance == pytest.approx(
-            12e-6 * seat * 28 - thicker - journal, rel=1e-9
-        )
-        assert new.pad_clearance - pad.pad_clearance == pytest.approx(wider - journal, rel=1e-9)
-
-    def test_everything_warm_alike_grows_in_proportion(self, rocker):
-        expansion = rocker.pads[0].backing.thermal_expansion
-        growth = Growth(reference=20.0, housing=40.0, expansion=(expansion, expansion))
-        new = grown(rocker, growth, 40.0, 40.0)
-        for pad, was in zip(new.pads, rocker.pads, strict=True):
-            assert pad.pad_clearance == pytest.approx(was.pad_clearance * (1 + 20 * expansion), rel=1e-3)
-            assert pad.assembled_clearance == pytest.approx(was.assembled_clearance, abs=0.05e-6)
-
-    def test_the_journal_settles_at_its_own_temperature(self, rocker):
-        growth = Growth()
-        p = run(rocker, Options(growth=growth))
-        by_hand = grown(rocker, growth, 40.0, p.equilibrium.grown)
-        again = run(by_hand)
-        np.testing.assert_allclose(again.h, p.h, rtol=1e-4)
-        # it is as warm as its films, in the mean over their area
-        area = [film.grid.area for film in p.equilibrium.films]
-        assert p.equilibrium.grown == pytest.approx(np.average(p.temperature, weights=area), abs=1e-4)
-        assert p.setup.bearing.pads[0].assembled_clearance < rocker.pads[0].assembled_clearance
-        assert p.mesh_error < 0.01  # the coarser mesh does not grow once more
-
-    def test_no_clearance_left_is_said(self, rocker):
-        with pytest.raises(ValueError, match="no clearance left"):
-            run(rocker, Options(growth=Growth(journal=250.0)))
-
-    @pytest.mark.parametrize("wrong", [{"reference": math.nan}, {"housing": 900.0}, {"expansion": (1.0, 1e-5)}])
-    def test_nonsense_is_refused(self, wrong):
-        with pytest.raises(ValueError):
-            Growth(**wrong)
+def test_grown_clearances_by_hand(rocker):
+    growth = Growth(reference=20.0, housing=48.0, expansion=(11e-6, 12e-6))
+    pad, new = rocker.pads[0], grown(rocker, growth, 40.0, 50.0).pads[0]
+    seat = rocker.journal_radius + pad.pad_clearance + pad.thickness
+    journal = 11e-6 * rocker.journal_radius * 30
+    thicker = pad.backing.thermal_expansion * pad.thickness * 20
+    wider = pad.backing.thermal_expansion * (rocker.journal_radius + pad.pad_clearance) * 20
+    assert new.assembled_clearance - pad.assembled_clearance == pytest.approx(
+        12e-6 * seat * 28 - thicker - journal, rel=1e-9
+    )
+    assert new.pad_clearance - pad.pad_clearance == pytest.approx(wider - journal, rel=1e-9)
 
 
-def test_unknown_options_are_refused(rocker):
-    with pytest.raises(ValueError, match="cavitation must be one of"):
-        Options(cavitation="gumbel")
-    with pytest.raises(ValueError, match="options must be"):
-        predict(rocker, 5000.0, speed=SPEED, options={"conduction": True})  # type: ignore[arg-type]
+def test_the_journal_settles_at_its_own_temperature(rocker):
+    growth = Growth()
+    p = run(rocker, options=Options(growth=growth))
+    by_hand = grown(rocker, growth, 40.0, p.equilibrium.grown)
+    again = run(by_hand)
+    np.testing.assert_allclose(again.h, p.h, rtol=1e-4)
+    # it is as warm as its films, in the mean over their area
+    area = [film.grid.area for film in p.equilibrium.films]
+    assert p.equilibrium.grown == pytest.approx(np.average(p.temperature, weights=area), abs=1e-4)
+    assert p.setup.bearing.pads[0].assembled_clearance < rocker.pads[0].assembled_clearance
+    assert p.mesh_error < 0.01  # the coarser mesh does not grow once more
+
+
+def test_no_clearance_left_is_said(rocker):
+    with pytest.raises(ValueError, match="no clearance left"):
+        run(rocker, options=Options(growth=Growth(journal=250.0)))
+
+
+@pytest.mark.parametrize("wrong", [{"reference": math.nan}, {"housing": 900.0}, {"expansion": (1.0, 1e-5)}])
+def test_nonsense_growth_is_refused(wrong):
+    with pytest.raises(ValueError):
+        Growth(**wrong)

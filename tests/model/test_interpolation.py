@@ -1,7 +1,5 @@
 """Rising cubics against scipy's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator

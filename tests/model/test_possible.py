@@ -1,7 +1,5 @@
 """Numbers that no bearing has are refused with their name; all that a bearing may have passes."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from dataclasses import replace
@@ -9,7 +7,6 @@ from dataclasses import replace
 import pytest
 
 from model.bearing import Bearing, BearingError, Material, Oil, Pivot
-from model.bearing_file import load_bearing
 from model.possible import BOUNDS, check_possible
 from model.predict import predict
 
@@ -27,13 +24,6 @@ def with_number(bearing: Bearing, part: type, name: str, value: float) -> Bearin
     else:
         last = replace(last, **{name: value})
     return bearing.with_pads((*bearing.pads[:-1], last))
-
-
-def test_the_bundled_bearings_are_possible(checkout):
-    files = sorted((checkout / "model" / "bearings").glob("*.toml"))
-    assert files
-    for path in files:
-        check_possible(load_bearing(path))
 
 
 def test_every_number_of_every_part_has_bounds():

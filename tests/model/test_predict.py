@@ -1,8 +1,7 @@
 """Predictions as users see them: mesh convergence and its estimate, fields, names, warm starts."""
 
-from __future__ import annotations
-
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,31 +11,13 @@ from model.pivots import pivot_laws
 from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Mesh, Setup
+from tests.model import points
+from tests.model.points import DOWN, OMEGA, SPEED, close
 from tests.rigs.sweeps import sweep
 
-SPEED, OMEGA, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, -math.pi / 2
 
-
-def run(bearing: Bearing, mesh: tuple[int, int] | None = None, thermal: str = "adiabatic") -> Prediction:
-    p = predict(bearing, 5000.0, DOWN, SPEED, OMEGA, thermal=thermal, mesh=mesh)
-    assert p.converged
-    return p
-
-
-def numbers(p: Prediction) -> np.ndarray:
-    return np.array([p.kxx, p.kyy, p.cxx, p.cyy, p.position[1], p.max_pressure, p.pad_load[0], p.pad_load[2]])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])
-def test_bearing_converges_with_second_order(rocker, thermal):
-    fine = numbers(run(rocker, (320, 24), thermal))
-    errors = [np.abs(numbers(run(rocker, (40 * s, 4 * s), thermal)) / fine - 1.0) for s in (1, 2)]
-    errors.append(np.abs(numbers(run(rocker, (160, 12), thermal)) / fine - 1.0))
-    assert (errors[1] < 4e-3).all(), errors[1]
-    assert (errors[2] < 1.5e-3).all(), errors[2]
-    # between the first and the second everything halves: a quarter, with room for where the rupture line falls
-    assert np.median(errors[1] / errors[0]) < 0.4
+def run(bearing: Bearing, mesh: tuple[int, int] | None = None, **more: Any) -> Prediction:
+    return points.run(bearing, mesh=mesh, **{"excitation": OMEGA} | more)
 
 
 @pytest.mark.slow
@@ -56,7 +37,7 @@ def test_coefficients_by_name_and_shape(rocker):
     p = run(rocker)
     assert p.kxx == p.h[0, 0].real == p.k[0, 0]
     assert p.cyx == pytest.approx(p.h[1, 0].imag / OMEGA)
-    several = predict(rocker, 5000.0, DOWN, SPEED, [OMEGA, 2 * OMEGA])
+    several = run(rocker, excitation=[OMEGA, 2 * OMEGA])
     assert several.h.shape == (2, 2, 2)
     assert several.cxx.shape == (2,)
     with pytest.raises(AttributeError, match="kzz"):
@@ -91,19 +72,16 @@ def test_temperature_channel_reads_mid_length_along_the_arc(rocker):
 
 
 def test_warm_start_on_another_mesh_starts_cold(rocker):
-    coarse = run(rocker, (40, 4))
-    p = predict(rocker, 5000.0, DOWN, SPEED, OMEGA, start=coarse)
-    np.testing.assert_allclose(p.h, run(rocker).h, rtol=1e-6, atol=1e-6 * p.kyy)
+    close(run(rocker, start=run(rocker, (40, 4))).h, run(rocker).h, 1e-6)
 
 
 def test_a_sweep_over_a_change_of_regime_finds_what_single_points_find(rocker):
     setup = Setup(rocker, pivot_laws(5e8, rocker), "isothermal")
-    speed, line = 2 * math.pi * 22, np.array([2 * math.pi * 25])
-    loads = [float(w) for w in np.arange(6000.0, 10001.0, 500.0)]
-    swept = sweep(setup, [(w, -math.pi / 2, speed, line) for w in loads])
+    places = [(w, DOWN, SPEED, np.array([OMEGA])) for w in np.arange(6000.0, 10001.0, 500.0).tolist()]
+    swept = sweep(setup, places)
     assert swept[0].idle_pads != swept[-1].idle_pads
-    for w, p in zip(loads, swept, strict=True):
-        single = predict_setup(setup, w, -math.pi / 2, speed, line)
+    for point, p in zip(places, swept, strict=True):
+        single = predict_setup(setup, *point)
         assert p.idle_pads == single.idle_pads
         np.testing.assert_allclose(p.h, single.h, rtol=1e-4)
 

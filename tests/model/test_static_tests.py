@@ -1,7 +1,5 @@
 """What static tests would show: dry curves, the clearance polygon, loci and sweeps with warm starts."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -13,9 +11,10 @@ from model.pivots import pivot_laws
 from model.predict import predict_setup
 from model.setup import Mesh, Setup
 from model.static_tests import dry_curve, polygon_sides
+from tests.model.points import DOWN, OMEGA, SPEED, close
 from tests.rigs.sweeps import sweep
 
-SPEED, OMEGA, DOWN = 2 * math.pi * 22.0, np.array([2 * math.pi * 25.0]), -math.pi / 2
+LINE = np.array([OMEGA])
 LOADS = np.linspace(2500.0, 8750.0, 6)
 
 
@@ -29,16 +28,8 @@ def test_dry_curve_is_the_law_through_structure_and_instruments(rocker):
     law = pivot_laws("kirk", rocker)[0]
     np.testing.assert_allclose(plain[1], [law.deflection(w) for w in load])
     np.testing.assert_allclose(plain[0], load)
-    read = dry_curve(
-        setup(
-            rocker,
-            Effect("housing_flexibility", stiffness=1e9),
-            Effect("probe_gain", factor=1.1),
-            Effect("loadcell_gain", factor=0.9),
-        ),
-        1,
-        load,
-    )
+    gains = Effect("probe_gain", factor=1.1), Effect("loadcell_gain", factor=0.9)
+    read = dry_curve(setup(rocker, Effect("housing_flexibility", stiffness=1e9), *gains), 1, load)
     np.testing.assert_allclose(read[1], 1.1 * (plain[1] + load / 1e9), atol=1e-15)
     np.testing.assert_allclose(read[0], 0.9 * load)
 
@@ -50,9 +41,8 @@ def test_polygon_of_equal_pads_is_regular(rocker):
 
 
 def test_push_load_enlarges_the_polygon_by_what_pivots_and_housing_give(rocker):
-    spring = setup(
-        rocker, Effect("housing_flexibility", stiffness=4e8), Effect("soft_pivot", pad=3, stiffness_factor=0.3)
-    )
+    soft = Effect("housing_flexibility", stiffness=4e8), Effect("soft_pivot", pad=3, stiffness_factor=0.3)
+    spring = setup(rocker, *soft)
     pushed, clearance = polygon_sides(spring, 200.0)[0], polygon_sides(spring, 0.0)[0]
     give = [law.deflection(200.0) for law in spring.pivots]
     np.testing.assert_allclose(pushed - clearance, np.array(give) + 200.0 / 4e8)
@@ -66,15 +56,15 @@ def test_push_load_enlarges_the_polygon_by_what_pivots_and_housing_give(rocker):
 
 def test_sweeps_up_and_down_meet_cold_starts(rocker):
     one = setup(rocker)
-    points = [(load, DOWN, SPEED, OMEGA) for load in LOADS]
+    points = [(load, DOWN, SPEED, LINE) for load in LOADS]
     up, down = sweep(one, points), sweep(one, points[::-1])[::-1]
     for load, a, b in zip(LOADS, up, down, strict=True):
-        cold = predict_setup(one, load, DOWN, SPEED, OMEGA)
+        cold = predict_setup(one, load, DOWN, SPEED, LINE)
         for warm in (a, b):
             assert warm.converged
-            np.testing.assert_allclose(warm.h, cold.h, rtol=2e-5, atol=2e-5 * np.abs(cold.h).max())
+            close(warm.h, cold.h, 2e-5)
             np.testing.assert_allclose(warm.position, cold.position, atol=1e-10)
-    near = [(load, DOWN, SPEED, OMEGA) for load in LOADS[0] + 50.0 * np.arange(5)]
+    near = [(load, DOWN, SPEED, LINE) for load in LOADS[0] + 50.0 * np.arange(5)]
     one = one.change(thermal="tehd")  # adiabatic films begin as near from the curves of their pads
     carried, alone = sweep(one, near), [predict_setup(one, *point) for point in near]
     assert sum(p.equilibrium.iterations for p in carried) < sum(p.equilibrium.iterations for p in alone)
@@ -96,7 +86,7 @@ def test_locus_of_equal_pads_repeats_every_pad(rocker):
 
 def test_a_point_that_fails_does_not_spoil_the_next(rocker):
     one = setup(rocker.with_pads(rocker.pads[:1]))
-    points = [(5000.0, d, SPEED, OMEGA) for d in (DOWN, 1.5, DOWN)]
+    points = [(5000.0, d, SPEED, LINE) for d in (DOWN, 1.5, DOWN)]
     found = sweep(one, points)
     assert [p.converged for p in found] == [True, False, True]
     np.testing.assert_allclose(found[2].h, found[0].h, rtol=1e-6)
