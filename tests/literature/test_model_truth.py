@@ -46,16 +46,8 @@ def solve(name: str, key: str, point: dict, mesh: Mesh | None = None) -> Predict
     bearing = load_bearing(BEARINGS / truth(name)["bearing"])
     custom = key == "points" and truth(name)["pivots"] == "custom"
     laws = softer(bearing) if custom else pivot_laws("kirk", bearing)
-    hz = 2 * math.pi
-    return predict(
-        bearing,
-        point["static_load_N"],
-        -math.pi / 2,
-        hz * point["shaft_speed_Hz"],
-        hz * point["excitation_Hz"],
-        pivots=laws,
-        mesh=mesh,
-    )
+    speed, excitation = (2 * math.pi * point[f"{name}_Hz"] for name in ("shaft_speed", "excitation"))
+    return predict(bearing, point["static_load_N"], -math.pi / 2, speed, excitation, pivots=laws, mesh=mesh)
 
 
 @pytest.mark.parametrize(("name", "key"), CASES)
