@@ -158,17 +158,29 @@ def test_half_speed_whirl_takes_the_pressure_away(wedge):
     np.testing.assert_allclose(forces.damping @ rates, -forces.force, atol=2e-3 * np.hypot(*forces.force))
 
 
-@pytest.mark.parametrize("wedge", [(0.0, 0.5), (0.65, 0.2), (0.9, 0.08)], ids=["full", "ruptured", "deep"])
-def test_forces_and_coefficients_converge_with_second_order(wedge):
-    fine = solve((320, 24), wedge, sharp=True)[2]
+@pytest.mark.parametrize(
+    ("wedge", "filling", "least"),
+    [
+        ((0.0, 0.5), None, 1.3),
+        ((0.65, 0.2), None, 1.3),
+        ((0.9, 0.08), None, 1.3),
+        # fronts that run across the mesh fall between its nodes by chance: between the first and the second order
+        ((-1.0, 0.1), 1.0, 0.8),
+        ((0.3, 0.4), 0.7, 0.8),
+    ],
+)
+def test_forces_and_coefficients_converge_with_second_order(wedge, filling, least):
+    solver = solve_film if filling is None else lambda *given: solve_film_jfo(*given, (filling, np.inf))
+    fine = solve((320, 24), wedge, True, solver)[2]
     errors = []
     for scale in (1, 2, 4):
-        f = solve((32 * scale, 2 * scale), wedge, sharp=True)[2]
+        f = solve((32 * scale, 2 * scale), wedge, True, solver)[2]
         errors.append([np.abs(a - b).max() / np.abs(b).max() for a, b in zip(f[:3], fine[:3], strict=True)])
+    assert (errors[2] < np.array([1e-3, 5e-3, 5e-3])).all(), errors
     order = np.log2(np.array(errors)[0] / np.array(errors)[2]) / 2.0
     assert order[0] > 1.7  # force
     # the rupture line falls between nodes by chance: single steps scatter, two halvings show the order
-    assert (order[1:] > 1.3).all(), order
+    assert (order[1:] > least).all(), order
 
 
 @pytest.mark.parametrize(
