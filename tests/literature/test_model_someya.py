@@ -16,12 +16,12 @@ import math
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, Oil, Pad, Pivot
+from model.bearing import Bearing
 from model.predict import predict
 from model.prediction import Prediction
+from tests.rigs.bearings import changed_pads, ring
 
-CLEARANCE, DIAMETER, REVS = 1e-4, 0.1, 20.0
-OIL = Oil(0.03, 0.0, 860.0, 0.0, 2000.0, 0.13, 40.0)
+CLEARANCE, DIAMETER, REVS, VISCOSITY = 1e-4, 0.1, 20.0, 0.03
 LIMIT_E, LIMIT_K, LIMIT_B = 0.015, 0.08, 0.05
 #: L/D, direction of the load, and on how many axes the printed numbers hold (both are alike between pads).
 BETWEEN_PADS, ON_PAD = (0.5, -0.25 * math.pi, 2), (1.0, -0.5 * math.pi, 1)
@@ -47,17 +47,15 @@ ROWS = [
 
 
 def databook_bearing(slenderness: float) -> Bearing:
-    pads = tuple(
-        Pad(math.radians(angle), math.radians(80), 0.5, CLEARANCE, CLEARANCE, 0.01, 0.0, 0.01, 1e-9, 1e-12)
-        for angle in (-90, 0, 90, 180)
-    )
-    return Bearing("databook", DIAMETER, slenderness * DIAMETER, pads, Pivot(), OIL)
+    angles, size = np.radians([-90.0, 0.0, 90.0, 180.0]).tolist(), (DIAMETER, slenderness * DIAMETER)
+    bearing = ring(angles, size, math.radians(80), (CLEARANCE, CLEARANCE), (VISCOSITY, 40.0))
+    return changed_pads(bearing, mass=1e-9, moment_of_inertia=1e-12)
 
 
 def solve(slenderness: float, sommerfeld: float, direction: float) -> tuple[Prediction, float]:
     bearing = databook_bearing(slenderness)
     ratio = (0.5 * DIAMETER / CLEARANCE) ** 2
-    load = OIL.viscosity_40 * REVS * bearing.length * DIAMETER * ratio / sommerfeld
+    load = VISCOSITY * REVS * bearing.length * DIAMETER * ratio / sommerfeld
     p = predict(bearing, load, direction, 2 * math.pi * REVS, pivots="rigid", thermal="isothermal")
     assert p.converged
     return p, load
