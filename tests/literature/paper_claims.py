@@ -29,7 +29,7 @@ from model.predict import predict
 from model.setup import Setup
 from model.static_tests import polygon_sides
 from rigdata.arrays import FloatArray
-from tests.rigs.sweeps import sweep
+from tests.rigs.bearings import sweep
 from tests.studies.results import table, write_section
 
 FOLDER = Path(__file__).resolve().parents[2] / "model" / "bearings"
