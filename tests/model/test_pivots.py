@@ -1,13 +1,15 @@
-"""Pivot laws: the printed formulas, tangents by differences, measured curves, files."""
+"""Pivot laws: the printed formulas, tangents by differences, measured curves and their cubics, files."""
 
 import math
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 import tpjb_ident as ti
 from model.bearing import BearingError, Pivot
 from model.conditions import pads_of
+from model.interpolation import rising_cubics
 from model.measured_pivot import FormulaPivot, MeasuredPivot
 from model.pad.pivot import ROCKER as BY_ROCKER
 from model.pivots import (
@@ -229,3 +231,10 @@ def test_a_list_of_numbers_is_no_list_of_laws_and_the_message_says_what_is(rocke
     """It said "need one pivot law per pad (5), got 5 entries"."""
     with pytest.raises(BearingError, match=r"need 5 pivot laws, one per pad, such as constant_pivot.*; got \(500"):
         pivot_laws([5e8] * 5, rocker)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("count", [2, 3, 9])
+def test_cubics_are_those_of_scipy(seed, count):
+    x, y = np.sort(np.random.default_rng(seed).normal(size=(2, count)), axis=1)
+    np.testing.assert_allclose(rising_cubics(x, y), PchipInterpolator(x, y).c, rtol=1e-9, atol=1e-12)
