@@ -10,6 +10,7 @@ import pytest
 
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
+from tests.rigs.closed_form import vector
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.terms.mains import MainsEquations
@@ -38,8 +39,7 @@ def test_random_intervals_hold_on_fresh_campaigns(tmp_path):
         path = tmp_path / f"{seed}.h5"
         write_campaign(path, rig)
         for p in identify(load_campaign(path), IdentifySettings(methods=())).points:
-            h = bearing_like(p.point)
-            truth = np.concatenate([h.real.ravel(), h.imag.ravel()])
+            truth = vector(bearing_like(p.point))
             lo, hi = p.stiffness.interval(0.95, systematic=False)
             inside.append((lo <= truth) & (truth <= hi))
             limit = 0.06 if p.point.excitation_hz == 50 else 0.01  # on the mains two answers can remain
@@ -54,7 +54,7 @@ def test_angles_of_a_known_disturbance_are_found_among_many_minima():
     """Six runs, two probes with mains of known size and unknown phase: H is found, the interval holds."""
     omega = 2 * np.pi * 50
     h = np.array([[7.5e7 + 1j * omega * 4.2e5, 5e6], [2e5, 1.9e8 + 1j * omega * 4.6e5]])
-    truth = np.concatenate([h.real.ravel(), h.imag.ravel()])
+    truth = vector(h)
     probes = np.array([[1, 1], [-1, 1]]) / np.sqrt(2)
     patterns = 0.0375e-6 * np.linalg.pinv(probes).T.astype(complex)
     angle = np.arange(6) * np.pi / 6

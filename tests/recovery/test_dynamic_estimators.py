@@ -85,17 +85,13 @@ def _runs_that_differ(seed: int, directions: int = 6, windows: int = 6):
     """Repeats far better than the runs agree: K of every run is off by a little of its own, C is not."""
     rng = np.random.default_rng([seed, directions])
     angle = np.arange(directions) * np.pi / directions
-    force = (
-        500 * np.stack([np.cos(angle), np.sin(angle)], axis=1) * np.exp(2j * np.pi * rng.random(directions))[:, None]
-    )
+    phase = np.exp(2j * np.pi * rng.random(directions))[:, None]
+    direct, cross = np.diag([1e8, 4e8]), np.array([[0, 2e8], [2e8, 0]])
     D, F = [], []
-    for f in force:
-        off = 0.004 * rng.standard_normal() * np.diag([1e8, 4e8]) + 0.003 * rng.standard_normal() * np.array(
-            [[0, 2e8], [2e8, 0]]
-        )
-        d = np.linalg.solve(H_TRUE + off, f)
+    for f in 500 * np.stack([np.cos(angle), np.sin(angle)], axis=1) * phase:
+        off = 0.004 * rng.standard_normal() * direct + 0.003 * rng.standard_normal() * cross
         wobble = rng.standard_normal((windows, 4)) + 1j * rng.standard_normal((windows, 4))
-        D.append(d + 2e-9 * wobble[:, :2])
+        D.append(np.linalg.solve(H_TRUE + off, f) + 2e-9 * wobble[:, :2])
         F.append(f + 0.2 * wobble[:, 2:])
     return np.concatenate(D), np.concatenate(F), np.repeat(np.arange(directions), windows)
 
