@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.dynamics import mass_centre_offset, pad_matrices, reduce_pads
+from model.dynamics import mass_centre_offset
 from model.effects import Effect
 from model.options import Options
 from model.prediction import Prediction
@@ -67,27 +67,6 @@ def test_coupling_of_an_offset_mass_lowers_what_moves_together(rocker):
         assert np.array([tilt, eta]) @ mass @ np.array([tilt, eta]) == pytest.approx(energy, rel=1e-12)
     central = run(rocker)
     assert mass_centre_offset(central.setup, central.equilibrium.films[0]) == 0.0
-
-
-def test_rigid_pivots_leave_out_the_radial_motion(rocker):
-    p = run(rocker, pivots="rigid")
-    pads, omega = pad_matrices(p.setup, p.equilibrium.films), np.array([100.0])
-    stiff = pads._replace(pad_stiffness=np.minimum(pads.pad_stiffness, 1e16))
-    np.testing.assert_allclose(reduce_pads(stiff, omega), reduce_pads(pads, omega), rtol=1e-5, atol=1.0)
-
-
-def test_massless_pads_lose_nothing_below_50_hz(rocker):
-    light = changed_pads(rocker, mass=0.0, moment_of_inertia=0.0)
-    p, q = (run(bearing, excitation=2 * math.pi * np.array([10.0, 50.0])) for bearing in (rocker, light))
-    np.testing.assert_allclose(p.kyy, q.kyy, rtol=2e-3)
-
-
-def test_frequency_zero_and_infinity(rocker):
-    # pads follow quasi-statically at 0, stand still at high frequency (heavy inertia): then h is the film's own
-    heavy = changed_pads(rocker, mass=1e9, moment_of_inertia=1e9)
-    p = run(heavy, excitation=100.0)
-    film = sum(m.stiffness[:2, :2] + 100j * m.damping[:2, :2] for m in p.pad_matrices)
-    close(p.h, film, 1e-3)
 
 
 def test_one_static_solution_serves_all_frequencies_and_one_is_synchronous(rocker):

@@ -68,15 +68,6 @@ def test_heat_made_leaves_with_the_oil():
     assert errors[2] < errors[0] / 8.0  # second order: a sixteenth
 
 
-def test_dissipation_is_the_journals_work():
-    # with p = 0 on all edges, U (mu U/h + h/2 dp/dx) and mu U^2/h + h^3/12mu |grad p|^2 have one integral
-    grid, work, _ = full_film((160, 12))
-    px = np.gradient(work.pressure, grid.dx, axis=0, edge_order=2)
-    friction = MU * SURFACE / work.thickness + 0.5 * work.thickness * px
-    work_done = SURFACE * float((friction * grid.area).sum()) / 2.0
-    assert heat_made(grid, work) == pytest.approx(work_done, rel=2e-3)
-
-
 def test_couette_flow_heats_linearly():
     # no wedge: no pressure; rho c h U/2 T' = mu U^2 / h
     grid, _, temperature = full_film((40, 4), wedge=(0.0, 0.0))

@@ -14,7 +14,7 @@ from model.prediction import Prediction
 from model.setup import Mesh, Setup
 from model.static_tests import dry_curve, polygon_sides
 from tests.model import points
-from tests.model.points import DOWN, OMEGA, SPEED, close
+from tests.model.points import DOWN, LOAD, OMEGA, SPEED, close
 from tests.rigs.bearings import sweep
 
 
@@ -77,17 +77,6 @@ def test_warm_start_on_another_mesh_starts_cold(rocker):
     close(run(rocker, start=run(rocker, (40, 4))).h, run(rocker).h, 1e-6)
 
 
-def test_a_sweep_over_a_change_of_regime_finds_what_single_points_find(rocker):
-    setup = Setup(rocker, pivot_laws(5e8, rocker), "isothermal")
-    places = [(w, DOWN, SPEED, np.array([OMEGA])) for w in np.arange(6000.0, 10001.0, 500.0).tolist()]
-    swept = sweep(setup, places)
-    assert swept[0].idle_pads != swept[-1].idle_pads
-    for point, p in zip(places, swept, strict=True):
-        single = predict_setup(setup, *point)
-        assert p.idle_pads == single.idle_pads
-        np.testing.assert_allclose(p.h, single.h, rtol=1e-4)
-
-
 def test_a_prediction_prints_in_the_units_of_its_readers(rocker):
     found = predict(rocker, load=5000.0, speed=138.0, excitation=np.array([100.0, 157.0]))
     assert len(repr(found)) < 300
@@ -136,34 +125,36 @@ def test_push_load_enlarges_the_polygon_by_what_pivots_and_housing_give(rocker):
     assert moved[0][2] == pytest.approx(rocker.pads[2].assembled_clearance + 1e-5)
 
 
-def test_sweeps_up_and_down_meet_cold_starts(rocker):
-    one = setup(rocker)
-    points = [(load, DOWN, SPEED, LINE) for load in LOADS]
+@pytest.mark.parametrize(
+    ("pivots", "thermal", "loads", "changes"),
+    [("kirk", "adiabatic", LOADS, False), (5e8, "isothermal", np.arange(6000.0, 10001.0, 500.0), True)],
+)
+def test_sweeps_up_and_down_meet_cold_starts_over_a_change_of_regime_too(rocker, pivots, thermal, loads, changes):
+    one = setup(rocker, pivots=pivots).change(thermal=thermal)
+    points = [(load, DOWN, SPEED, LINE) for load in loads]
     up, down = sweep(one, points), sweep(one, points[::-1])[::-1]
-    for load, a, b in zip(LOADS, up, down, strict=True):
-        cold = predict_setup(one, load, DOWN, SPEED, LINE)
-        for warm in (a, b):
+    assert (up[0].idle_pads != up[-1].idle_pads) is changes
+    for point, *both in zip(points, up, down, strict=True):
+        cold = predict_setup(one, *point)
+        for warm in both:
             assert warm.converged
+            assert warm.idle_pads == cold.idle_pads
             close(warm.h, cold.h, 2e-5)
             np.testing.assert_allclose(warm.position, cold.position, atol=1e-10)
-    near = [(load, DOWN, SPEED, LINE) for load in LOADS[0] + 50.0 * np.arange(5)]
-    one = one.change(thermal="tehd")  # adiabatic films begin as near from the curves of their pads
+
+
+def test_a_neighbour_saves_iterations_where_pads_bend(rocker):
+    # adiabatic films begin as near from the curves of their pads
+    one = setup(rocker).change(thermal="tehd")
+    near = [(load, DOWN, SPEED, LINE) for load in 2500.0 + 50.0 * np.arange(5)]
     carried, alone = sweep(one, near), [predict_setup(one, *point) for point in near]
     assert sum(p.equilibrium.iterations for p in carried) < sum(p.equilibrium.iterations for p in alone)
 
 
-def test_locus_of_equal_pads_repeats_every_pad(rocker):
-    directions = np.linspace(-math.pi, math.pi, 20, endpoint=False)
-    turning = 2 * math.pi * 20.0
-    found = sweep(setup(rocker), [(5000.0, d, turning, np.array([turning])) for d in directions.tolist()])
-    points = np.array([p.position for p in found])
-    assert points.shape == (20, 2)
-    turned = points[4:8]  # 72 deg further
-    c, s = math.cos(2 * math.pi / 5), math.sin(2 * math.pi / 5)
-    np.testing.assert_allclose(turned, points[:4] @ np.array([[c, s], [-s, c]]), atol=2e-9)
-    # inside the clearance polygon
-    pushed, angle = polygon_sides(setup(rocker), 5000.0)
-    assert (points @ np.array([np.cos(angle), np.sin(angle)]) < pushed).all()
+def test_the_locus_lies_inside_the_clearance_polygon_that_its_load_would_push(rocker):
+    pushed, angle = polygon_sides(setup(rocker), LOAD)
+    for p in sweep(setup(rocker), [(LOAD, direction, SPEED, LINE) for direction in np.linspace(-3.0, 3.0, 8).tolist()]):
+        assert (p.position @ [np.cos(angle), np.sin(angle)] < pushed).all()
 
 
 def test_a_point_that_fails_does_not_spoil_the_next(rocker):

@@ -55,16 +55,6 @@ def test_a_clockwise_shaft_is_the_mirror_image(rocker):
     assert (left.speed, left.rotation, right.rotation) == (SPEED, *reversed(ROTATIONS))
 
 
-def test_hot_oil_goes_on_with_the_shaft(rocker):
-    warm = {}
-    for rotation in ROTATIONS:
-        hot = [Effect("hot_oil_carryover", fraction=0.8)]
-        warm[rotation] = [f.inlet for f in predict(rocker, effects=hot, rotation=rotation, **POINT).pad_flow]
-    # load on pad 1: the hot oil of the loaded pad enters pad 2, or pad 5
-    assert warm["counter-clockwise"][1] > warm["counter-clockwise"][4] + 1.0
-    np.testing.assert_allclose(warm["clockwise"], np.roll(warm["counter-clockwise"][::-1], 1), rtol=1e-6)
-
-
 def test_a_shaft_against_the_stated_sense_enters_at_the_other_edge(rocker):
     stated = with_offset(rocker, 0.6, "counter-clockwise")
     backward = predict(stated, rotation="clockwise", **POINT)
