@@ -171,5 +171,6 @@ def test_directions_that_contradict_one_another_a_million_times_have_wide_interv
     table = windows(3, n=8, noise=1e-12 * np.eye(4))
     off = complex_normal(rng, 6, 2)[table.direction]
     est = estimate_table(dataclasses.replace(table, F=table.F + off), 160.0, method)
+    np.testing.assert_allclose(est.covariance, est.covariance.T)
     assert np.linalg.eigvalsh(est.covariance / est.covariance.max())[0] > 0
     assert est.standard_error.min() > 0.05 * np.abs(H).min()  # as far as the directions differ
