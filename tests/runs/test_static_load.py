@@ -23,13 +23,6 @@ def loaded(ratios, load=5000.0, direction=-90.0):
     return SimpleNamespace(point=place(load, direction), mean_loads=force)
 
 
-def test_a_ratio_is_size_and_angle_whatever_the_direction():
-    given = np.array([1.02, np.exp(0.01j), 0.97 * np.exp(-0.02j)])
-    for direction in (-90.0, 0.0, 54.0):
-        (miss,), common = load_misses([loaded(given, 3000.0, direction)])
-        np.testing.assert_allclose(common * (1 + miss), given, rtol=1e-12)
-
-
 def test_misses_are_relative_to_what_all_runs_share():
     """A gain and a rotation of the cells move nothing."""
     scatter = np.array([0.01 + 0.003j, -0.01 - 0.003j, 0.01 - 0.003j, -0.01 + 0.003j])
