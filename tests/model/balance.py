@@ -15,18 +15,18 @@ class Balance:
 
     def __init__(
         self,
-        one: tuple[FilmGrid, FilmWork],
+        film: tuple[FilmGrid, FilmWork],
         wedge: tuple[float, float, float],
         speed: float,
         filling: float = 1.0,
         compliance: np.ndarray | None = None,
     ) -> None:
-        self.grid, work = one
+        self.grid, work = film
         self.clearance, self.wedge = wedge[0], np.array(wedge[1:])
         self.speed, self.filling, self.compliance, self.still = speed, filling, compliance, work.extra.copy()
         self.viscosity, self.density = float(work.viscosity[1, 1]), float(work.density[1, 1])
         self.dry, self.lacking = work.ruptured[1:-1, :-1].copy(), work.ruptured[0].copy()
-        theta = fluid_fraction(*one, wedge, speed, filling)
+        theta = fluid_fraction(*film, wedge, speed, filling)
         self.start = np.where(self.dry, theta[1:-1, :-1], work.pressure[1:-1, :-1]).ravel()
 
     def __call__(self, unknown: np.ndarray, wedge: np.ndarray) -> np.ndarray:

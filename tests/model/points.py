@@ -49,7 +49,7 @@ def plain_film(
 
 
 def solved(
-    one: tuple[FilmGrid, FilmWork],
+    film: tuple[FilmGrid, FilmWork],
     wedge: tuple[float, float],
     sharp: bool = False,
     solver: Callable[..., FilmForces] = solve_film,
@@ -57,7 +57,7 @@ def solved(
     clearance: float = 1e-4,
 ) -> FilmForces:
     """Solve from a full film; `wedge` is (a, b) over the clearance."""
-    one[1].ruptured[:] = False
-    forces = solver(*one, (clearance, wedge[0] * clearance, wedge[1] * clearance), speed, sharp)
+    film[1].ruptured[:] = False
+    forces = solver(*film, (clearance, wedge[0] * clearance, wedge[1] * clearance), speed, sharp)
     assert forces.steps > 0
     return forces

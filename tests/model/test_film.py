@@ -84,34 +84,19 @@ def test_infinitely_short_film_meets_ocvirks_parabola():
 
 def reference_force(grid: FilmGrid, wedge: tuple[float, float], rates: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
     """Film force with squeeze, da/dt and db/dt [m/s]: another matrix, another solver, the same equation."""
-    nt, nz = len(grid.angle) - 1, len(grid.z) - 1
+    nz = len(grid.z) - 1
     node, face = height(grid.angle, wedge), height(0.5 * (grid.angle[1:] + grid.angle[:-1]), wedge)
-    index = np.arange((nt - 1) * nz).reshape(nt - 1, nz)
-    rows, columns, values = [], [], []
-
-    def link(i: np.ndarray, j: np.ndarray, g: np.ndarray) -> None:
-        rows.extend([i, i])
-        columns.extend([i, j])
-        values.extend([g, -g])
-
     gx = face[:, None] ** 3 / (12 * MU) * grid.height[:-1] / grid.dx
     gz = node[1:-1, None] ** 3 / (12 * MU) * grid.dx / grid.dz
-    for a, b, g in ((index[:-1], index[1:], gx[1:-1]), (index[:, :-1], index[:, 1:], gz[:, :-1])):
-        link(a.ravel(), b.ravel(), g.ravel())
-        link(b.ravel(), a.ravel(), g.ravel())
-    matrix = sparse.coo_matrix(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(index.size, index.size)
-    )
-    wall = np.zeros(index.shape)
-    wall[0] += gx[0]
-    wall[-1] += gx[-1]
-    wall[:, -1] += gz[:, -1]
-    matrix = (matrix + sparse.diags(wall.ravel())).tocsr()
+    beside = np.where(np.arange(nz) < nz - 1, gz, 0.0)  # the last of a line has the edge beside it
+    whole = gx[1:] + gx[:-1] + gz + np.roll(beside, 1, axis=1)
+    links = (gx[1:-1].ravel(), nz), (beside.ravel()[:-1], 1)
+    matrix = sum((sparse.diags([-g, -g], [-n, n]) for g, n in links), sparse.diags(whole.ravel())).tocsr()
     squeeze = -(rates[0] * np.cos(grid.angle[1:-1]) + rates[1] * np.sin(grid.angle[1:-1]))
     source = -(0.5 * SPEED * np.diff(face) + squeeze * grid.dx)[:, None] * grid.height[:-1]
-    wet = np.ones(index.size, bool)
+    wet = np.ones(source.size, bool)
     for _ in range(100):
-        p = np.zeros(index.size)
+        p = np.zeros(source.size)
         keep = np.flatnonzero(wet)
         p[keep] = spsolve(matrix[keep][:, keep].tocsc(), source.ravel()[keep])
         residual = matrix @ p - source.ravel()
@@ -121,7 +106,7 @@ def reference_force(grid: FilmGrid, wedge: tuple[float, float], rates: tuple[flo
         wet = new
     else:
         raise AssertionError("reference active set did not settle")
-    weighted = (p.reshape(index.shape) * grid.area[1:-1, :-1]).sum(axis=1)
+    weighted = (p.reshape(source.shape) * grid.area[1:-1, :-1]).sum(axis=1)
     return np.array([weighted @ grid.cos[1:-1], weighted @ grid.sin[1:-1]])
 
 
