@@ -34,6 +34,11 @@ def side(name: str, values, random=1e-3, gain=0.01, quality="ok", channels=CHANN
     return Side(name, pd.DataFrame([row]), campaign=campaign, sensors={"calibration: X1A": moved[None]})
 
 
+def changed(place: int, factor: float) -> np.ndarray:
+    """The true entries, one of them another."""
+    return TRUE * np.where(np.arange(8) == place, factor, 1.0)
+
+
 def half(difference, name="kyy_N_per_m"):
     row = difference.points.iloc[0]
     return 0.5 * (row[f"{name}_difference_hi"] - row[f"{name}_difference_lo"])
@@ -51,14 +56,13 @@ def test_a_common_calibration_cancels_and_another_one_does_not():
 
 
 def test_it_says_yes_no_and_cannot_tell():
-    moved = TRUE.copy()
-    moved[3] *= 1.05
-    changed = difference_of(side("a", TRUE), side("b", moved)).points.iloc[0]
-    assert changed["kyy_N_per_m_difference"] == pytest.approx(0.05 * TRUE[3])
-    limits = [changed[f"kyy_N_per_m_difference{ending}"] for ending in ("_lo", "_hi")]
+    moved = changed(3, 1.05)
+    found = difference_of(side("a", TRUE), side("b", moved)).points.iloc[0]
+    assert found["kyy_N_per_m_difference"] == pytest.approx(0.05 * TRUE[3])
+    limits = [found[f"kyy_N_per_m_difference{ending}"] for ending in ("_lo", "_hi")]
     width = 1.96 * np.sqrt(2) * 1e-3 * TRUE[3]
     assert limits == pytest.approx([0.05 * TRUE[3] - width, 0.05 * TRUE[3] + width], rel=1e-3)
-    assert [changed["kyy_changed"], changed["kxx_changed"]] == ["yes", "no"]
+    assert [found["kyy_changed"], found["kxx_changed"]] == ["yes", "no"]
     unsure = difference_of(side("a", TRUE, random=0.05), side("b", moved, random=0.05)).points.iloc[0]
     assert unsure["kyy_changed"] == "cannot tell"
     doubtful = difference_of(side("a", TRUE), side("b", moved, quality="ok; baseline-missing"))
@@ -67,9 +71,7 @@ def test_it_says_yes_no_and_cannot_tell():
 
 
 def test_sentences_name_the_largest_change_and_points_without_a_partner():
-    moved = TRUE.copy()
-    moved[4] *= 1.2
-    first, *_ = difference_sentences(difference_of(side("before", TRUE), side("after", moved)))
+    first, *_ = difference_sentences(difference_of(side("before", TRUE), side("after", changed(4, 1.2))))
     assert first == (
         "From before to after 1 of 8 coefficients changed beyond what both intervals allow, most of all cxx at 5 kN, "
         "25 Hz: +18.5\N{NO-BREAK SPACE}% of the mean direct coefficient (120.0 ± 1.9 kN s/m)."
@@ -78,14 +80,11 @@ def test_sentences_name_the_largest_change_and_points_without_a_partner():
     first, *more = difference_sentences(apart)
     assert first == "a and b have no operating point in common."
     assert more[-1].startswith("Without a partner: a: 5 kN at -90°, shaft at 22 Hz (1320 rpm), 25 Hz; b: 6 kN")
-    more_points = side("b", TRUE)
-    both = pd.concat([more_points.coefficients.assign(static_load_N=load) for load in (6000.0, 7000.0)])
-    *_, last = difference_sentences(
-        difference_of(side("a", TRUE), replace(more_points, coefficients=both.reset_index(drop=True)))
-    )
+    other = side("b", TRUE)
+    both = pd.concat([other.coefficients.assign(static_load_N=load) for load in (6e3, 7e3)], ignore_index=True)
+    *_, last = difference_sentences(difference_of(side("a", TRUE), replace(other, coefficients=both)))
     assert last.count("b: ") == 1
     assert "; b: 6 kN at -90°, shaft at 22 Hz (1320 rpm), 25 Hz; 7 kN at -90°" in last
-    other = side("b", TRUE)
     mirrored = replace(other, coefficients=other.coefficients.assign(rotation="clockwise"))
     *_, last = difference_sentences(difference_of(side("a", TRUE), mirrored))
     assert "b: 5 kN at -90°, shaft at 22 Hz (1320 rpm) clockwise, 25 Hz" in last
@@ -141,14 +140,10 @@ def test_campaigns_of_static_tests_alone_are_compared_by_these(tmp_path):
 
 
 def test_the_first_screen_says_what_was_tested_and_each_value_with_its_interval(tmp_path):
-    moved = TRUE.copy()
-    moved[7] *= 0.5
-    sides = [side("a", TRUE), side("b", moved, quality="large-amplitude")]
-    both = [[s.coefficients.assign(rotation=sense) for sense in ROTATIONS] for s in sides]
-    sides = [
-        replace(s, campaign=None, coefficients=pd.concat(frames, ignore_index=True))
-        for s, frames in zip(sides, both, strict=True)
-    ]
+    sides = []
+    for one in (side("a", TRUE), side("b", changed(7, 0.5), quality="large-amplitude")):
+        both = pd.concat([one.coefficients.assign(rotation=sense) for sense in ROTATIONS], ignore_index=True)
+        sides.append(replace(one, campaign=None, coefficients=both))
     page = write_difference_report(tmp_path, difference_of(*sides), {"then": "tpjb view o"}).read_text("utf-8")
     first = re.sub(r"<[^>]+>", " ", page[page.index("<main>") : page.index("<nav")])
     words = " ".join(first.split())

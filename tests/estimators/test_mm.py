@@ -8,7 +8,14 @@ from tests.phasors.phasor_cases import H, complex_normal
 from tests.seeds import first_quick
 from tpjb_ident.estimate.statistics import bisquare_weight, efficiency_constant
 from tpjb_ident.estimators import least_trimmed
-from tpjb_ident.estimators.least_trimmed import MANY_WINDOWS, Regression, distance2, mm_fit, robust_start
+from tpjb_ident.estimators.least_trimmed import (
+    MANY_WINDOWS,
+    Regression,
+    distance2,
+    evenly_chosen,
+    mm_fit,
+    robust_start,
+)
 
 
 def windows(seed, n=60, g=6, noise=0.1, bad=10):
@@ -17,6 +24,14 @@ def windows(seed, n=60, g=6, noise=0.1, bad=10):
     Y = X @ H.T + noise * complex_normal(rng, n, 2)
     Y[:bad] += 3.0 * complex_normal(rng, bad, 2)
     return X, Y, np.arange(n) % g
+
+
+def runs(seed, g=6, n=20, wobble=0.02, noise=0.01):
+    """Windows of g runs, n each, about a motion of their own; and the generator."""
+    rng = np.random.default_rng(seed)
+    label = np.repeat(np.arange(g), n)
+    X = complex_normal(rng, g, 2)[label] + wobble * complex_normal(rng, g * n, 2)
+    return X, X @ H.T + noise * complex_normal(rng, g * n, 2), label, rng
 
 
 @pytest.mark.parametrize("unit", [2.0**-40, 2.0**30])
@@ -109,9 +124,7 @@ def test_noise_of_any_size_gives_the_same_start():
 
 def two_opinions(tightness, seed=3):
     """Three windows of five in every direction say H, two of five 2 H with `tightness` times less power of noise."""
-    rng = np.random.default_rng(seed)
-    label = np.repeat(np.arange(6), 20)
-    X = complex_normal(rng, 6, 2)[label] + 0.05 * complex_normal(rng, 120, 2)
+    X, _, label, rng = runs(seed, wobble=0.05)
     few = np.arange(120) % 5 < 2
     E = 0.05 * complex_normal(rng, 120, 2) / np.sqrt(np.where(few, tightness, 1.0))[:, None]
     return X, X @ H.T * np.where(few, 2.0, 1.0)[:, None] + E, label
@@ -154,10 +167,8 @@ def test_two_runs_that_fit_by_themselves_are_no_core():
 
     Half of the windows, three runs, are not.
     """
-    rng = np.random.default_rng(12)
-    label = np.repeat(np.arange(6), 20)
-    X = complex_normal(rng, 6, 2)[label] + 0.005 * complex_normal(rng, 120, 2)
-    Y = X @ H.T + 0.3 * complex_normal(rng, 6, 2)[label] + 0.01 * complex_normal(rng, 120, 2)
+    X, Y, label, rng = runs(12, wobble=0.005)
+    Y += 0.3 * complex_normal(rng, 6, 2)[label]
     start = robust_start(Regression(X, Y), label, 1)
     accepted = distance2(Regression(X, Y).residual(start.coefficients), start.scatter) < chi2.ppf(0.99, 4)
     assert len(np.unique(label[accepted])) >= 3
@@ -207,3 +218,87 @@ def test_windows_of_a_direction_that_few_runs_have_are_no_outliers(noise, betwee
         fit = mm_fit(X, Y, label)
         np.testing.assert_allclose(fit.coefficients, H, atol=max(noise + 2 * between, 1e-9))
         assert (fit.weights[label >= 12] > 0.3).mean() > 0.9
+
+
+@pytest.mark.parametrize("share", [0.3, 0.45])
+def test_bad_windows_with_one_and_the_same_disturbance_do_not_win(share):
+    X, Y, label, rng = runs(17, 8, 15, noise=0.02)
+    bad = rng.permutation(120) < share * 120
+    Y[bad] += 3.0 - 2.0j
+    fit = mm_fit(X, Y, label)
+    np.testing.assert_allclose(fit.coefficients, H, atol=0.04)
+    assert (fit.weights[bad] == 0.0).all()
+    assert np.mean(fit.weights[~bad] > 0.3) > 0.95
+    start = robust_start(Regression(X, Y), label, 1)
+    assert not start.exact
+    good = (Y - X @ H.T)[~bad]
+    np.testing.assert_allclose(np.trace(start.scatter).real, np.mean(np.abs(good) ** 2) * 2, rtol=0.35)
+
+
+def test_other_starts_lead_to_the_same_answer():
+    X, Y, label = windows(18, n=72, noise=0.05, bad=20)
+    fits = [mm_fit(X, Y, label, seed).coefficients for seed in range(5)]
+    for fit in fits[1:]:
+        np.testing.assert_allclose(fit, fits[0], atol=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("q", "enough"), [(1, 8), (2, 8), (3, 10), (4, 12)])
+def test_a_robust_fit_takes_two_windows_more_than_twice_what_a_core_must_hold(q, enough):
+    rng = np.random.default_rng(q)
+    X = complex_normal(rng, enough, 2)
+    Y = X @ complex_normal(rng, q, 2).T + 0.05 * complex_normal(rng, enough, q)
+    label = np.arange(enough) % 4
+    few = mm_fit(X[:-1], Y[:-1], label[:-1])
+    assert few.conditions == ("no-robust-start",)
+    assert few.iterations == 0
+    assert "no-robust-start" not in mm_fit(X, Y, label).conditions
+    two = mm_fit(X[:2], Y[:2], label[:2])
+    np.testing.assert_allclose(two.scatter, 0.0, atol=1e-20)
+
+
+def test_exact_windows_are_told_by_the_usual_force_not_by_the_wildest():
+    X, Y, label = windows(21, 40, 5, noise=0.0, bad=0)
+    Y[:10] += 2.6e-9
+    Y[10] *= 30.0
+    fit = mm_fit(X, Y, label)
+    np.testing.assert_array_equal(fit.weights, np.arange(40) > 10)
+    np.testing.assert_allclose(fit.coefficients, H, atol=1e-9)
+    assert fit.conditions == ("zero-scale",)
+    assert "29 of 40 windows" in fit.conditions[0].detail
+    assert fit.iterations == 0
+
+
+def test_a_fit_that_is_not_left_to_settle_says_so():
+    X, Y, label = windows(22, 40, 5, bad=0)
+    endless = mm_fit(X, Y, label, tolerance=-1.0)
+    assert endless.iterations == 200
+    assert mm_fit(X, Y, label, tolerance=1e9).iterations == 1
+    assert endless.conditions == ("iteration-limit",)
+    fine, rough = mm_fit(X, Y, label), mm_fit(X, Y, label, tolerance=1e-3)
+    assert 1 <= rough.iterations < fine.iterations < 100
+    np.testing.assert_allclose(rough.coefficients, fine.coefficients, atol=2e-3)
+    np.testing.assert_allclose(endless.coefficients, fine.coefficients, atol=1e-11)
+    assert fine.conditions == ()
+
+
+def test_a_tight_core_in_every_direction_is_heard_against_a_scattered_majority():
+    X, Y, label, rng = runs(28)
+    bad = np.arange(120) % 20 >= 9  # eleven of twenty in every direction
+    Y[bad] += 5.0 * complex_normal(rng, bad.sum(), 2)
+    start = robust_start(Regression(X, Y), label, 1)
+    np.testing.assert_allclose(start.coefficients, H, atol=0.03)
+    assert np.trace(start.scatter).real < 10 * 2 * 0.01**2
+
+
+def test_a_share_of_every_direction_is_looked_at():
+    direction = np.random.default_rng(2).permutation(np.repeat(np.arange(5), [400, 200, 100, 50, 50]))
+    chosen = evenly_chosen(direction, 80)
+    assert len(np.unique(chosen)) == 80
+    assert (np.diff(chosen) > 0).all()
+    np.testing.assert_allclose(np.bincount(direction[chosen]), [40, 20, 10, 5, 5], atol=1)
+    for d in range(5):
+        places = np.flatnonzero(direction == d)
+        rank = np.searchsorted(places, chosen[direction[chosen] == d]) / len(places)
+        assert np.ptp(rank) > 0.7
+    np.testing.assert_array_equal(evenly_chosen(direction[:80], 80), np.arange(80))

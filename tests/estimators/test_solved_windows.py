@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tests.phasors.phasor_cases import NOISE, H, complex_normal, hermitian, windows
-from tpjb_ident.estimate.window_means import attenuation
-from tpjb_ident.estimators.estimate import solved_windows
-from tpjb_ident.estimators.r_matrix import complex_to_real_covariance, phasor_table
+from tests.seeds import first_quick
+from tpjb_ident.estimate.window_means import LOCKED, aligned, attenuation
+from tpjb_ident.estimators.estimate import estimate_table, solved_windows
+from tpjb_ident.estimators.r_matrix import complex_to_real_covariance, displacement_condition, phasor_table
 
 
 def solved(table, weights=None):
@@ -84,21 +85,25 @@ def test_eight_spare_repeats_make_a_noise_of_four_components(g, n, told):
     assert (solved(windows(14, g, n)) is not None) is told
 
 
-@pytest.mark.parametrize("directions", [7, 9])
-def test_one_direction_of_many_that_stands_apart_has_no_weight(directions):
+def apart(directions, off):
+    """Windows of some directions, the fourth of which is off; which windows are its."""
     table = windows(19, g=directions, n=12, noise=0.05 * NOISE)
     mine = table.direction == 3
-    apart = dataclasses.replace(table, F=table.F + 0.5 * mine[:, None])
-    result = solved(apart)
+    return dataclasses.replace(table, F=table.F + off * mine[:, None]), mine
+
+
+@pytest.mark.parametrize("directions", [7, 9])
+def test_one_direction_of_many_that_stands_apart_has_no_weight(directions):
+    table, mine = apart(directions, 0.5)
+    result = solved(table)
     np.testing.assert_allclose(result.weights[mine], 0.0, atol=1e-3)
     assert result.weights[~mine].mean() > 0.8
     np.testing.assert_allclose(result.h * table.h_scale, H, atol=0.05)
 
 
 def test_of_four_directions_nobody_can_say_which_is_wrong():
-    table = windows(19, g=4, n=12, noise=0.05 * NOISE)
-    mine = table.direction == 3
-    result, calm = solved(dataclasses.replace(table, F=table.F + 0.3 * mine[:, None])), solved(table)
+    (table, mine), (quiet, _) = apart(4, 0.3), apart(4, 0.0)
+    result, calm = solved(table), solved(quiet)
     assert result.weights[mine].mean() > 0.5
     assert np.trace(result.covariance) > 30 * np.trace(calm.covariance)
 
@@ -128,3 +133,44 @@ def test_runs_that_differ_in_stiffness_widen_its_interval_and_hardly_that_of_dam
     inside, widths = np.array(inside), np.median(widths, axis=0)
     assert inside[:, [0, 3]].mean() > 0.9
     assert (widths[[4, 7]] < 0.5 * widths[[0, 3]]).all()
+
+
+@pytest.mark.parametrize(("beyond", "wandering"), [(0.01, 0), (-0.01, 6)])
+def test_a_drive_wanders_below_a_limit_of_its_mean_phase(beyond, wandering):
+    table = windows(15, noise=1e-6 * np.eye(4))
+    z = np.concatenate([table.D, table.F], axis=1)
+    turn = np.exp(1j * np.arccos(LOCKED + beyond) * np.where(np.arange(240) % 2, 1, -1))
+    assert aligned(z * turn[:, None], table.direction, np.ones(240))[1] == wandering
+
+
+def test_condition_is_the_ratio_of_the_axes():
+    assert displacement_condition(np.array([[3.0, 0.0], [0.0, 1.0j]])) == pytest.approx(3.0)
+    assert displacement_condition(np.array([[3.0, 0.0], [0.0, 1.0j]]), np.array([1.0, 9.0])) == pytest.approx(1.0)
+    assert displacement_condition(np.array([[3.0, 1.0]])) == np.inf
+    assert displacement_condition(np.array([[3.0, 1.0], [6.0, 2.0]])) == np.inf
+
+
+@pytest.mark.parametrize("method", first_quick("ols", "mm"))
+def test_where_windows_agree_but_for_noise_every_method_has_the_interval_of_its_scatter(method):
+    """Noise of the forces alone, over the inverse Gram matrix of all windows; a scatter of runs is never negative."""
+    noise = np.diag([1e-14, 1e-14, 2.5e-3, 2.5e-3]).astype(complex)
+    ratios = []
+    for seed in range(10):
+        table = windows(seed, n=40, noise=noise)
+        est = estimate_table(table, 160.0, method)
+        gram = np.linalg.inv(table.D.conj().T @ table.D)
+        known = 2.5e-3 * complex_to_real_covariance(np.kron(np.eye(2), gram)) / table.d_scale**2
+        ratios.append(np.diag(est.covariance) / np.diag(known))
+    np.testing.assert_allclose(np.median(ratios, axis=0), 1.7, atol=0.5)
+
+
+@pytest.mark.parametrize("method", ["ols", "mm", "mm-eiv"])
+def test_directions_that_contradict_one_another_a_million_times_have_wide_intervals(method):
+    """Noise of 1e-6 beside forces that no h explains."""
+    rng = np.random.default_rng(4)
+    table = windows(3, n=8, noise=1e-12 * np.eye(4))
+    off = complex_normal(rng, 6, 2)[table.direction]
+    est = estimate_table(dataclasses.replace(table, F=table.F + off), 160.0, method)
+    np.testing.assert_allclose(est.covariance, est.covariance.T)
+    assert np.linalg.eigvalsh(est.covariance / est.covariance.max())[0] > 0
+    assert est.standard_error.min() > 0.05 * np.abs(H).min()  # as far as the directions differ

@@ -11,14 +11,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.predict import predict
+from rigdata.arrays import FloatArray
 from tests.studies import results
 
-FloatArray = NDArray[np.float64]
 FOLDER = Path(__file__).resolve().parents[2] / "model" / "bearings"
 SPEED, EXCITATION, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, -math.pi / 2
 MESHES = ((20, 2), (40, 4), (80, 8), (160, 16), (320, 32))
@@ -43,15 +41,10 @@ CASES = (
 )
 
 
-def bearing(name: str) -> Bearing:
-    return load_bearing(FOLDER / f"{name}.toml")
-
-
 def numbers(case: Case, mesh: tuple[int, int]) -> FloatArray:
     """`NAMES` on one mesh."""
-    p = predict(
-        bearing(case.bearing), case.load, DOWN, SPEED, EXCITATION, pivots=case.pivots, thermal=case.thermal, mesh=mesh
-    )
+    drawn = load_bearing(FOLDER / f"{case.bearing}.toml")
+    p = predict(drawn, case.load, DOWN, SPEED, EXCITATION, pivots=case.pivots, thermal=case.thermal, mesh=mesh)
     if not p.converged:
         raise RuntimeError(f"{case.name} on {mesh}: {p.status}")
     return np.array([p.max_pressure, p.pad_load[0], p.position[1], p.kxx, p.kyy, p.cxx, p.cyy])

@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
@@ -29,10 +28,10 @@ from model.pivots import pivot_laws
 from model.predict import predict
 from model.setup import Setup
 from model.static_tests import polygon_sides
-from tests.rigs.sweeps import sweep
+from rigdata.arrays import FloatArray
+from tests.rigs.bearings import sweep
 from tests.studies.results import table, write_section
 
-FloatArray = NDArray[np.float64]
 FOLDER = Path(__file__).resolve().parents[2] / "model" / "bearings"
 SPEED, EXCITATION, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, -math.pi / 2
 LOADS = (2500.0, 3750.0, 5000.0, 6250.0, 7500.0, 8750.0)

@@ -14,8 +14,7 @@ from statsmodels.robust.scale import HuberScale
 from tpjb_ident.estimators.estimate import RlmSettings, solve_rlm
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "mass_rlm.json").read_text(encoding="utf-8"))
-
-
+X, Y = np.array(REFERENCE["X"]), np.array(REFERENCE["y"])
 #: As MASS::rlm's proposal 2.
 PROPOSAL_2 = HuberScale(d=1.345, tol=1e-13, maxiter=500)
 
@@ -35,11 +34,7 @@ def mass_scale(model, residual) -> float:
     ],
 )
 def test_coefficients_and_scale_are_those_of_mass(run: str, norm: str, scale):
-    fit = solve_rlm(
-        np.array(REFERENCE["X"]),
-        np.array(REFERENCE["y"]),
-        RlmSettings(norm, scale, max_iterations=2000, tolerance=1e-15),
-    )
+    fit = solve_rlm(X, Y, RlmSettings(norm, scale, 2000, 1e-15))
     expected = REFERENCE["results"][run]
     np.testing.assert_allclose(fit.params, expected["coefficients"], rtol=0, atol=1e-12)
     assert fit.scale == pytest.approx(expected["scale"], rel=1e-11)
@@ -47,8 +42,7 @@ def test_coefficients_and_scale_are_those_of_mass(run: str, norm: str, scale):
 
 
 def test_the_usual_mad_constant_differs_by_what_it_should():
-    X, y = np.array(REFERENCE["X"]), np.array(REFERENCE["y"])
-    own = solve_rlm(X, y, RlmSettings("huber", "mad", 2000, 1e-15))
+    own = solve_rlm(X, Y, RlmSettings("huber", "mad", 2000, 1e-15))
     mass = REFERENCE["results"]["psi.huber"]
     assert own.scale / mass["scale"] == pytest.approx(0.6745 / 0.6744897501960817, rel=1e-5)
     assert 0 < np.abs(own.params - mass["coefficients"]).max() < 1e-6

@@ -6,7 +6,9 @@ temperature, digitised to about 1 K; target: 4 K to their TEHD results, 5 K to t
 """
 
 import math
+from typing import Any
 
+import numpy as np
 import pytest
 
 from model.bearing import Bearing, Oil, Pad, Pivot
@@ -32,8 +34,8 @@ def bearing() -> Bearing:
     return Bearing("Fillon", 0.1, 0.07, pads, Pivot(), oil)
 
 
-def run(rpm: float, thermal: str) -> Prediction:
-    p = predict(bearing(), 10e3, -math.pi / 2, rpm * math.pi / 30, pivots="rigid", thermal=thermal)
+def run(rpm: float, thermal: str, **more: Any) -> Prediction:
+    p = predict(bearing(), 10e3, speed=rpm * math.pi / 30, pivots="rigid", thermal=thermal, **more)
     assert p.converged
     return p
 
@@ -42,8 +44,7 @@ def test_adiabatic_film_heats_by_what_the_load_says():
     # without carry-over and without heat into the pads the rise of a film that carries W is bound to W, not to the
     # speed: mu U / h^2 is what carries. Film and power grow with speed as they must.
     runs = [run(rpm, "adiabatic") for rpm in PEAK]
-    peaks = [p.max_temperature for p in runs]
-    assert max(peaks) - min(peaks) < 3.0
+    assert np.ptp([p.max_temperature for p in runs]) < 3.0
     assert runs[0].max_temperature - 40.0 < 20.0
     assert [p.power_loss for p in runs] == sorted(p.power_loss for p in runs)
     assert [p.min_film for p in runs] == sorted(p.min_film for p in runs)
@@ -51,7 +52,6 @@ def test_adiabatic_film_heats_by_what_the_load_says():
 
 def peak(p: Prediction) -> float:
     """Thermocouples sit in the pads: the faces count."""
-    assert p.converged
     return max(float(t.max()) for t in p.face_temperature)
 
 
@@ -70,10 +70,7 @@ def test_peak_pad_temperatures_without_a_chosen_constant(rpm):
 def test_peak_pad_temperatures_with_the_paths_of_heat_one_by_one(rpm):
     # one temperature across the film, a parabola at the faces, and a lambda of 0.9 that is ours
     options = Options(conduction=True, isothermal_journal=True, growth=Growth(reference=20.0))
-    p = predict(
-        bearing(), 10e3, speed=rpm * math.pi / 30, pivots="rigid", thermal="tehd",
-        effects=[Effect("hot_oil_carryover", fraction=0.9)], options=options,
-    )  # fmt: skip
+    p = run(rpm, "tehd", effects=[Effect("hot_oil_carryover", fraction=0.9)], options=options)
     assert peak(p) == pytest.approx(PEAK[rpm][0], abs=7.0 if rpm > 3000 else 4.0)
 
 

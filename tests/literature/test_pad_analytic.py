@@ -18,7 +18,7 @@ from model.bearing import BABBITT, STEEL, Bearing, Material
 from model.bearing_file import load_bearing
 from model.pad.block_cholesky import solve
 from model.pad.line import Line
-from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, SectorMesh, sector_mesh
+from model.pad.mesh import MeshDensity, PadGeometry, SectorMesh, sector_mesh
 from model.pad.operators import ElasticSector
 from tests.pad_responses import PadResponse, pad_solid
 
@@ -121,14 +121,11 @@ class TestThickCylinder:
         factor = (1.0 + nu) / STEEL.youngs_modulus * self.PRESSURE * a2 / (b2 - a2)
         return factor * ((1.0 - 2.0 * nu) * self.INNER + b2 / self.INNER)
 
-    def test_one_element_is_close(self) -> None:
-        assert self.error(1) < 1e-3
-
-    def test_fourth_order(self) -> None:
+    def test_one_element_is_close_and_the_order_is_four(self) -> None:
         """Displacement under its own load is an energy: order 2p = 4 for quadratic elements."""
         errors = [self.error(n) for n in (1, 2, 4)]
-        orders = [math.log2(errors[i] / errors[i + 1]) for i in range(2)]
-        assert min(orders) > 3.5, orders
+        assert errors[0] < 1e-3
+        assert min(math.log2(errors[i] / errors[i + 1]) for i in range(2)) > 3.5, errors
 
     def test_hot_plain_cylinder_grows_like_a_free_one(self) -> None:
         """Free to slide along z: u_r = alpha T r exactly, whatever the mesh."""
@@ -171,35 +168,6 @@ class TestBimetal:
         # the babbitt, inside, expands more: the strip opens, its ends move outward
         assert got == pytest.approx(-self.curvature(lining, BABBITT, backing, STEEL, rise), rel=0.005)
 
-    def test_curved_pad_bends_by_the_same_curvature(self) -> None:
-        """A thin curved strip changes its curvature by as much: u'' + u = R^2 kappa + R eps along the arc."""
-        lining, backing, radius, arc = 0.3e-3, 0.7e-3, 0.05, math.radians(60.0)
-        mesh = strip((radius, radius + lining, radius + 1e-3), arc, 0.1e-3, (BABBITT, STEEL), 60)
-        fixed = unfixed(mesh)
-        fixed[0, U_THETA] = True
-        fixed[0, U_R, -1, :] = True
-        u = thermal_field(ElasticSector(mesh, fixed), 25.0)[:, U_R, -1, 0]
-        theta = mesh.theta.nodes
-        inside = (theta > 0.05 * arc) & (theta < 0.9 * arc)
-        basis = np.stack([np.ones_like(theta), np.cos(theta)], axis=1)[inside]
-        constant, _ = np.linalg.lstsq(basis, u[inside], rcond=None)[0]
-        # u = R^2 kappa + R eps + c cos(theta); eps = hoop strain of the back, from the exact two-layer ring
-        kappa = -self.curvature(lining, BABBITT, backing, STEEL, 25.0)
-        growth = self.back_strain(lining, backing, 25.0)
-        outer = radius + 1e-3
-        assert constant == pytest.approx(outer**2 * kappa + outer * growth, rel=0.02)
-
-    @staticmethod
-    def back_strain(lining: float, backing: float, rise: float) -> float:
-        """Strain of the outer fibre of a free two-layer strip, by force and moment balance."""
-        edges = np.array([0.0, lining, lining + backing])
-        e = np.array([BABBITT.youngs_modulus, STEEL.youngs_modulus])
-        alpha = np.array([BABBITT.thermal_expansion, STEEL.thermal_expansion]) * rise
-        first, second, third = (np.diff(edges**k) / k for k in (1, 2, 3))
-        left = np.array([[e @ first, e @ second], [e @ second, e @ third]])
-        strain, slope = np.linalg.solve(left, [(e * alpha) @ first, (e * alpha) @ second])
-        return strain + slope * edges[-1]
-
 
 def paper_pad(name: str, n_theta: int = 49, n_z: int = 9, **keywords: object) -> tuple[PadResponse, Bearing]:
     bearing = load_bearing(BEARINGS / f"{name}.toml")
@@ -216,20 +184,6 @@ def loaded(solid: PadResponse, force: float) -> np.ndarray:
     shape = np.sin(np.pi * s)[:, None] * (1.0 - z**2)
     arm = np.cos(solid.film_theta)[:, None] * np.ones(z.size)
     return force / (2.0 * arm.ravel() @ solid.film_mass @ shape.ravel()) * shape
-
-
-@pytest.mark.slow
-def test_pad_of_the_paper_deforms_by_microns() -> None:
-    """Fig. 2: the loaded pad of the rocker bearing at 5 kN opens by a few um towards its edges."""
-    solid, _ = paper_pad("rocker")
-    bend = solid.bend(loaded(solid, 4565.0))
-    assert 1e-6 < bend.max() < 4e-6
-    assert bend.min() > 0.0
-    assert bend[0, 0] > 3.0 * bend[24, 0]
-    rise = 5.0 + 10.0 * (solid.film_theta - solid.film_theta[0])[:, None] * np.ones(9) / np.ptp(solid.film_theta)
-    grow = solid.expand(rise)
-    assert 2e-6 < np.ptp(grow) < 10e-6
-    assert grow[24, 0] < 0.0 < grow[0, -1]
 
 
 # Radial displacement [um] at three angles (leading edge, a quarter of the arc, pivot) x four places along the half
@@ -265,18 +219,6 @@ def test_default_mesh_is_within_one_percent(name: str) -> None:
             finest = np.array(FINEST[name, case])
             difference = 1e6 * field[np.ix_([0, 24, 48], [0, 16, 28, 32])] - finest
             assert np.abs(difference).max() < 0.01 * np.abs(finest).max(), (case, difference)
-
-
-def test_converges_from_below() -> None:
-    """Displacement elements are too stiff, and nested ones ever less so: energy grows, by ever smaller steps."""
-    energies = []
-    for factor in (1, 2, 3):
-        n = MeshDensity(arc=2 * factor, face=factor, half_length=3, backing=factor, rim=10.0, edge=10.0)
-        solid, _ = paper_pad("rocker", density=n, face=PivotFace(0.02, 69.6e-3))
-        pressure = loaded(solid, 4500.0)
-        energies.append(float(pressure.ravel() @ solid.film_mass @ solid.bend(pressure).ravel()))
-    assert energies[0] < energies[1] < energies[2]
-    assert energies[2] - energies[1] < energies[1] - energies[0]
 
 
 DENSITY = MeshDensity(arc=8, face=1, half_length=4, backing=2, rim=0.1, edge=0.2)

@@ -1,7 +1,5 @@
 """The two bundled bearings, read once: they are frozen, every change is a copy."""
 
-from __future__ import annotations
-
 import pytest
 
 from model.bearing import Bearing

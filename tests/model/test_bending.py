@@ -1,37 +1,38 @@
-"""Pads that give way: the Newton step knows how the film answers, and ends where the solid says."""
-
-from __future__ import annotations
+"""Pads that give way: the Newton step knows how the film answers, and ends where the solid says; pads that bend with
+the motion: the stiff pad, the mesh, and what a film does by its own balances."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
+from model.dynamics import flexing_impedance
 from model.effects import Effect
 from model.film.faces import conductances
 from model.film.reynolds import solve_film
 from model.film.slopes import shape_slopes
+from model.options import Options
 from model.pivots import pivot_laws
-from model.predict import predict
-from model.setup import Setup
+from model.prediction import Prediction
+from model.setup import Mesh, Setup
 from model.statics.search import Search
+from tests.model import points
+from tests.model.balance import Balance
+from tests.model.points import SPEED, close, run
 from tests.pad_responses import pad_solid
 
-SPEED = 2 * math.pi * 22
 
-
-@pytest.fixture(scope="module", params=["rocker", "spherical"])
+@pytest.fixture(params=["rocker", "spherical"])
 def bearing(request) -> Bearing:
-    return load_bearing(f"model/bearings/{request.param}.toml")
+    return request.getfixturevalue(request.param)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("load", [2500.0, 8750.0])
 def test_deformation_is_what_pressure_and_heat_ask_for(bearing, load):
-    p = predict(bearing, load, speed=SPEED, thermal="tehd")
-    assert p.converged
+    p = run(bearing, load=load, thermal="tehd")
     assert p.equilibrium.iterations <= 18  # followed one step behind, it swings for ever
     films = p.equilibrium.films
     for film in films:
@@ -39,11 +40,6 @@ def test_deformation_is_what_pressure_and_heat_ask_for(bearing, load):
         wanted = solid.bend(film.work.pressure) + solid.expand(film.work.temperature - 40.0)
         np.testing.assert_allclose(film.bent, wanted, atol=1e-5 * film.work.thickness.min())
     assert np.ptp(films[0].bent) > 1e-6
-
-
-def test_pads_of_one_shape_share_their_matrices(bearing):
-    films = predict(bearing, 5000.0, speed=SPEED, thermal="tehd").equilibrium.films
-    assert len({id(f.deformation) for f in films}) == 1
 
 
 @pytest.mark.slow
@@ -56,48 +52,73 @@ def test_the_matrices_of_a_search_stand_in_one_order(bearing):
 
 
 def test_pressure_slopes_by_shape_are_finite_differences(bearing):
-    p = predict(bearing, 5000.0, speed=SPEED, thermal="tehd")
+    p = run(bearing, thermal="tehd")
     film = p.equilibrium.films[0]
     assert film.deformation is not None
-    grid, work = film.grid, film.work
-    wedge = film.wedge
-    surface = SPEED * bearing.journal_radius
+    grid, work, wedge = film.grid, film.work, film.wedge
 
     def pressure(amplitudes: np.ndarray) -> np.ndarray:
         work.extra[:] = film.bent + film.deformation.shapes @ amplitudes
-        assert solve_film(grid, work, wedge, surface, False).steps > 0
+        assert solve_film(grid, work, wedge, SPEED * bearing.journal_radius, False).steps > 0
         return work.unknown.copy()
 
     size = 1e-9 / np.abs(film.deformation.shapes).max()
     pressure(np.zeros(film.deformation.shapes.shape[2]))
     shapes = film.deformation.shapes + 0j  # complex, as the dynamics ask: compiled already
-    slopes = shape_slopes(grid, work, conductances(grid, work, wedge), shapes).real
-    for m in range(slopes.shape[1]):
-        step = np.zeros(slopes.shape[1])
-        step[m] = size
-        differences = (pressure(step) - pressure(-step)) / (2 * size)
-        np.testing.assert_allclose(slopes[:, m], differences, atol=0.01 * np.abs(differences).max())
-
-
-def test_shapes_are_orthonormal_by_area(bearing):
-    film = predict(bearing, 5000.0, speed=SPEED, thermal="tehd").equilibrium.films[0]
-    assert film.deformation is not None
-    count = film.deformation.shapes.shape[2]
-    np.testing.assert_allclose(
-        film.deformation.amplitudes @ film.deformation.shapes.reshape(-1, count), np.eye(count), atol=1e-10
-    )
+    by_shape = shape_slopes(grid, work, conductances(grid, work, wedge), shapes).real
+    for slope, step in zip(by_shape.T, size * np.eye(by_shape.shape[1]), strict=True):
+        close(slope, (pressure(step) - pressure(-step)) / (2 * size), 0.01)
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_softer_and_stiffer_pads_converge(bearing, factor):
-    p = predict(bearing, 5000.0, speed=SPEED, effects=[Effect("pad_bending", compliance_factor=factor)])
-    assert p.converged
+    p = run(bearing, Effect("pad_bending", compliance_factor=factor))
     assert p.equilibrium.iterations <= 18
 
 
 @pytest.mark.slow
 def test_starved_and_misaligned_films_bend_too(bearing):
     for effect in (Effect("starvation", arc_fraction=0.15), Effect("misalignment", angle=1e-4, direction=-1.2)):
-        p = predict(bearing, 5000.0, speed=SPEED, thermal="tehd", effects=[effect])
-        assert p.converged, (effect, p.status)
-        assert p.equilibrium.iterations <= 25
+        assert run(bearing, effect, thermal="tehd").equilibrium.iterations <= 25
+
+
+FLEXING = Options(perturbed_bending=True)
+
+
+def flexing(bearing: Bearing, factor: float = 1.0, options: Options = FLEXING, **more: Any) -> Prediction:
+    """An isothermal bearing with pads that bend."""
+    bending = Effect("pad_bending", compliance_factor=factor)
+    return points.run(bearing, bending, thermal="isothermal", options=options, **more)
+
+
+@pytest.mark.slow
+def test_a_stiff_pad_moves_as_a_rigid_body(rocker):
+    for factor, least, most in ((1e-6, 0.0, 1e-5), (1.0, 1e-3, 1.0)):
+        p, rigid = flexing(rocker, factor=factor), flexing(rocker, factor=factor, options=Options())
+        change = np.abs(p.h - rigid.h).max() / np.abs(rigid.h).max()
+        assert least < change < most
+
+
+@pytest.mark.slow
+def test_it_hardly_hangs_on_the_mesh_and_takes_from_stiffness_or_damping(rocker):
+    p, fine, rigid = flexing(rocker), flexing(rocker, mesh=Mesh(160, 12)), flexing(rocker, options=Options())
+    np.testing.assert_allclose(np.diag(p.k), np.diag(fine.k), rtol=0.01)
+    np.testing.assert_allclose(np.diag(p.c), np.diag(fine.c), rtol=0.01)
+    # in series with the film the pad takes from its damping
+    assert (np.diag(p.c) < np.diag(rigid.c)).all()
+
+
+@pytest.mark.slow
+def test_it_is_what_a_film_over_a_flexing_pad_does_by_its_own_balances(rocker):
+    omega = 2 * math.pi * 50
+    p = flexing(rocker, excitation=omega, mesh=Mesh(20, 4))
+    film, speed = p.equilibrium.films[0], p.equilibrium.running.speed
+    added = flexing_impedance(film, np.array([omega]), 1.0)[0]
+    assert not film.work.ruptured[1:-1, :-1].any()
+    found, rigid = (
+        Balance((film.grid, film.work), film.wedge, speed, compliance=compliance).impedance(omega)
+        for compliance in (film.deformation.compliance, None)
+    )
+    close(film.forces.stiffness + 1j * omega * film.forces.damping, rigid, 1e-4)
+    close(found - rigid, added, 5e-3)
+    assert np.abs(added).max() > 0.3 * np.abs(rigid).max()

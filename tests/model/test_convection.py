@@ -1,7 +1,5 @@
 """Operators interpolated over the convection of a pad's free faces are those of a solution for it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,23 +1,19 @@
-"""Dynamic coefficients: Eq. (9)-(12) against a dense solution of the whole system, and what each pad entry does."""
-
-from __future__ import annotations
+"""Dynamic coefficients: Eq. (9)-(12) against a dense solution of the whole system, what each pad entry does, and at
+rest the slope of the static locus."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from model.dynamics import mass_centre_offset, pad_matrices, reduce_pads
+from model.bearing import Bearing
+from model.dynamics import mass_centre_offset
 from model.effects import Effect
 from model.options import Options
-from model.pivots import pivot_laws
-from model.predict import predict, predict_setup
 from model.prediction import Prediction
-from model.setup import Setup
+from tests.model.points import DOWN, LOAD, SPEED, close, run, slopes
 from tests.rigs.bearings import changed_pads
-
-SPEED = 2 * math.pi * 22.0
-DOWN = -math.pi / 2
 
 
 def dense(p: Prediction, omega: float) -> np.ndarray:
@@ -55,14 +51,13 @@ def dense(p: Prediction, omega: float) -> np.ndarray:
 def test_reduction_is_the_dense_solution(rocker, hz, offset):
     heavy = changed_pads(rocker, pivot_offset=offset, mass=5.0, moment_of_inertia=2e-2)
     effects = [Effect("pivot_damping", damping=4e5), Effect("pivot_rotation", rotational_stiffness=3e4)]
-    p = predict(heavy, 5000.0, -1.2, SPEED, 2 * math.pi * hz, effects=effects)
-    expected = dense(p, 2 * math.pi * hz)
-    np.testing.assert_allclose(p.h, expected, atol=1e-9 * np.abs(expected).max())
+    p = run(heavy, *effects, direction=-1.2, excitation=2 * math.pi * hz)
+    close(p.h, dense(p, 2 * math.pi * hz), 1e-9)
 
 
 def test_coupling_of_an_offset_mass_lowers_what_moves_together(rocker):
     # kinetic energy 1/2 m (eta' - b t')^2 + 1/2 (I - m b^2) t'^2 with tilt and b counter-clockwise, eta outward
-    p = predict(changed_pads(rocker, pivot_offset=0.6), 5000.0, DOWN, SPEED)
+    p = run(changed_pads(rocker, pivot_offset=0.6))
     film = p.equilibrium.films[0]
     b = mass_centre_offset(p.setup, film)
     assert b < 0.0  # the pivot stands behind the middle, so that the centre is upstream (clockwise)
@@ -70,76 +65,88 @@ def test_coupling_of_an_offset_mass_lowers_what_moves_together(rocker):
     for tilt, eta in ((1.0, 0.3), (-2.0, 1.0)):
         energy = film.pad.mass * (eta - b * tilt) ** 2 + (film.pad.moment_of_inertia - film.pad.mass * b**2) * tilt**2
         assert np.array([tilt, eta]) @ mass @ np.array([tilt, eta]) == pytest.approx(energy, rel=1e-12)
+    central = run(rocker)
+    assert mass_centre_offset(central.setup, central.equilibrium.films[0]) == 0.0
 
 
-def test_central_pivot_has_its_mass_on_the_pivot_line(rocker):
-    p = predict(rocker, 5000.0, DOWN, SPEED)
-    assert mass_centre_offset(p.setup, p.equilibrium.films[0]) == 0.0
-
-
-def test_rigid_pivots_leave_out_the_radial_motion(rocker):
-    p = predict(rocker, 5000.0, DOWN, SPEED, pivots="rigid")
-    pads, omega = pad_matrices(p.setup, p.equilibrium.films), np.array([100.0])
-    stiff = pads._replace(pad_stiffness=np.minimum(pads.pad_stiffness, 1e16))
-    np.testing.assert_allclose(reduce_pads(stiff, omega), reduce_pads(pads, omega), rtol=1e-5, atol=1.0)
-
-
-def test_massless_pads_lose_nothing_below_50_hz(rocker):
-    light = changed_pads(rocker, mass=0.0, moment_of_inertia=0.0)
-    excitation = 2 * math.pi * np.array([10.0, 50.0])
-    p, q = (predict(b, 5000.0, DOWN, SPEED, excitation) for b in (rocker, light))
-    np.testing.assert_allclose(p.kyy, q.kyy, rtol=2e-3)
-
-
-def test_frequency_zero_and_infinity(rocker):
-    # pads follow quasi-statically at 0, stand still at high frequency (heavy inertia): then h is the film's own
-    heavy = changed_pads(rocker, mass=1e9, moment_of_inertia=1e9)
-    p = predict(heavy, 5000.0, DOWN, SPEED, 100.0)
-    film = sum(m.stiffness[:2, :2] + 100j * m.damping[:2, :2] for m in p.pad_matrices)
-    np.testing.assert_allclose(p.h, film, atol=1e-3 * np.abs(film).max())
-
-
-def test_one_static_solution_serves_all_frequencies(rocker):
-    excitation = 2 * math.pi * np.array([10.0, 25.0, 50.0])
-    p = predict(rocker, 5000.0, DOWN, SPEED, excitation)
+def test_one_static_solution_serves_all_frequencies_and_one_is_synchronous(rocker):
+    excitation = np.array([2 * math.pi * 10.0, SPEED, 2 * math.pi * 50.0])
+    p = run(rocker, excitation=excitation)
     assert p.h.shape == (3, 2, 2)
-    for k, omega in enumerate(excitation):
-        h = predict(rocker, 5000.0, DOWN, SPEED, float(omega)).h
-        np.testing.assert_allclose(p.h[k], h, rtol=0.0, atol=1e-12 * np.abs(h).max())
-
-
-def test_default_excitation_is_synchronous(rocker):
-    p = predict(rocker, 5000.0, DOWN, SPEED)
-    assert p.excitation == SPEED
-    assert p.cyy == pytest.approx(p.h[1, 1].imag / SPEED)
+    for h, omega in zip(p.h, excitation.tolist(), strict=True):
+        close(h, run(rocker, excitation=omega).h, 1e-12)
+    synchronous = run(rocker)
+    assert synchronous.excitation == SPEED
+    close(synchronous.h, p.h[1], 1e-12)
+    assert synchronous.cyy == pytest.approx(synchronous.h[1, 1].imag / SPEED)
 
 
 @pytest.mark.slow
-class TestPerturbedHeat:
-    def test_the_slope_of_a_hot_film_s_locus_is_its_stiffness(self, rocker):
-        # frozen viscosity is 3 to 7 % off it
-        for load, close in ((5000.0, 2e-4), (8750.0, 3e-3)):
-            setup = Setup(rocker, pivot_laws("rigid", rocker), "adiabatic", accuracy=1e-11)
-            setup = setup.change(options=Options(perturbed_heat=True))
-            points = [predict_setup(setup, w, -math.pi / 2, 138.0, 1e-4) for w in (load, 0.999 * load, 1.001 * load)]
-            slope = (points[2].position - points[1].position) / (0.002 * load)
-            moved = np.linalg.solve(points[0].h.real, [0.0, -1.0])
-            assert moved[1] == pytest.approx(slope[1], rel=close)
-            frozen = predict_setup(setup.change(options=Options()), load, -math.pi / 2, 138.0, 1e-4)
-            assert abs(np.linalg.solve(frozen.h.real, [0.0, -1.0])[1] / slope[1] - 1.0) > 0.02
-
-    def test_far_above_the_oil_s_passage_it_is_frozen(self, rocker):
+@pytest.mark.parametrize(
+    ("point", "limit"),
+    [
         # 5 kHz: a hundred times faster than oil passes a pad
-        fast = np.array([2 * math.pi * 5e3])
-        both = [
-            predict(rocker, 5000.0, speed=138.0, excitation=fast, pivots="rigid", options=Options(perturbed_heat=on)).h
-            for on in (False, True)
-        ]
-        assert np.abs(both[1] - both[0]).max() < 2e-3 * np.abs(both[0]).max()
+        ({"excitation": np.array([2 * math.pi * 5e3]), "pivots": "rigid"}, 2e-3),
+        ({"thermal": "isothermal"}, 0.0),
+    ],
+    ids=["far above the oil's passage", "isothermal"],
+)
+def test_perturbed_heat_changes_nothing_where_heat_cannot_follow(rocker, point, limit):
+    frozen, moved = (run(rocker, options=Options(perturbed_heat=on), **point).h for on in (False, True))
+    close(moved, frozen, limit)
 
-    def test_isothermal_films_have_nothing_to_follow(self, rocker):
-        both = [
-            predict(rocker, 5000.0, speed=138.0, thermal="isothermal", options=Options(perturbed_heat=on)).h
-            for on in (False, True)
-        ]
-        np.testing.assert_array_equal(both[0], both[1])
+
+ISOTHERMAL = {"thermal": "isothermal"}
+FAST, HALF_FED = {"speed": 2 * math.pi * 150.0, "load": 2000.0}, {"speed": 2 * math.pi * 60.0, "mesh": (40, 4)}
+LEANING = [Effect("misalignment", angle=6e-4, direction=0.4)]
+HELD = [*LEANING, Effect("pivot_rotation", rotational_stiffness=2e4)]
+BENDING = [Effect("pad_bending", compliance_factor=1.0)]
+TILTED = {"effects": [Effect("misalignment", angle=6e-4, direction=DOWN), *BENDING]}
+HEATED = {"thermal": "adiabatic", "pivots": "rigid", "options": Options(perturbed_heat=True)}
+PLAIN = {"options": Options()}
+#: Bearing, point, how close, and what the point is without: then the slope is off by more than this share.
+CASES = {
+    "rigid pivots": ("rocker", {"pivots": "rigid"}, 2e-3, None),
+    "Kirk's pivots": ("rocker", {}, 2e-3, None),
+    "pivots that roll": ("rocker", {"effects": [Effect("pivot_rolling", factor=2.0)]}, 5e-3, None),
+    "turbulence": ("thin", FAST | {"options": Options(turbulence="ng-pan")}, 5e-3, None),
+    "mass conserved": ("spherical", {"load": 8750.0, "options": Options(cavitation="jfo")}, 2e-3, None),
+    "short of oil": ("fed", HALF_FED | {"options": Options(cavitation="jfo")}, 0.03, None),
+    "axial tilt": ("spherical", {"effects": LEANING, "options": Options(axial_tilt=True)}, 1e-3, (PLAIN, 5e-3)),
+    "axial tilt, held": ("spherical", {"effects": HELD, "options": Options(axial_tilt=True)}, 1e-3, (PLAIN, 5e-3)),
+    "axial tilt, bending": (
+        "spherical",
+        TILTED | {"options": Options(axial_tilt=True, perturbed_bending=True)},
+        2e-3,
+        None,
+    ),
+    "bending": ("rocker", {"effects": BENDING, "options": Options(perturbed_bending=True)}, 2e-4, (PLAIN, 0.01)),
+    "heat": ("rocker", HEATED, 2e-4, (PLAIN, 0.02)),
+    "heat, heavy load": ("rocker", HEATED | {"load": 8750.0}, 3e-3, (PLAIN, 0.02)),
+}
+
+
+@pytest.fixture
+def bearings(rocker, spherical) -> dict[str, Bearing]:
+    thin = replace(rocker, oil=replace(rocker.oil, viscosity_40=0.02 * rocker.oil.viscosity_40))
+    fed = replace(rocker, oil=replace(rocker.oil, supply_flow=18.0 / 60e3))
+    return {"rocker": rocker, "spherical": spherical, "thin": thin, "fed": fed}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_at_rest_the_stiffness_is_the_slope_of_the_static_locus(bearings, name):
+    which, point, limit, other = CASES[name]
+    bearing, point = bearings[which], ISOTHERMAL | point
+    load = point.pop("load", LOAD)
+
+    def position(push: np.ndarray) -> np.ndarray:
+        place = {"load": float(np.hypot(*push)), "direction": math.atan2(push[1], push[0])}
+        return run(bearing, **point, **place).bearing_position
+
+    compliance = slopes(position, np.array([0.0, -load]), 0.004 * load)
+    k = run(bearing, load=load, excitation=1e-3, **point).k
+    np.testing.assert_allclose(k @ compliance, np.eye(2), atol=limit)
+    if other is not None:
+        without = run(bearing, load=load, excitation=1e-3, **point | other[0]).k
+        assert np.abs(without @ compliance - np.eye(2)).max() > other[1]

@@ -1,10 +1,10 @@
 """Effects: neutral values change nothing, the others exactly what each says of itself; messages; files; one's own."""
 
-from __future__ import annotations
-
 import math
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +13,7 @@ from model.bearing import Bearing
 from model.effects import (
     Effect,
     EffectError,
-    EffectKind,
     EffectWords,
-    Parameter,
     apply_effects,
     known_effects,
     load_effects,
@@ -28,9 +26,10 @@ from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
 from model.static_tests import dry_curve
+from tests.model import points
+from tests.model.points import DOWN, LOAD, OMEGA, SPEED, close
 from tests.rigs.bearings import changed_pads
 
-SPEED, OMEGA, LOAD, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, 5000.0, -math.pi / 2
 NAMES = {
     "pivot_flexibility", "soft_pivot", "pad_offset", "thermal_growth", "preload_error", "oil_viscosity",
     "supply_temperature", "hot_oil_carryover", "pad_bending", "housing_flexibility", "fluid_inertia",
@@ -48,10 +47,8 @@ def base(rocker) -> Prediction:
     return run(rocker)
 
 
-def run(bearing: Bearing, *effects: Effect, pivots: object = "kirk", load: float = LOAD) -> Prediction:
-    p = predict(bearing, load, DOWN, SPEED, OMEGA, pivots=pivots, effects=effects)
-    assert p.converged
-    return p
+def run(bearing: Bearing, *effects: Effect, **more: Any) -> Prediction:
+    return points.run(bearing, *effects, excitation=OMEGA, **more)
 
 
 def same(p: Prediction, q: Prediction, tolerance: float = 1e-10) -> None:
@@ -88,11 +85,7 @@ def test_an_effect_is_the_same_from_a_start_without_it(rocker, base, name):
     if known_effects()[name].missing(rocker):
         pytest.skip("the bearing cannot have it")
     effect = typical(name)
-    cold = predict(rocker, LOAD, DOWN, SPEED, OMEGA, effects=[effect])
-    warm = predict(rocker, LOAD, DOWN, SPEED, OMEGA, effects=[effect], start=base)
-    assert cold.converged
-    assert warm.converged
-    same(warm, cold, 2e-6)
+    same(run(rocker, effect, start=base), run(rocker, effect), 2e-6)
 
 
 def test_library_has_every_name_that_users_know():
@@ -123,25 +116,61 @@ def test_pivot_flexibility_and_soft_pivot(rocker):
     np.testing.assert_allclose(one.deflection, expected, rtol=1e-5)
 
 
-def test_geometry_effects_are_other_bearings(rocker):
-    pad = rocker.pads[3]
-    moved = [*rocker.pads]
-    moved[3] = replace(pad, assembled_clearance=pad.assembled_clearance + 12e-6)
-    same(run(rocker, Effect("pad_offset", pad=4, radial_offset=12e-6)), run(rocker.with_pads(tuple(moved))))
-    wider = changed_pads(rocker, assembled_clearance=pad.assembled_clearance + 9e-6)
-    same(run(rocker, Effect("thermal_growth", clearance_change=9e-6)), run(wider), 1e-9)
-    # ... but it is a matter of running: the drawing, and with it the dry tests, keep their clearance
+def oil(**changes: float) -> Callable[[Bearing], Bearing]:
+    return lambda bearing: replace(bearing, oil=replace(bearing.oil, **changes))
+
+
+def moved(bearing: Bearing) -> Bearing:
+    pads = [*bearing.pads]
+    pads[3] = replace(pads[3], assembled_clearance=92e-6)
+    return bearing.with_pads(tuple(pads))
+
+
+OTHERS = {
+    "pad_offset": ({"pad": 4, "radial_offset": 12e-6}, moved),
+    "thermal_growth": ({"clearance_change": 9e-6}, lambda b: changed_pads(b, assembled_clearance=89e-6)),
+    "uneven_pads": ({f"offset_{k}": 4e-6 for k in range(1, 6)}, lambda b: changed_pads(b, assembled_clearance=84e-6)),
+    "preload_error": ({"pad_clearance_change": 10e-6}, lambda b: changed_pads(b, pad_clearance=140e-6)),
+    "oil_viscosity": ({"factor": 1.2}, oil(viscosity_40=1.2 * 0.0396)),
+    "supply_temperature": ({"change": 7.0}, oil(supply_temperature=47.0)),
+    # heat that is lost is oil that takes up more
+    "heat_loss": ({"share": 0.3}, oil(specific_heat=2000.0 / 0.7, conductivity=0.13 / 0.7)),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_an_effect_on_geometry_or_oil_is_another_bearing(rocker, name):
+    parameters, other = OTHERS[name]
+    same(run(rocker, Effect(name, **parameters)), run(other(rocker)), 1e-9)
+
+
+def housing(stiffness: float) -> Effect:
+    return Effect("housing_flexibility", stiffness=stiffness)
+
+
+def springs(*turns: float) -> list[Effect]:
+    return [Effect("structure_compliance", stiffness=2e9, direction=0.3 + turn) for turn in turns]
+
+
+EQUAL = {
+    "viscosity twice": ([Effect("oil_viscosity", factor=1.1)] * 2, [Effect("oil_viscosity", factor=1.21)]),
+    # twice a loss is what is left of what is left
+    "heat lost twice": ([Effect("heat_loss", share=1 - math.sqrt(0.7))] * 2, [Effect("heat_loss", share=0.3)]),
+    "alike in all directions": ([Effect("series_compliance", xx=1e-9, xy=0.0, yy=1e-9)], [housing(1e9)]),
+    # a direction and its opposite are one, two at right angles the spring of the housing
+    "a spring seen from behind": (springs(-math.pi), springs(0.0)),
+    "two springs at right angles": (springs(0.0, math.pi / 2), [housing(2e9)]),
+}
+
+
+@pytest.mark.parametrize("name", EQUAL)
+def test_effects_that_are_the_same_in_other_words(rocker, name):
+    same(*(run(rocker, *effects) for effects in EQUAL[name]), 1e-9)
+
+
+def test_growth_is_a_matter_of_running_the_drawing_and_with_it_the_dry_tests_keep_their_clearance(rocker):
     setup = apply_effects(Setup(rocker, pivot_laws("kirk", rocker)), [Effect("thermal_growth", clearance_change=9e-6)])
     assert setup.bearing == rocker
-    bored = changed_pads(rocker, pad_clearance=pad.pad_clearance + 10e-6)
-    same(run(rocker, Effect("preload_error", pad_clearance_change=10e-6)), run(bored))
-
-
-def test_oil_effects_are_other_oils(rocker):
-    thick = replace(rocker, oil=replace(rocker.oil, viscosity_40=1.2 * rocker.oil.viscosity_40))
-    same(run(rocker, Effect("oil_viscosity", factor=1.2)), run(thick))
-    hot = replace(rocker, oil=replace(rocker.oil, supply_temperature=47.0))
-    same(run(rocker, Effect("supply_temperature", change=7.0)), run(hot))
 
 
 def test_a_measured_curve_does_not_hold_the_housing_twice(rocker):
@@ -169,27 +198,6 @@ def test_housing_flexibility_is_a_spring_in_series(rocker, base):
     np.testing.assert_allclose(p.bearing_position, base.position, atol=1e-14)
 
 
-@pytest.mark.slow
-def test_parallel_terms_add_to_what_the_records_show(rocker, base):
-    stiff = Effect("parallel_stiffness", xx=1e6, xy=2e6, yx=-2e6, yy=0.0)
-    damping = Effect("parallel_damping", xx=0.0, xy=0.0, yx=0.0, yy=1e3)
-    added = run(rocker, stiff, damping).h - base.h
-    assert np.allclose(added, [[1e6, 2e6], [-2e6, 1j * OMEGA * 1e3]], atol=1.0)
-
-
-@pytest.mark.slow
-def test_a_series_compliance_alike_in_all_directions_is_the_flexible_housing(rocker):
-    series = run(rocker, Effect("series_compliance", xx=1e-9, xy=0.0, yy=1e-9))
-    housing = run(rocker, Effect("housing_flexibility", stiffness=1e9))
-    assert np.allclose(series.h, housing.h)
-    assert np.allclose(series.position, housing.position)
-
-
-def test_fluid_inertia(rocker, base):
-    p = run(rocker, Effect("fluid_inertia", added_mass=25.0))
-    np.testing.assert_allclose(p.h, base.h - OMEGA**2 * 25.0 * np.eye(2), rtol=1e-10)
-
-
 def test_pivot_damping_is_c_eta(rocker, base):
     p = run(rocker, Effect("pivot_damping", damping=5e5))
     assert p.pad_matrices[0].pad_damping[1, 1] == 5e5
@@ -215,7 +223,7 @@ def test_misalignment(rocker, base):
     change = [p.kyy - base.kyy for p in small]
     assert change[1] / change[0] == pytest.approx(4.0, rel=0.15)  # even in the angle: quadratic where it is small
     there, back = (run(rocker, Effect("misalignment", angle=3e-4, direction=d)) for d in (0.7, 0.7 + math.pi))
-    np.testing.assert_allclose(there.h, back.h, atol=1e-7 * np.abs(base.h).max())
+    close(back.h, there.h, 1e-7)
     film = there.equilibrium.films[0]
     assert film.work.pressure.shape[1] == 2 * (base.equilibrium.films[0].work.pressure.shape[1] - 1) + 1
     theta = film.grid.angle + film.pad.pivot_angle
@@ -232,32 +240,6 @@ def test_starvation(rocker):
     assert p.pad_temperature(0.1) == pytest.approx([40.0] * 5)
 
 
-def test_carryover_heats_the_inlets(rocker, base):
-    p = run(rocker, Effect("hot_oil_carryover", fraction=0.5))
-    assert all(film.inlet > 40.2 for film in p.equilibrium.films)
-    assert p.max_temperature > base.max_temperature + 1.0
-    assert p.min_film < base.min_film
-
-
-def test_probe_effects_act_on_the_readings(rocker, base):
-    p = run(rocker, Effect("probe_gain", factor=1.25))
-    np.testing.assert_allclose(p.h, base.h / 1.25, rtol=1e-10)
-    np.testing.assert_allclose(p.position, 1.25 * base.position, atol=1e-16)
-    np.testing.assert_allclose(p.bearing_h, base.h, rtol=1e-10)
-    angle = 0.05
-    p = run(rocker, Effect("probe_rotation", angle=angle))
-    # a probe that really stands at theta + angle reads the displacement along there and is taken to stand at theta
-    reading = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-    np.testing.assert_allclose(p.h @ reading, base.h, rtol=1e-9, atol=1e-6)
-    np.testing.assert_allclose(p.position, reading @ base.position, atol=1e-16)
-
-
-def test_delay_turns_the_phase(rocker, base):
-    p = run(rocker, Effect("channel_delay", delay=2e-4))
-    np.testing.assert_allclose(p.h, base.h * np.exp(1j * OMEGA * 2e-4), rtol=1e-10)
-    np.testing.assert_allclose(p.position, base.position, atol=1e-16)
-
-
 def rig_force(h: np.ndarray, gain: np.ndarray, mass: float = HOUSING_MASS, stated: float = HOUSING_MASS) -> np.ndarray:
     """What a rig computes for the film force per displacement: cells times gain, plus stated mass times acceleration.
 
@@ -268,24 +250,41 @@ def rig_force(h: np.ndarray, gain: np.ndarray, mass: float = HOUSING_MASS, state
     return gain @ (CELLS[:, None] * x) - stated * OMEGA**2 * x
 
 
-def test_force_effects_act_on_the_cells_alone(rocker, base):
-    np.testing.assert_allclose(rig_force(base.h, np.eye(2)), base.h, rtol=1e-12)
-    p = run(rocker, Effect("loadcell_gain", factor=0.97))
-    np.testing.assert_allclose(p.h, rig_force(base.h, 0.97 * np.eye(2)), rtol=1e-9)
-    np.testing.assert_allclose(p.load_reading, [0.0, -0.97 * LOAD], atol=1e-9)
-    cross = np.array([[1.0, 0.04], [0.04, 1.0]])
-    p = run(rocker, Effect("loadcell_crosstalk", fraction=0.04))
-    np.testing.assert_allclose(p.h, rig_force(base.h, cross), rtol=1e-9, atol=1.0)
-    np.testing.assert_allclose(p.load_reading, [-0.04 * LOAD, -LOAD], atol=1e-9)
-    p = run(rocker, Effect("housing_mass", mass_error=12.0))
-    np.testing.assert_allclose(p.h, rig_force(base.h, np.eye(2), mass=HOUSING_MASS + 12.0), rtol=1e-9)
+def by(*rows: list[complex]) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda h: h + np.array(rows)
+
+
+I2, CROSS = np.eye(2), np.array([[1.0, 0.04], [0.04, 1.0]])
+#: A probe that really stands at theta + angle reads the displacement along there and is taken to stand at theta.
+TURNED = np.array([[math.cos(0.05), math.sin(0.05)], [-math.sin(0.05), math.cos(0.05)]])
+#: Parameters, h as it is read, and what the readings of position and of load are of the true ones.
+READINGS = {
+    "fluid_inertia": ({"added_mass": 25.0}, lambda h: h - OMEGA**2 * 25.0 * I2, I2, I2),
+    "parallel_stiffness": ({"xx": 1e6, "xy": 2e6, "yx": -2e6, "yy": 0.0}, by([1e6, 2e6], [-2e6, 0.0]), I2, I2),
+    "parallel_damping": ({"xx": 0.0, "xy": 0.0, "yx": 0.0, "yy": 1e3}, by([0.0, 0.0], [0.0, 1e3j * OMEGA]), I2, I2),
+    "probe_gain": ({"factor": 1.25}, lambda h: h / 1.25, 1.25 * I2, I2),
+    "probe_rotation": ({"angle": 0.05}, lambda h: h @ TURNED.T, TURNED, I2),
+    "channel_delay": ({"delay": 2e-4}, lambda h: h * np.exp(1j * OMEGA * 2e-4), I2, I2),
+    "loadcell_gain": ({"factor": 0.97}, lambda h: rig_force(h, 0.97 * I2), I2, 0.97 * I2),
+    "loadcell_crosstalk": ({"fraction": 0.04}, lambda h: rig_force(h, CROSS), I2, CROSS),
+    "housing_mass": ({"mass_error": 12.0}, lambda h: rig_force(h, I2, mass=HOUSING_MASS + 12.0), I2, I2),
+    "none": ({}, lambda h: rig_force(h, I2), I2, I2),
+}
+
+
+@pytest.mark.parametrize("name", READINGS)
+def test_what_acts_on_the_readings_leaves_the_film_as_it_is(rocker, base, name):
+    parameters, read, place, load = READINGS[name]
+    p = run(rocker, *([Effect(name, **parameters)] if parameters else ()))
+    np.testing.assert_allclose(p.h, read(base.h), rtol=1e-9, atol=1.0)
+    np.testing.assert_allclose(p.position, place @ base.position, atol=1e-16)
+    np.testing.assert_allclose(p.load_reading, load @ [0.0, -LOAD], atol=1e-9)
+    np.testing.assert_allclose(p.pad_load, base.pad_load, rtol=1e-12)
 
 
 def test_effects_combine(rocker, base):
     p = run(rocker, Effect("probe_gain", factor=1.1), Effect("fluid_inertia", added_mass=10.0))
     np.testing.assert_allclose(p.h, (base.h - OMEGA**2 * 10.0 * np.eye(2)) / 1.1, rtol=1e-9)
-    twice = run(rocker, *[Effect("oil_viscosity", factor=1.1)] * 2)
-    same(twice, run(rocker, Effect("oil_viscosity", factor=1.21)), 1e-9)
 
 
 @pytest.mark.slow
@@ -321,9 +320,8 @@ def test_messages_name_the_effect_and_the_parameter(name, parameters, message):
 
 def test_quantities_with_units_are_taken():
     assert Effect("pad_offset", pad=2, radial_offset="12 um").parameters["radial_offset"] == pytest.approx(12e-6)
-    assert Effect("misalignment", angle="0.01 deg", direction="90 deg").parameters["direction"] == pytest.approx(
-        math.pi / 2
-    )
+    leaning = Effect("misalignment", angle="0.01 deg", direction="90 deg")
+    assert leaning.parameters["direction"] == pytest.approx(math.pi / 2)
 
 
 def test_pad_beyond_the_bearing_is_refused(rocker):
@@ -333,28 +331,11 @@ def test_pad_beyond_the_bearing_is_refused(rocker):
 
 def test_effects_are_values():
     one, two = (Effect("soft_pivot", pad=5, stiffness_factor=0.3) for _ in range(2))
-    assert one == two
-    assert hash(one) == hash(two)
+    assert len({one, two}) == 1
     assert pickle.loads(pickle.dumps(one)) == one
     assert repr(one) == "Effect('soft_pivot', pad=5, stiffness_factor=0.3)"
     with pytest.raises(TypeError):
         one.parameters["pad"] = 1
-
-
-def test_ones_own_effect(rocker, base, monkeypatch):
-    monkeypatch.setattr("model.effects.registry._registered", {})  # other tests know the bundled ones only
-
-    def apply(setup: Setup, share: float) -> Setup:
-        return setup.change(added_mass=setup.added_mass + 100.0 * share)
-
-    kind = EffectKind("sloshing", "structure", (Parameter("share", "1", "ratio", 0.0, 0.0, 1.0),), apply, "a guess")
-    register(kind)
-    p = run(rocker, Effect("sloshing", share=0.1))
-    np.testing.assert_allclose(p.h, base.h - OMEGA**2 * 10.0 * np.eye(2), rtol=1e-10)
-    with pytest.raises(EffectError, match="is bundled"):
-        register(replace(kind, name="soft_pivot"))
-    with pytest.raises(EffectError, match="its words name amount, no parameter"):
-        register(replace(kind, words=EffectWords("oil sloshes by {amount}", "", "", "")))
 
 
 def test_file(tmp_path):
@@ -393,16 +374,20 @@ def test_broken_file(tmp_path, text, message):
 OWN = """
 from model.effects import EffectKind, Parameter
 KIND = EffectKind("{name}", "bearing", (Parameter("share", "1", "ratio", 0.0, 0.0, 1.0, 0.1),),
-                  lambda setup, share: setup, "made up")
+                  lambda setup, share: setup.change(added_mass=setup.added_mass + 100.0 * share), "made up")
 """
 
 
-def test_effects_of_ones_own_are_registered_from_a_file(tmp_path, monkeypatch):
+def test_effects_of_ones_own_are_registered_from_a_file(rocker, base, tmp_path, monkeypatch):
     monkeypatch.setattr("model.effects.registry._registered", {})  # other tests know the bundled ones only
     path = tmp_path / "own.py"
-    path.write_text(OWN.format(name="of_ones_own"))
-    assert [k.name for k in load_library(path)] == ["of_ones_own"]
-    assert Effect("of_ones_own", share=0.5).parameters["share"] == 0.5
+    path.write_text(OWN.format(name="sloshing"))
+    (kind,) = load_library(path)
+    assert kind.name == "sloshing"
+    p = run(rocker, Effect("sloshing", share=0.1))
+    np.testing.assert_allclose(p.h, base.h - OMEGA**2 * 10.0 * np.eye(2), rtol=1e-10)
+    with pytest.raises(EffectError, match="its words name amount, no parameter"):
+        register(replace(kind, words=EffectWords("oil sloshes by {amount}", "", "", "")))
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,5 @@
 """The film kernel against integrals, an independent solver and itself."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,10 +10,11 @@ from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 
 from model.film.cavitation import solve_film_jfo
-from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, solve_film
+from tests.model.points import close, plain_film, slopes, solved
 
-MU, RHO, SPEED, RADIUS, CLEARANCE = 0.03, 850.0, 7.0, 0.05, 1e-4
+MU, SPEED, RADIUS, CLEARANCE = 0.03, 7.0, 0.05, 1e-4
 
 
 def solve_flooded_film(*args: Any) -> FilmForces:
@@ -25,22 +23,11 @@ def solve_flooded_film(*args: Any) -> FilmForces:
 
 
 def solve(
-    shape: tuple[int, int],
-    wedge: tuple[float, float],
-    length: float = 0.07,
-    arc: tuple[float, float] = (-0.5, 0.5),
-    sharp: bool = False,
-    symmetric: bool = True,
-    solver: Callable[..., FilmForces] = solve_film,
+    shape: tuple[int, int], wedge: tuple[float, float], sharp: bool = False, solver: Any = solve_film, **more: Any
 ) -> tuple[FilmGrid, FilmWork, FilmForces]:
     """Solve one isoviscous film; `wedge` is (a, b) over the clearance."""
-    grid = film_grid(*arc, RADIUS, length, shape, symmetric)
-    work = film_work(grid, 40.0)
-    work.viscosity[:] = MU
-    work.density[:] = RHO
-    forces = solver(grid, work, (CLEARANCE, wedge[0] * CLEARANCE, wedge[1] * CLEARANCE), SPEED, sharp)
-    assert forces.steps > 0
-    return grid, work, forces
+    one = plain_film(shape, **more)
+    return *one, solved(one, wedge, sharp, solver)
 
 
 def height(alpha: np.ndarray | float, wedge: tuple[float, float]) -> np.ndarray | float:
@@ -97,34 +84,19 @@ def test_infinitely_short_film_meets_ocvirks_parabola():
 
 def reference_force(grid: FilmGrid, wedge: tuple[float, float], rates: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
     """Film force with squeeze, da/dt and db/dt [m/s]: another matrix, another solver, the same equation."""
-    nt, nz = len(grid.angle) - 1, len(grid.z) - 1
+    nz = len(grid.z) - 1
     node, face = height(grid.angle, wedge), height(0.5 * (grid.angle[1:] + grid.angle[:-1]), wedge)
-    index = np.arange((nt - 1) * nz).reshape(nt - 1, nz)
-    rows, columns, values = [], [], []
-
-    def link(i: np.ndarray, j: np.ndarray, g: np.ndarray) -> None:
-        rows.extend([i, i])
-        columns.extend([i, j])
-        values.extend([g, -g])
-
     gx = face[:, None] ** 3 / (12 * MU) * grid.height[:-1] / grid.dx
     gz = node[1:-1, None] ** 3 / (12 * MU) * grid.dx / grid.dz
-    for a, b, g in ((index[:-1], index[1:], gx[1:-1]), (index[:, :-1], index[:, 1:], gz[:, :-1])):
-        link(a.ravel(), b.ravel(), g.ravel())
-        link(b.ravel(), a.ravel(), g.ravel())
-    matrix = sparse.coo_matrix(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(index.size, index.size)
-    )
-    wall = np.zeros(index.shape)
-    wall[0] += gx[0]
-    wall[-1] += gx[-1]
-    wall[:, -1] += gz[:, -1]
-    matrix = (matrix + sparse.diags(wall.ravel())).tocsr()
+    beside = np.where(np.arange(nz) < nz - 1, gz, 0.0)  # the last of a line has the edge beside it
+    whole = gx[1:] + gx[:-1] + gz + np.roll(beside, 1, axis=1)
+    links = (gx[1:-1].ravel(), nz), (beside.ravel()[:-1], 1)
+    matrix = sum((sparse.diags([-g, -g], [-n, n]) for g, n in links), sparse.diags(whole.ravel())).tocsr()
     squeeze = -(rates[0] * np.cos(grid.angle[1:-1]) + rates[1] * np.sin(grid.angle[1:-1]))
     source = -(0.5 * SPEED * np.diff(face) + squeeze * grid.dx)[:, None] * grid.height[:-1]
-    wet = np.ones(index.size, bool)
+    wet = np.ones(source.size, bool)
     for _ in range(100):
-        p = np.zeros(index.size)
+        p = np.zeros(source.size)
         keep = np.flatnonzero(wet)
         p[keep] = spsolve(matrix[keep][:, keep].tocsc(), source.ravel()[keep])
         residual = matrix @ p - source.ravel()
@@ -134,7 +106,7 @@ def reference_force(grid: FilmGrid, wedge: tuple[float, float], rates: tuple[flo
         wet = new
     else:
         raise AssertionError("reference active set did not settle")
-    weighted = (p.reshape(index.shape) * grid.area[1:-1, :-1]).sum(axis=1)
+    weighted = (p.reshape(source.shape) * grid.area[1:-1, :-1]).sum(axis=1)
     return np.array([weighted @ grid.cos[1:-1], weighted @ grid.sin[1:-1]])
 
 
@@ -149,27 +121,18 @@ def test_force_is_an_independent_solver_s(wedge):
 def test_stiffness_and_damping_are_differences_of_an_independent_solvers_forces(wedge):
     grid, _, forces = solve((160, 8), wedge, sharp=True)
     step = 0.003  # of the clearance: small against the film, large enough that the rupture line crosses nodes
-    stiffness, damping = np.empty((2, 2)), np.empty((2, 2))
-    for k, unit in enumerate(np.eye(2)):
-        ahead, behind = (tuple(np.array(wedge) + s * step * unit) for s in (1, -1))
-        stiffness[:, k] = reference_force(grid, ahead) - reference_force(grid, behind)
-        rate = step * SPEED * CLEARANCE / RADIUS * unit
-        damping[:, k] = reference_force(grid, wedge, tuple(rate)) - reference_force(grid, wedge, tuple(-rate))
-    stiffness /= 2 * step * CLEARANCE
-    damping /= 2 * step * SPEED * CLEARANCE / RADIUS
-    np.testing.assert_allclose(forces.stiffness, stiffness, atol=2e-3 * np.abs(stiffness).max())
-    np.testing.assert_allclose(forces.damping, damping, atol=2e-3 * np.abs(damping).max())
+    stiffness = slopes(lambda place: reference_force(grid, tuple(place)), np.array(wedge), step)
+    slow = step * SPEED * CLEARANCE / RADIUS
+    damping = slopes(lambda rates: reference_force(grid, wedge, tuple(rates)), np.zeros(2), slow)
+    close(CLEARANCE * forces.stiffness, stiffness, 2e-3)
+    close(forces.damping, damping, 2e-3)
 
 
 @pytest.mark.parametrize("wedge", [(0.6, 0.25), (-0.3, 0.5)])
 def test_plain_stiffness_is_the_derivative_of_the_discrete_force(wedge):
+    stiffness = solve((80, 6), wedge)[2].stiffness
     step = 1e-6  # small enough that no node changes sides
-    _, _, forces = solve((80, 6), wedge)
-    for k, unit in enumerate(np.eye(2)):
-        ahead, behind = (solve((80, 6), tuple(np.array(wedge) + s * step * unit))[2].force for s in (1, -1))
-        np.testing.assert_allclose(
-            forces.stiffness[:, k], (ahead - behind) / (2 * step * CLEARANCE), rtol=2e-6, atol=1e-3
-        )
+    close(CLEARANCE * stiffness, slopes(lambda w: solve((80, 6), tuple(w))[2].force, np.array(wedge), step), 2e-6)
 
 
 @pytest.mark.parametrize("wedge", [(0.6, 0.25), (0.85, 0.1), (-0.3, 0.5)])
@@ -180,19 +143,29 @@ def test_half_speed_whirl_takes_the_pressure_away(wedge):
     np.testing.assert_allclose(forces.damping @ rates, -forces.force, atol=2e-3 * np.hypot(*forces.force))
 
 
-@pytest.mark.parametrize("wedge", [(0.0, 0.5), (0.65, 0.2), (0.9, 0.08)], ids=["full", "ruptured", "deep"])
-def test_forces_and_coefficients_converge_with_second_order(wedge):
-    fine = solve((320, 24), wedge, sharp=True)[2]
+@pytest.mark.parametrize(
+    ("wedge", "filling", "least"),
+    [
+        ((0.0, 0.5), None, 1.3),
+        ((0.65, 0.2), None, 1.3),
+        ((0.9, 0.08), None, 1.3),
+        # fronts that run across the mesh fall between its nodes by chance: between the first and the second order
+        ((-1.0, 0.1), 1.0, 0.8),
+        ((0.3, 0.4), 0.7, 0.8),
+    ],
+)
+def test_forces_and_coefficients_converge_with_second_order(wedge, filling, least):
+    solver = solve_film if filling is None else lambda *given: solve_film_jfo(*given, (filling, np.inf))
+    fine = solve((320, 24), wedge, True, solver)[2]
     errors = []
     for scale in (1, 2, 4):
-        f = solve((32 * scale, 2 * scale), wedge, sharp=True)[2]
-        errors.append(
-            [np.abs(got - want).max() / np.abs(want).max() for got, want in zip(f[:3], fine[:3], strict=True)]
-        )
+        f = solve((32 * scale, 2 * scale), wedge, True, solver)[2]
+        errors.append([np.abs(a - b).max() / np.abs(b).max() for a, b in zip(f[:3], fine[:3], strict=True)])
+    assert (errors[2] < np.array([1e-3, 5e-3, 5e-3])).all(), errors
     order = np.log2(np.array(errors)[0] / np.array(errors)[2]) / 2.0
     assert order[0] > 1.7  # force
     # the rupture line falls between nodes by chance: single steps scatter, two halvings show the order
-    assert (order[1:] > 1.3).all(), order
+    assert (order[1:] > least).all(), order
 
 
 @pytest.mark.parametrize(
@@ -202,19 +175,7 @@ def test_half_width_is_the_mirrored_whole(solver, wedge, share):
     half = solve((60, 4), wedge, sharp=True, solver=solver)[2]
     whole = solve((60, 8), wedge, sharp=True, symmetric=False, solver=solver)[2]
     for got, want in zip(half[:3], whole[:3], strict=True):
-        np.testing.assert_allclose(got, want, rtol=share, atol=share * np.abs(want).max())
-
-
-def test_film_scales_as_reynolds_equation_says():
-    grid, work, base = solve((40, 4), (0.5, 0.3))
-    work.viscosity[:] = 2 * MU
-    work.ruptured[:] = False
-    double = solve_film(grid, work, (CLEARANCE, 0.5 * CLEARANCE, 0.3 * CLEARANCE), SPEED, False)
-    np.testing.assert_allclose(double.force, 2 * base.force, rtol=1e-12)
-    work.viscosity[:] = MU
-    work.density[:] = 3 * RHO  # the same everywhere: no matter
-    dense = solve_film(grid, work, (CLEARANCE, 0.5 * CLEARANCE, 0.3 * CLEARANCE), SPEED, False)
-    np.testing.assert_allclose(dense.force, base.force, rtol=1e-10)
+        close(got, want, share)
 
 
 def test_active_set_settles_on_fine_meshes():
@@ -227,16 +188,6 @@ def test_active_set_settles_on_fine_meshes():
 
 @pytest.mark.parametrize("solver", [solve_film, solve_flooded_film])
 def test_touching_film_is_reported(solver):
-    grid = film_grid(-0.5, 0.5, RADIUS, 0.07, (40, 4), True)
-    work = film_work(grid, 40.0)
-    work.viscosity[:] = MU
-    work.density[:] = RHO
-    forces = solver(grid, work, (CLEARANCE, 1.2 * CLEARANCE, 0.0), SPEED, False)
+    forces = solver(*plain_film((40, 4)), (CLEARANCE, 1.2 * CLEARANCE, 0.0), SPEED, False)
     assert forces.steps == -1
     assert forces.min_film < 0.0
-
-
-@pytest.mark.parametrize("shape", [(3, 4), (41, 4), (40, 3), (40, 0)])
-def test_odd_meshes_are_refused(shape):
-    with pytest.raises(ValueError, match="even numbers of intervals"):
-        film_grid(-0.5, 0.5, RADIUS, 0.07, shape, True)

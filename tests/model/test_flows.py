@@ -1,7 +1,5 @@
 """What enters and leaves the films: balances, hot oil round the ring, idle pads, named regimes, numbers."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -17,13 +15,14 @@ from model.predict import predict
 from model.setup import Mesh
 from model.statics.pad_film import oil_constants
 from model.statics.pad_flow import striation, through_flow
+from tests.model.points import DOWN, LOAD, SPEED, run
 from tests.rigs.bearings import changed_pads
 
-SPEED, LOAD, DOWN = 2 * math.pi * 22.0, 5000.0, -math.pi / 2
+HELD = Effect("pivot_rotation", rotational_stiffness=1e6)
 
 
 def test_what_enters_a_full_film_leaves_it(rocker):
-    p = predict(rocker, 3000.0, DOWN, SPEED)
+    p = run(rocker, load=3000.0)
     for film in p.equilibrium.films:
         assert not film.work.ruptured.any()
         entering, leaving = through_flow(film)
@@ -33,8 +32,7 @@ def test_what_enters_a_full_film_leaves_it(rocker):
 def test_streaks_carry_what_the_rupture_line_lets_pass(rocker):
     # pads pressed hard downstream of their pivots rupture there: what the balance leaves is what the streaks hold
     for mesh, tolerance in ((Mesh(80, 6), 0.03), (Mesh(320, 12), 0.015)):
-        p = predict(changed_pads(rocker, pivot_offset=0.35), 8000.0, DOWN, SPEED, mesh=mesh, effects=[
-            Effect("pivot_rotation", rotational_stiffness=1e6)])  # fmt: skip
+        p = run(changed_pads(rocker, pivot_offset=0.35), HELD, load=8000.0, mesh=mesh)
         films = [f for f in p.equilibrium.films if f.forces is not None and f.work.ruptured[-2].any()]
         films = [f for f in films if not f.work.ruptured[1].any()]  # nothing made up at the inlet
         assert films
@@ -45,9 +43,7 @@ def test_streaks_carry_what_the_rupture_line_lets_pass(rocker):
 
 @pytest.mark.parametrize("fraction", [0.3, 0.8, 0.98])
 def test_hot_oil_goes_round_with_a_flow_balance(rocker, fraction):
-    p = predict(rocker, LOAD, DOWN, SPEED, effects=[Effect("hot_oil_carryover", fraction=fraction)])
-    assert p.converged
-    flow = p.pad_flow
+    flow = run(rocker, Effect("hot_oil_carryover", fraction=fraction)).pad_flow
     for k in range(5):  # pad 5, at 198 deg, feeds pad 1, at 270 deg
         oil, before = rocker.oil, flow[k - 1]
         passed = fraction * before.outflow * oil.density(before.outlet) / (flow[k].inflow * oil.density(flow[k].inlet))
@@ -101,7 +97,7 @@ def test_a_resting_film_heats_and_shears_as_its_equation_says(rocker):
 def test_idle_pads_of_isothermal_films_shear_oil_as_cold_as_it_enters(rocker, preload, direction):
     pads = tuple(replace(p, assembled_clearance=(1.0 - preload) * p.pad_clearance) for p in rocker.pads)
     bearing, turning = rocker.with_pads(pads), 2 * math.pi * 40
-    p = predict(bearing, 9000.0, math.radians(direction), turning, thermal="isothermal")
+    p = run(bearing, load=9000.0, direction=math.radians(direction), speed=turning, thermal="isothermal")
     idle = [film for film in p.equilibrium.films if film.idle]
     assert idle
     surface, supply = turning * bearing.journal_radius, bearing.oil.supply_temperature
@@ -119,7 +115,7 @@ def test_idle_pads_of_isothermal_films_shear_oil_as_cold_as_it_enters(rocker, pr
 def test_power_loss_does_not_fall_when_pads_unload(rocker):
     # as the load grows the upper pads go idle, one film after the other; their oil is sheared on
     loads = np.linspace(6000.0, 18000.0, 13)
-    points = [predict(rocker, float(w), DOWN, SPEED) for w in loads]
+    points = [run(rocker, load=float(w)) for w in loads]
     idle = [len(p.idle_pads) for p in points]
     assert idle[0] == 0
     assert idle[-1] >= 2
@@ -133,7 +129,7 @@ def test_power_loss_does_not_fall_when_pads_unload(rocker):
 
 
 def test_numbers_that_people_expect(rocker):
-    p = predict(rocker, LOAD, DOWN, SPEED)
+    p = run(rocker)
     mu = rocker.oil.viscosity(40.0)
     expected = mu * 22.0 * 0.09986 * 0.0696 / LOAD * (0.04993 / 80e-6) ** 2
     assert p.sommerfeld == pytest.approx(expected, rel=1e-12)
@@ -142,19 +138,18 @@ def test_numbers_that_people_expect(rocker):
     film = max(p.equilibrium.films, key=lambda f: f.work.thickness.max())
     local = SPEED * rocker.journal_radius * film.work.density * film.work.thickness / film.work.viscosity
     assert p.reynolds == pytest.approx(local.max(), rel=1e-9)
-    turned = predict(rocker, LOAD, DOWN, SPEED, effects=[Effect("pivot_rotation", rotational_stiffness=1e6)])
-    assert 0.1 < turned.attitude_angle < math.pi / 2  # a fixed pad lets the journal move on with rotation
+    assert 0.1 < run(rocker, HELD).attitude_angle < math.pi / 2  # a fixed pad lets the journal move on with rotation
 
 
 def test_regimes_are_named(rocker):
     thin = replace(rocker, oil=replace(rocker.oil, viscosity_40=0.0004))
-    fast = predict(thin, 200.0, DOWN, 20 * SPEED, thermal="isothermal")
+    fast = run(thin, load=200.0, speed=20 * SPEED, thermal="isothermal")
     named = [name for name in fast.status if name.startswith("film not laminar: Re ")]
     assert named == [f"film not laminar: Re {fast.reynolds:.0f}"]
     assert fast.reynolds > 1000.0
-    cold = predict(rocker, LOAD, DOWN, SPEED, effects=[Effect("supply_temperature", change=-25.0)])
+    cold = run(rocker, Effect("supply_temperature", change=-25.0))
     assert "oil beyond its data: 15 degC" in cold.status
-    assert predict(rocker, LOAD, DOWN, SPEED).status == ()
+    assert run(rocker).status == ()
 
 
 def test_pads_in_each_others_way_are_named(rocker):
@@ -164,6 +159,5 @@ def test_pads_in_each_others_way_are_named(rocker):
 
     assert "interference: no clearance at pads 1" in status(assembled_clearance=-2e-6)
     assert "pads 5 and 1 overlap" in status(arc=math.radians(110.0))
-    even = math.radians(72.0)
-    ring = changed_pads(rocker, arc=even)
+    ring = changed_pads(rocker, arc=math.radians(72.0))
     assert "pads 1 and 2 touch" in predict(ring, LOAD, DOWN, SPEED).status

@@ -1,7 +1,5 @@
 """Compiled loops: one stamp over all their sources, so that no stale machine code survives an edit or an upgrade."""
 
-from __future__ import annotations
-
 import math
 import pickle
 import subprocess

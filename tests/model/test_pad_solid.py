@@ -1,7 +1,5 @@
 """The pad as a solid: algebra, symmetry, heat balance, grids, cache."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -79,11 +77,9 @@ class TestCompliance:
     def test_uneven_film_grid_and_constant_field(self) -> None:
         theta, _ = grids()
         z = 0.5 * 69.6e-3 * np.linspace(0.0, 1.0, 7) ** 1.5
-        uneven = pad_solid(PAD, bearing(), theta, z, density=COARSE)
-        ones = np.ones((25, 7))
-        np.testing.assert_allclose(
-            uneven.bend(ones)[:, 0], solid().bend(ones)[:, 0], rtol=0.01, atol=0.003 * solid().bend(ones).max()
-        )
+        ones, even = np.ones((25, 7)), solid().bend(np.ones((25, 7)))
+        uneven = pad_solid(PAD, bearing(), theta, z, density=COARSE).bend(ones)
+        np.testing.assert_allclose(uneven[:, 0], even[:, 0], rtol=0.01, atol=0.003 * even.max())
 
 
 class TestHeat:
@@ -197,11 +193,18 @@ class TestStore:
         assert [path.suffix for path in (tmp_path / "deep" / "folder").iterdir()] == [".npz"]
 
     @pytest.mark.slow
-    @pytest.mark.parametrize("damage", [b"", b"not a zip", b"PK\x03\x04 cut off"])
+    @pytest.mark.parametrize("damage", [b"", b"not a zip", b"PK\x03\x04 cut off", None])
     def test_damaged_file_is_solved_again(self, tmp_path, monkeypatch, counted, damage) -> None:
         monkeypatch.setenv("TPJB_CACHE", str(tmp_path))
         first = self.fresh()
-        next(tmp_path.glob("*.npz")).write_bytes(damage)
+        (path,) = tmp_path.glob("*.npz")
+        if damage is None:  # whole, with a number that no pad has
+            with np.load(path) as stored:
+                arrays = dict(stored)
+            arrays["compliance"][0, 0] = np.nan
+            np.savez(path, **arrays)
+        else:
+            path.write_bytes(damage)
         np.testing.assert_array_equal(first, self.fresh())
         assert len(counted) == 2
 
@@ -219,17 +222,6 @@ class TestStore:
         loaded = [answer for answer in answers if answer is not None]
         assert all((answer["a"] == arrays["a"]).all() for answer in loaded)
         assert 0 < len(loaded) < len(answers)
-
-    def test_wrong_content_is_solved_again(self, tmp_path, monkeypatch, counted) -> None:
-        monkeypatch.setenv("TPJB_CACHE", str(tmp_path))
-        first = self.fresh()
-        path = next(tmp_path.glob("*.npz"))
-        with np.load(path) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        arrays["compliance"][0, 0] = np.nan
-        np.savez(path, **arrays)
-        np.testing.assert_array_equal(first, self.fresh())
-        assert len(counted) == 2
 
     def test_unwritable_folder_is_no_error(self, tmp_path, monkeypatch, counted) -> None:
         (tmp_path / "file").write_text("in the way")

@@ -1,15 +1,15 @@
-"""Pivot laws: the printed formulas, tangents by differences, measured curves, files."""
-
-from __future__ import annotations
+"""Pivot laws: the printed formulas, tangents by differences, measured curves and their cubics, files."""
 
 import math
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 import tpjb_ident as ti
 from model.bearing import BearingError, Pivot
 from model.conditions import pads_of
+from model.interpolation import rising_cubics
 from model.measured_pivot import FormulaPivot, MeasuredPivot
 from model.pad.pivot import ROCKER as BY_ROCKER
 from model.pivots import (
@@ -79,14 +79,10 @@ def test_kirk_secant_deflects_alike_but_vibrates_with_the_secant():
             assert secant.vibration_stiffness(w) == kirk.secant(w)
 
 
-def test_rigid():
-    law = formula_pivot(Pivot("rigid"))
-    assert law == RIGID_PIVOT
-    assert law.deflection(1e9) == 0.0
-    assert math.isinf(law.stiffness(1.0))
-
-
-def test_no_load_no_deflection_and_finite_stiffness():
+def test_rigid_pivots_give_nothing_and_no_load_moves_none_of_finite_stiffness():
+    assert formula_pivot(Pivot("rigid")) == RIGID_PIVOT
+    assert RIGID_PIVOT.deflection(1e9) == 0.0
+    assert math.isinf(RIGID_PIVOT.stiffness(1.0))
     for law in (formula_pivot(ROCKER), formula_pivot(SPHERE), constant_pivot(1e9)):
         assert law.deflection(0.0) == 0.0
         assert 0 < law.stiffness(0.0) < math.inf
@@ -102,9 +98,9 @@ def test_rocker_formula_is_held_beyond_its_physics():
 
 @pytest.mark.parametrize("factor", [0.3, 1.0, 2.5])
 def test_scaled(factor):
-    law = ScaledPivot(formula_pivot(SPHERE), factor)
-    assert law.deflection(1000.0) == pytest.approx(formula_pivot(SPHERE).deflection(1000.0) / factor)
-    assert law.stiffness(1000.0) == pytest.approx(formula_pivot(SPHERE).stiffness(1000.0) * factor)
+    law, plain = ScaledPivot(formula_pivot(SPHERE), factor), formula_pivot(SPHERE)
+    assert law.deflection(1000.0) == pytest.approx(plain.deflection(1000.0) / factor)
+    assert law.stiffness(1000.0) == pytest.approx(plain.stiffness(1000.0) * factor)
     assert f"{factor:g}" in law.name
 
 
@@ -153,8 +149,8 @@ def test_bad_choices_are_refused(rocker, choice):
         pivot_laws(choice, rocker)
 
 
-def pivots_file(pads: str, schema: str = "tpjb-pivots/1") -> str:
-    return f'schema = "{schema}"\n{pads}'
+def pivots_file(*pads: str, schema: str = "tpjb-pivots/1") -> str:
+    return "".join([f'schema = "{schema}"\n', *pads])
 
 
 def pad_table(number: int, force: str = "[500.0, 1000.0]", deflection: str = "[1e-6, 2e-6]") -> str:
@@ -163,7 +159,7 @@ def pad_table(number: int, force: str = "[500.0, 1000.0]", deflection: str = "[1
 
 def test_file_is_read_pad_by_pad(tmp_path, rocker):
     path = tmp_path / "pivots.toml"
-    path.write_text(pivots_file("".join(pad_table(k) for k in (3, 1, 2, 5, 4))), encoding="utf-8")
+    path.write_text(pivots_file(*(pad_table(k) for k in (3, 1, 2, 5, 4))), encoding="utf-8")
     laws = pivot_laws(path, rocker)
     assert len(laws) == 5
     assert laws[0].deflection(750.0) == pytest.approx(1.5e-6)
@@ -187,7 +183,7 @@ def test_a_prediction_says_which_pivots_are_pressed_harder_than_in_their_dry_tes
 def test_predict_names_the_pads_that_press_measured_pivots_beyond_their_dry_tests(rocker, tmp_path):
     """It said nothing, where `compare` did."""
     path = tmp_path / "pivots.toml"
-    path.write_text(pivots_file("".join(pad_table(k) for k in range(1, 6))), encoding="utf-8")
+    path.write_text(pivots_file(*(pad_table(k) for k in range(1, 6))), encoding="utf-8")
     prediction = ti.predict(rocker, load=6000.0, speed=140.0, pivots=path)
     (beyond,) = (condition for condition in prediction.status if "dry tests" in condition)
     assert beyond.pads == tuple(np.flatnonzero(prediction.pad_load > 1000.0) + 1)
@@ -199,10 +195,10 @@ def test_predict_names_the_pads_that_press_measured_pivots_beyond_their_dry_test
     ("text", "message"),
     [
         ("schema = 1 2", "cannot be read"),
-        (pivots_file(pad_table(1), "tpjb-pivots/9"), "schema"),
-        (pivots_file(""), "no \\[\\[pads\\]\\]"),
-        (pivots_file("".join(pad_table(k) for k in (1, 2, 4, 5))), "Measure pad #3"),
-        (pivots_file("".join(pad_table(k) for k in range(1, 7))), "needs 1 to 5"),
+        (pivots_file(pad_table(1), schema="tpjb-pivots/9"), "schema"),
+        (pivots_file(), "no \\[\\[pads\\]\\]"),
+        (pivots_file(*(pad_table(k) for k in (1, 2, 4, 5))), "Measure pad #3"),
+        (pivots_file(*(pad_table(k) for k in range(1, 7))), "needs 1 to 5"),
         (pivots_file(pad_table(1, force="[2.0, 1.0]")), "pad 1: .* rise strictly from zero: load goes from 2 to 1"),
         (pivots_file(pad_table(1) + "stiffness_N_per_m = [-5e8, 6e8]\n"), "stiffness_N_per_m: entry 1 is -5"),
         (pivots_file(pad_table(1) + "stiffness_N_per_m = [5e8, 0.0]\n"), "stiffness_N_per_m: entry 2 is 0"),
@@ -235,3 +231,10 @@ def test_a_list_of_numbers_is_no_list_of_laws_and_the_message_says_what_is(rocke
     """It said "need one pivot law per pad (5), got 5 entries"."""
     with pytest.raises(BearingError, match=r"need 5 pivot laws, one per pad, such as constant_pivot.*; got \(500"):
         pivot_laws([5e8] * 5, rocker)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("count", [2, 3, 9])
+def test_cubics_are_those_of_scipy(seed, count):
+    x, y = np.sort(np.random.default_rng(seed).normal(size=(2, count)), axis=1)
+    np.testing.assert_allclose(rising_cubics(x, y), PchipInterpolator(x, y).c, rtol=1e-9, atol=1e-12)

@@ -1,42 +1,25 @@
-"""Predictions as users see them: mesh convergence and its estimate, fields, names, warm starts."""
-
-from __future__ import annotations
+"""Predictions as users see them: mesh error, fields, names, warm starts; what static tests would show."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from model.bearing import Bearing
+from model.effects import Effect, apply_effects
 from model.pivots import pivot_laws
 from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Mesh, Setup
-from tests.rigs.sweeps import sweep
-
-SPEED, OMEGA, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, -math.pi / 2
-
-
-def run(bearing: Bearing, mesh: tuple[int, int] | None = None, thermal: str = "adiabatic") -> Prediction:
-    p = predict(bearing, 5000.0, DOWN, SPEED, OMEGA, thermal=thermal, mesh=mesh)
-    assert p.converged
-    return p
+from model.static_tests import dry_curve, polygon_sides
+from tests.model import points
+from tests.model.points import DOWN, LOAD, OMEGA, SPEED, close
+from tests.rigs.bearings import sweep
 
 
-def numbers(p: Prediction) -> np.ndarray:
-    return np.array([p.kxx, p.kyy, p.cxx, p.cyy, p.position[1], p.max_pressure, p.pad_load[0], p.pad_load[2]])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])
-def test_bearing_converges_with_second_order(rocker, thermal):
-    fine = numbers(run(rocker, (320, 24), thermal))
-    errors = [np.abs(numbers(run(rocker, (40 * s, 4 * s), thermal)) / fine - 1.0) for s in (1, 2)]
-    errors.append(np.abs(numbers(run(rocker, (160, 12), thermal)) / fine - 1.0))
-    assert (errors[1] < 4e-3).all(), errors[1]
-    assert (errors[2] < 1.5e-3).all(), errors[2]
-    # between the first and the second everything halves: a quarter, with room for where the rupture line falls
-    assert np.median(errors[1] / errors[0]) < 0.4
+def run(bearing: Bearing, mesh: tuple[int, int] | None = None, **more: Any) -> Prediction:
+    return points.run(bearing, mesh=mesh, **{"excitation": OMEGA} | more)
 
 
 @pytest.mark.slow
@@ -56,7 +39,7 @@ def test_coefficients_by_name_and_shape(rocker):
     p = run(rocker)
     assert p.kxx == p.h[0, 0].real == p.k[0, 0]
     assert p.cyx == pytest.approx(p.h[1, 0].imag / OMEGA)
-    several = predict(rocker, 5000.0, DOWN, SPEED, [OMEGA, 2 * OMEGA])
+    several = run(rocker, excitation=[OMEGA, 2 * OMEGA])
     assert several.h.shape == (2, 2, 2)
     assert several.cxx.shape == (2,)
     with pytest.raises(AttributeError, match="kzz"):
@@ -91,21 +74,7 @@ def test_temperature_channel_reads_mid_length_along_the_arc(rocker):
 
 
 def test_warm_start_on_another_mesh_starts_cold(rocker):
-    coarse = run(rocker, (40, 4))
-    p = predict(rocker, 5000.0, DOWN, SPEED, OMEGA, start=coarse)
-    np.testing.assert_allclose(p.h, run(rocker).h, rtol=1e-6, atol=1e-6 * p.kyy)
-
-
-def test_a_sweep_over_a_change_of_regime_finds_what_single_points_find(rocker):
-    setup = Setup(rocker, pivot_laws(5e8, rocker), "isothermal")
-    speed, line = 2 * math.pi * 22, np.array([2 * math.pi * 25])
-    loads = [float(w) for w in np.arange(6000.0, 10001.0, 500.0)]
-    swept = sweep(setup, [(w, -math.pi / 2, speed, line) for w in loads])
-    assert swept[0].idle_pads != swept[-1].idle_pads
-    for w, p in zip(loads, swept, strict=True):
-        single = predict_setup(setup, w, -math.pi / 2, speed, line)
-        assert p.idle_pads == single.idle_pads
-        np.testing.assert_allclose(p.h, single.h, rtol=1e-4)
+    close(run(rocker, start=run(rocker, (40, 4))).h, run(rocker).h, 1e-6)
 
 
 def test_a_prediction_prints_in_the_units_of_its_readers(rocker):
@@ -114,3 +83,84 @@ def test_a_prediction_prints_in_the_units_of_its_readers(rocker):
     assert repr(found).startswith("<Prediction 5000 N at -90 deg, 21.96 Hz: shaft at")
     assert f"kxx {found.kxx[0] / 1e6:.4g}, kyy {found.kyy[0] / 1e6:.4g} MN/m" in found.summary()
     assert found._repr_html_().count("<tr") == 3
+
+
+LINE = np.array([OMEGA])
+LOADS = np.linspace(2500.0, 8750.0, 6)
+
+
+def setup(bearing: Bearing, *effects: Effect, pivots: object = "kirk") -> Setup:
+    return apply_effects(Setup(bearing, pivot_laws(pivots, bearing), mesh=Mesh(40, 4)), effects)
+
+
+def test_dry_curve_is_the_law_through_structure_and_instruments(rocker):
+    load = np.linspace(0.0, 5000.0, 11)
+    plain = dry_curve(setup(rocker), 1, load)
+    law = pivot_laws("kirk", rocker)[0]
+    np.testing.assert_allclose(plain[1], [law.deflection(w) for w in load])
+    np.testing.assert_allclose(plain[0], load)
+    gains = Effect("probe_gain", factor=1.1), Effect("loadcell_gain", factor=0.9)
+    read = dry_curve(setup(rocker, Effect("housing_flexibility", stiffness=1e9), *gains), 1, load)
+    np.testing.assert_allclose(read[1], 1.1 * (plain[1] + load / 1e9), atol=1e-15)
+    np.testing.assert_allclose(read[0], 0.9 * load)
+
+
+def test_polygon_of_equal_pads_is_regular(rocker):
+    distance, angle = polygon_sides(setup(rocker), 0.0)
+    np.testing.assert_allclose(distance, rocker.pads[0].assembled_clearance)
+    np.testing.assert_allclose(np.diff(np.unwrap(angle)), 2 * math.pi / 5)
+
+
+def test_push_load_enlarges_the_polygon_by_what_pivots_and_housing_give(rocker):
+    soft = Effect("housing_flexibility", stiffness=4e8), Effect("soft_pivot", pad=3, stiffness_factor=0.3)
+    spring = setup(rocker, *soft)
+    pushed, clearance = polygon_sides(spring, 200.0)[0], polygon_sides(spring, 0.0)[0]
+    give = [law.deflection(200.0) for law in spring.pivots]
+    np.testing.assert_allclose(pushed - clearance, np.array(give) + 200.0 / 4e8)
+    assert np.argmax(pushed) == 2
+    # running conditions do not change what is measured cold
+    warm = polygon_sides(setup(rocker, Effect("thermal_growth", clearance_change=1e-5)), 0.0)
+    np.testing.assert_allclose(warm[0], rocker.pads[0].assembled_clearance)
+    moved = polygon_sides(setup(rocker, Effect("pad_offset", pad=3, radial_offset=1e-5)), 0.0)
+    assert moved[0][2] == pytest.approx(rocker.pads[2].assembled_clearance + 1e-5)
+
+
+@pytest.mark.parametrize(
+    ("pivots", "thermal", "loads", "changes"),
+    [("kirk", "adiabatic", LOADS, False), (5e8, "isothermal", np.arange(6000.0, 10001.0, 500.0), True)],
+)
+def test_sweeps_up_and_down_meet_cold_starts_over_a_change_of_regime_too(rocker, pivots, thermal, loads, changes):
+    one = setup(rocker, pivots=pivots).change(thermal=thermal)
+    points = [(load, DOWN, SPEED, LINE) for load in loads]
+    up, down = sweep(one, points), sweep(one, points[::-1])[::-1]
+    assert (up[0].idle_pads != up[-1].idle_pads) is changes
+    for point, *both in zip(points, up, down, strict=True):
+        cold = predict_setup(one, *point)
+        for warm in both:
+            assert warm.converged
+            assert warm.idle_pads == cold.idle_pads
+            close(warm.h, cold.h, 2e-5)
+            np.testing.assert_allclose(warm.position, cold.position, atol=1e-10)
+
+
+def test_a_neighbour_saves_iterations_where_pads_bend(rocker):
+    # adiabatic films begin as near from the curves of their pads
+    one = setup(rocker).change(thermal="tehd")
+    near = [(load, DOWN, SPEED, LINE) for load in 2500.0 + 50.0 * np.arange(5)]
+    carried, alone = sweep(one, near), [predict_setup(one, *point) for point in near]
+    assert sum(p.equilibrium.iterations for p in carried) < sum(p.equilibrium.iterations for p in alone)
+
+
+def test_the_locus_lies_inside_the_clearance_polygon_that_its_load_would_push(rocker):
+    pushed, angle = polygon_sides(setup(rocker), LOAD)
+    for p in sweep(setup(rocker), [(LOAD, direction, SPEED, LINE) for direction in np.linspace(-3.0, 3.0, 8).tolist()]):
+        assert (p.position @ [np.cos(angle), np.sin(angle)] < pushed).all()
+
+
+def test_a_point_that_fails_does_not_spoil_the_next(rocker):
+    one = setup(rocker.with_pads(rocker.pads[:1]))
+    points = [(5000.0, d, SPEED, LINE) for d in (DOWN, 1.5, DOWN)]
+    found = sweep(one, points)
+    assert [p.converged for p in found] == [True, False, True]
+    np.testing.assert_allclose(found[2].h, found[0].h, rtol=1e-6)
+    assert "not converged" in "; ".join(found[1].status)

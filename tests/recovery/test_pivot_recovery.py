@@ -4,9 +4,10 @@ The virtual rig knows nothing of `tpjb_ident`; its laws are given here as plain 
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -28,14 +29,14 @@ from rigdata.virtual_rig import (
 )
 from tpjb_ident.clearance.locus import measure_locus
 from tpjb_ident.clearance.measure import measure_clearance
+from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.fit import fit_pivots
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 LOADS = np.array([1000.0, 2000.0, 4000.0])
 CONTACT_LOAD = 500.0
 CONTACT_TOLERANCE = 0.05
-
-
+SAMPLES = Path(__file__).resolve().parents[2].parent / "shared" / "samples"
 #: Load programmes, one test each; `dataclasses.replace` gives them another pad.
 PROGRAMMES = {
     "down": DryTest(1, branch="down"),
@@ -46,74 +47,68 @@ PROGRAMMES = {
 }
 
 
-class Line:
+class Law(NamedTuple):
+    """Deflection [m] and tangent compliance [m/N] under a load [N]."""
+
+    deflection: Callable[[np.ndarray], np.ndarray]
+    compliance: Callable[[np.ndarray], np.ndarray]
+
+
+def line(f: float = 1.0, housing: float = 0.0) -> Law:
     """Rocker: the printed formula's shape, softer by `f`, with a housing of compliance `housing` in series."""
-
-    def __init__(self, f: float = 1.0, housing: float = 0.0) -> None:
-        self.c, self.housing = 7.0e-11 / f, housing
-
-    def deflection(self, load):
-        """Deflection [m] under a load [N]."""
-        load = np.asarray(load, dtype=float)
-        return self.c * load * (18.95 - np.log(np.maximum(load, 1e-6))) + self.housing * load
-
-    def compliance(self, load):
-        """Tangent compliance [m/N] under a load [N]."""
-        return self.c * (17.95 - np.log(load)) + self.housing
+    c = 7.0e-11 / f
+    return Law(
+        lambda load: c * load * (18.95 - np.log(np.maximum(load, 1e-6))) + housing * load,
+        lambda load: c * (17.95 - np.log(load)) + housing,
+    )
 
 
-class Sphere:
+def sphere(f: float = 1.0, housing: float = 0.0) -> Law:
     """Point contact, with a housing of compliance `housing` in series."""
-
-    def __init__(self, f: float = 1.0, housing: float = 0.0) -> None:
-        self.c, self.housing = 6.03e-8 / f, housing
-
-    def deflection(self, load):
-        """Deflection [m] under a load [N]."""
-        return self.c * np.cbrt(np.asarray(load, dtype=float)) ** 2 + self.housing * load
-
-    def compliance(self, load):
-        """Tangent compliance [m/N] under a load [N]."""
-        return self.c * 2.0 / 3.0 / np.cbrt(load) + self.housing
+    c = 6.03e-8 / f
+    return Law(
+        lambda load: c * np.cbrt(load) ** 2 + housing * load, lambda load: c * 2.0 / 3.0 / np.cbrt(load) + housing
+    )
 
 
-def bearing(kind: str, seed: int) -> list:
+#: Two contacts one after the other.
+PLAY = Law(
+    lambda load: 3e-9 * np.minimum(load, 1500.0) + 1.5e-9 * np.maximum(load - 1500.0, 0.0),
+    lambda load: np.where(load < 1500.0, 3e-9, 1.5e-9),
+)
+
+
+#: Compliance of the housing, and the law of its pivots.
+KINDS = {
+    "rocker": (line, 0.0),
+    "rocker on housing": (line, 3e-10),
+    "sphere": (sphere, 0.0),
+    "sphere on housing": (sphere, 5e-10),
+}
+
+
+def bearing(kind: str, seed: int) -> list[Law]:
     """Five laws of one make, each pad with a stiffness of its own."""
-    rng = np.random.default_rng(seed)
-    factors = rng.uniform(0.3, 1.0, 5)
-    return {
-        "rocker": [Line(f) for f in factors],
-        "rocker on housing": [Line(f, 3e-10) for f in factors],
-        "sphere": [Sphere(f) for f in factors],
-        "sphere on housing": [Sphere(f, 5e-10) for f in factors],
-    }[kind]
+    law, housing = KINDS[kind]
+    return [law(f, housing) for f in np.random.default_rng(seed).uniform(0.3, 1.0, 5)]
 
 
-def truth_of(laws: Sequence) -> RigTruth:
-    """Physics of a bearing with these pivots."""
-    return RigTruth.constant(
-        np.diag([2e8, 4e8]),
-        np.diag([4e5, 6e5]),
-        pivot_deflection=lambda pad, load: laws[pad - 1].deflection(load),
-    )
-
-
-def campaign(path: Path | str, laws: Sequence, seed: int, **changes) -> tuple[Campaign, CampaignTruth]:
+def campaign(path: Path, laws: Sequence[Law], seed: int, **changes) -> tuple[Campaign, CampaignTruth]:
     """Write a campaign with dry tests and open it; gives its truth too."""
-    plan = RigPlan(
-        dry=changes.pop("dry", tuple(DryTest(p) for p in range(1, 6))), clearance=changes.pop("clearance", ())
+    truth = RigTruth.constant(
+        np.diag([2e8, 4e8]), np.diag([4e5, 6e5]), pivot_deflection=lambda pad, load: laws[pad - 1].deflection(load)
     )
-    rig = VirtualRig(
-        truth_of(laws),
-        plan,
-        instruments=changes.pop("instruments", Instruments.like_paper(seed=seed)),
-        noise=changes.pop("noise", Noise.like_samples()),
-        seed=seed,
-        **changes,
-    )
-    Path(path).unlink(missing_ok=True)
+    dry = changes.pop("dry", tuple(DryTest(p) for p in range(1, 6)))
+    usual = {"instruments": Instruments.like_paper(seed=seed), "noise": Noise.like_samples(), "seed": seed}
+    rig = VirtualRig(truth, RigPlan(dry=dry, clearance=changes.pop("clearance", ())), **usual | changes)
+    path.unlink(missing_ok=True)
     written = write_campaign(path, rig)
     return load_campaign(path), written
+
+
+def fitted(path: Path, laws: Sequence[Law], seed: int, **changes) -> tuple[PivotCurve, ...]:
+    """The curves of such a campaign."""
+    return fit_pivots(campaign(path, laws, seed, **changes)[0], ANGLES)
 
 
 def true_onset(law, gap: float) -> float:
@@ -121,9 +116,6 @@ def true_onset(law, gap: float) -> float:
     load = np.linspace(20.0, 7000.0, 70_000)
     missing = gap / CONTACT_LOAD * np.exp(-load / CONTACT_LOAD) > CONTACT_TOLERANCE * law.compliance(load)
     return float(load[missing].max())
-
-
-SAMPLES = Path(__file__).resolve().parents[2].parent / "shared" / "samples"
 
 
 def errors_within(curve, law, spreads):
@@ -223,17 +215,17 @@ def test_mistakes_on_the_mirror_line_show_in_the_pickup_alone(tmp_path, fault):
     # without any pick-up nothing tells, and nothing along the pad has changed
     quiet = Noise.like_samples()
     quiet = replace(quiet, displacement=replace(quiet.displacement, mains=0.0), force=replace(quiet.force, mains=0.0))
-    clean = fit_pivots(campaign(tmp_path / "c.h5", laws, 7, noise=quiet, **given)[0], ANGLES)
-    spoilt = fit_pivots(campaign(tmp_path / "c.h5", laws, 7, noise=quiet, faults=(fault,), **given)[0], ANGLES)
-    assert spoilt[0].stiffness(LOADS) == pytest.approx(clean[0].stiffness(LOADS), rel=4e-3)
+    spoilt, clean = (
+        fitted(tmp_path / "c.h5", laws, 7, noise=quiet, faults=faults, **given)[0] for faults in ((fault,), ())
+    )
+    assert spoilt.stiffness(LOADS) == pytest.approx(clean.stiffness(LOADS), rel=4e-3)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROGRAMMES)
 def test_any_load_programme(tmp_path, name):
-    law = Sphere(0.8)
-    source, _ = campaign(tmp_path / "c.h5", [law] * 5, 11, dry=(PROGRAMMES[name],))
-    (curve,) = fit_pivots(source, ANGLES)
+    law = sphere(0.8)
+    (curve,) = fitted(tmp_path / "c.h5", [law] * 5, 11, dry=(PROGRAMMES[name],))
     assert curve.law.name == "hertz-point"
     assert errors_within(curve, law, 4).max() < 0.03
     assert ("no-holds" in curve.status) is (name == "ramp")
@@ -246,8 +238,7 @@ def test_ramps_of_all_pads_are_not_taken_for_drift(tmp_path, kind):
     """Load and time grow together on a ramp: a drift learnt from it would eat the pivots' compliance."""
     laws = bearing(kind, 4003)
     dry = tuple(replace(PROGRAMMES["ramp"], pad=pad) for pad in range(1, 6))
-    source, _ = campaign(tmp_path / "c.h5", laws, 4003, dry=dry)
-    for curve, law in zip(fit_pivots(source, ANGLES), laws, strict=True):
+    for curve, law in zip(fitted(tmp_path / "c.h5", laws, 4003, dry=dry), laws, strict=True):
         assert errors_within(curve, law, 3.5)[1:].max() < 0.06
 
 
@@ -255,9 +246,8 @@ RUBBING = replace(Noise.like_samples(), dry=replace(Noise.like_samples().dry, fr
 
 
 def test_friction_shows_as_a_loop_and_is_taken_off(tmp_path):
-    law = Sphere()
-    source, _ = campaign(tmp_path / "c.h5", [law] * 5, 5, dry=(DryTest(1, branch="cycle"),), noise=RUBBING)
-    (curve,) = fit_pivots(source, ANGLES)
+    law = sphere()
+    (curve,) = fitted(tmp_path / "c.h5", [law] * 5, 5, dry=(DryTest(1, branch="cycle"),), noise=RUBBING)
     assert curve.law.theta[1] == pytest.approx(0.03, abs=0.004)
     assert curve.stiffness(LOADS) == pytest.approx(1.0 / law.compliance(LOADS), rel=0.02)
     load = np.linspace(500.0, 4500.0, 400)
@@ -267,10 +257,9 @@ def test_friction_shows_as_a_loop_and_is_taken_off(tmp_path):
 
 @pytest.mark.slow
 def test_up_and_down_in_two_runs_make_one_curve(tmp_path):
-    law = Sphere()
+    law = sphere()
     tests = (DryTest(1), DryTest(1, branch="down"))
-    source, _ = campaign(tmp_path / "c.h5", [law] * 5, 6, dry=tests, noise=RUBBING)
-    (curve,) = fit_pivots(source, ANGLES)
+    (curve,) = fitted(tmp_path / "c.h5", [law] * 5, 6, dry=tests, noise=RUBBING)
     assert curve.runs == ("p-1-up", "p-1-down")
     assert set(curve.steps.branch) == {1, -1}
     assert curve.stiffness(LOADS) == pytest.approx(1.0 / law.compliance(LOADS), rel=0.03)
@@ -279,10 +268,9 @@ def test_up_and_down_in_two_runs_make_one_curve(tmp_path):
 
 
 def test_a_long_false_load_is_left_out(tmp_path):
-    law = Line(0.4)
+    law = line(0.4)
     knock = Fault("glitch", "p-1-up", "L1V", value=3000.0, start=5.2, length=0.3)
-    source, _ = campaign(tmp_path / "c.h5", [law] * 5, 21, dry=(DryTest(1),), faults=(knock,))
-    (curve,) = fit_pivots(source, ANGLES)
+    (curve,) = fitted(tmp_path / "c.h5", [law] * 5, 21, dry=(DryTest(1),), faults=(knock,))
     assert errors_within(curve, law, 4)[1:].max() < 0.06
 
 
@@ -296,24 +284,12 @@ def test_clearance_has_no_bias_of_its_own(tmp_path, kind):
     assert np.abs(found.clearance - 80e-6).max() < 0.04e-6
 
 
-class Play:
-    """Two contacts one after the other."""
-
-    def deflection(self, load):
-        load = np.asarray(load, dtype=float)
-        return 3e-9 * np.minimum(load, 1500.0) + 1.5e-9 * np.maximum(load - 1500.0, 0.0)
-
-    def compliance(self, load):
-        return np.where(np.asarray(load) < 1500.0, 3e-9, 1.5e-9)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(("odd", "law"), [(Play(), "bilinear"), (Sphere(0.6, 3e-9), "point-in-series")])
+@pytest.mark.parametrize(("odd", "law"), [(PLAY, "bilinear"), (sphere(0.6, 3e-9), "point-in-series")])
 def test_a_pad_of_its_own_kind_keeps_its_own_law(tmp_path, odd, law):
     laws = bearing("sphere on housing", 1)
     laws[1] = odd
-    source, _ = campaign(tmp_path / "c.h5", laws, 1)
-    curve = fit_pivots(source, ANGLES)[1]
+    curve = fitted(tmp_path / "c.h5", laws, 1)[1]
     assert curve.law.name == law
     errors_within(curve, odd, 3)
 

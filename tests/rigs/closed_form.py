@@ -373,3 +373,8 @@ def write_rig(
     setup = replace(setup or Acquisition(uncertainty=EXACT), noise=noise_of(rig))
     folder.mkdir(parents=True, exist_ok=True)
     return write_campaign(folder, campaign(rig, channels or channels_of(rig), [seed]), setup, [seed, 1])
+
+
+def vector(h: Array) -> Array:
+    """Real and imaginary entries of a dynamic stiffness (8,), as estimates list them."""
+    return np.concatenate([h.real.ravel(), h.imag.ravel()])

@@ -4,16 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tests.rigs.closed_form import vector
 from tpjb_ident.estimators.estimate import estimate_dynamic_stiffness
 
 OMEGA = 2 * np.pi * 25.0
-H_TRUE = np.array(
-    [
-        [2.0e8 + 1j * OMEGA * 4.0e5, 2.0e7 + 1j * OMEGA * 2e4],
-        [-1.5e7 + 1j * OMEGA * 1e4, 5.0e8 + 1j * OMEGA * 6.0e5],
-    ]
-)
-TRUE = np.concatenate([H_TRUE.real.ravel(), H_TRUE.imag.ravel()])
+H_TRUE = np.array([[2.0e8, 2.0e7], [-1.5e7, 5.0e8]]) + 1j * OMEGA * np.array([[4.0e5, 2e4], [1e4, 6.0e5]])
+TRUE = vector(H_TRUE)
 #: Actual force = this times the command: 2-4 % cross-talk that nobody knows.
 CROSS_TALK = np.array([[1.0, 0.03], [-0.02, 1.0]])
 FORCE = 500.0

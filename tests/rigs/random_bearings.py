@@ -5,8 +5,6 @@ are the film thickness by its formula, Reynolds' equation by plain numpy, force,
 moment and pivot balance, the heat fixed point, and for idle pads a search for a loaded attitude that was missed.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import dataclass, field, replace
@@ -58,7 +56,7 @@ class Case:
     def predict(self) -> Prediction:
         return predict(self.bearing, self.load, self.direction, self.speed, pivots=self.stiffness)
 
-    def turned(self, angle: float) -> Case:
+    def turned(self, angle: float) -> "Case":
         """The same bearing and load, turned as a whole."""
         pads = tuple(replace(p, pivot_angle=p.pivot_angle + angle) for p in self.bearing.pads)
         return replace(self, bearing=self.bearing.with_pads(pads), direction=self.direction + angle)

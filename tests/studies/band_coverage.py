@@ -19,6 +19,7 @@ import pandas as pd
 from rigdata import load_campaign
 from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandPlan, BandRig, band_plans, stiffness
+from tests.rigs.closed_form import vector
 from tests.studies.results import report, study_parser, table
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.identification.identify import identify
@@ -99,8 +100,7 @@ def judged(result: BandResult, rig: BandRig) -> dict[str, object]:
     points = []
     for point in result.points:
         est = point.stiffness
-        known = stiffness(rig.bearing, np.array([est.omega]), load)[0]
-        truth = np.concatenate([known.real.ravel(), known.imag.ravel()])
+        truth = vector(stiffness(rig.bearing, np.array([est.omega]), load)[0])
         points.append(np.mean(np.abs(est.vector - truth) <= est.half_width()))
     row["points inside"] = np.mean(points) if points else np.nan
     model = result.models.get("K-C-M")

@@ -43,8 +43,7 @@ def counted(plan: dict[str, object], seed: int, gains: bool) -> tuple[list[bool]
         path = write_campaign(Path(folder), campaign, setup, [seed, 11])
         result = identify(load_campaign(path), IdentifySettings(methods=()))
     for p in result.points:
-        h = campaign.truth(p.point.static_load, p.point.excitation_hz)
-        truth = np.concatenate([h.real.ravel(), h.imag.ravel()])
+        truth = cf.vector(campaign.truth(p.point.static_load, p.point.excitation_hz))
         width = p.stiffness.half_width()
         inside += list(np.abs(p.stiffness.vector - truth) <= width)
         half += list(100 * width[[0, 3, 4, 7]] / np.abs(truth)[[0, 3, 4, 7]])

@@ -9,8 +9,6 @@ stays as it is, so that case i of a seed is always the same input (``--case i`` 
 file. The cases run in child processes, so that a crash of a C library is a finding and not the end.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import logging
@@ -64,7 +62,7 @@ class Tally:
     peak_MB: int = 0
     findings: list[dict[str, str]] = field(default_factory=list)
 
-    def take(self, more: Tally) -> None:
+    def take(self, more: "Tally") -> None:
         """Add the cases of a block; its findings are counted by whoever stores them."""
         self.cases += more.cases
         self.accepted += more.accepted

@@ -107,7 +107,7 @@ def fault(p: Prediction) -> str:
     films = [f for f in p.equilibrium.films if f.forces is not None]
     force = sum(f.forces.force[0] * f.normal + f.forces.force[1] * f.tangent for f in films)
     push = p.load * np.array([math.cos(p.load_direction), math.sin(p.load_direction)])
-    if not np.abs(force - push).max() < 1e-4 * p.load:
+    if not np.abs(force - push).max() < 1e-4 * max(p.load, 1.0):
         return "unbalanced"
     said = p.setup.thermal != "thd" or "flow back at a leading edge" in p.status
     return "" if said or abs(heat_lost(p)) < HEAT_LIMIT else "heat is lost"
