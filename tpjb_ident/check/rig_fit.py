@@ -52,7 +52,7 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
 
     None where the lines are too few; `static`: cells show the static load.
     """
-    clear = [run for run in runs if "force" not in run.report.doubts and run.shows("force")]
+    clear = [run for run in runs if not run.report.cells_doubted and run.shows("force")]
     observations = tuple(run for run in clear for _ in run.lines.omega)
     if len(observations) < _MIN_BLOCKS:
         return None

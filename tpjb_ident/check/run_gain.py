@@ -112,7 +112,7 @@ def point_runs(observations: Sequence[Observation], mass: float) -> list[PointRu
         is_clear = not shaft_order(point.excitation_hz, point.shaft_speed_hz)
         is_clear &= observation.shows("force") and observation.shows("displacement")
         measured = np.array([observation.film_force(mass), observation.line("displacement")])
-        if is_clear and len(probes) == 2 and "force" not in observation.report.doubts and np.isfinite(measured).all():
+        if is_clear and len(probes) == 2 and not observation.report.cells_doubted and np.isfinite(measured).all():
             named = ((channel.name, channel.axis) for channel in [*probes, *observation.of("force")])
             groups.setdefault((point, *named), []).append(observation)
     return [_readings(group, mass) for group in groups.values()]
