@@ -85,7 +85,7 @@ class MainsEquations:
 
     def h(self, x: FloatArray) -> ComplexArray:
         """H of the unknowns, (2, 2) [N/m]; `x` (8 + g m,)."""
-        return complex_matrix(x[:8]) * self.scale
+        return complex_matrix(self.entries(x))
 
     def entries(self, x: FloatArray) -> FloatArray:
         """The eight real entries of H [N/m]; `x` (8 + g m,)."""
@@ -99,22 +99,6 @@ class MainsEquations:
         """Weighted residuals, (4 g,); `x` (8 + g m,)."""
         r = (self.F - (self.D - self.vectors(x)) @ self.h(x).T) / self.sigma[:, None]
         return np.sqrt(2.0) * np.concatenate([r.real.ravel(), r.imag.ravel()])
-
-    def jacobian(self, x: FloatArray) -> FloatArray:
-        """D residual / d x, (4 g, 8 + g m); `x` (8 + g m,)."""
-        g, m = len(self.D), len(self.patterns)
-        h, clean = self.h(x), self.D - self.vectors(x)
-        slope = np.zeros((g, 2, 8 + g * m), dtype=complex)
-        columns = -self.scale * clean / self.sigma[:, None]
-        slope[:, 0, 0:2], slope[:, 1, 2:4] = columns, columns
-        slope[:, :, 4:8] = 1j * slope[:, :, 0:4]
-        turn = 1j * np.exp(1j * x[8:].reshape(g, m))
-        push = h @ self.patterns.T
-        rows = np.arange(g)
-        for k in range(m):
-            slope[rows, :, 8 + rows * m + k] = turn[:, k, None] * push[:, k] / self.sigma[:, None]
-        flat = slope.reshape(2 * g, -1)
-        return np.sqrt(2.0) * np.concatenate([flat.real, flat.imag])
 
     def start(self, h: ComplexArray) -> FloatArray:
         """Unknowns for a given H: the angles are those of what H leaves of the displacements; `h` (2, 2) [N/m]."""
@@ -135,7 +119,7 @@ class MainsEquations:
 
         minima: list[Minimum] = []
         for h in self._candidates():
-            fit = least_squares(self.residual, self.start(h), self.jacobian, method="lm", max_nfev=400)
+            fit = least_squares(self.residual, self.start(h), method="lm")
             if fit.status <= 0 or any(np.abs(fit.x[:8] - m.x[:8]).max() < 1e-5 for m in minima):
                 continue
             normal = fit.jac.T @ fit.jac
