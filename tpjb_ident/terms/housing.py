@@ -55,7 +55,7 @@ class Housing(Term):
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
         self._omega = blocks.usual_omega
-        self._inertia = _inertia_share(rig, blocks)
+        self._inertia = rig.mass * _usual_ratio(blocks.z[:, rig.of("acceleration")], blocks.z[:, rig.of("force")])
         self._blocks = blocks
         usual, across, loss = _CELLS
         if len(rig.of("acceleration")) < 2:
@@ -75,7 +75,10 @@ class Housing(Term):
             lag = Parameter("lag", "rad", _LOSS / 2 if rig.out_of_step else _SHAFT)
             differs = _PITCH if rig.out_of_step else _SHAFT
             entries = [Parameter(f"kappa_{name}", "1", differs) for name in ("xx", "xy", "yx", "yy")]
-            shaft = [Parameter(f"c_{name}", "nm/N", _shaft_compliance(rig, blocks)) for name in ("xx", "yy")]
+            # what lets the shaft move by its usual share, by the film's force per motion
+            ratio = _usual_ratio(vector(rig, blocks, "displacement"), film_force(rig, blocks))
+            compliance = _SHAFT * ratio / _NANOMETRE or 1.0
+            shaft = [Parameter(f"c_{name}", "nm/N", compliance) for name in ("xx", "yy")]
             self.parameters = (*entries, *shaft, lag)
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
@@ -246,12 +249,11 @@ def _kappa(value: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     return kappa, np.asarray(_NANOMETRE * np.diag(value[4:6]), complex)
 
 
-def _shaft_compliance(rig: Rig, blocks: Blocks) -> float:
-    """What lets the shaft of a floating stator move by its usual share, by the film's force per motion [nm/N]."""
-    motion = np.linalg.norm(vector(rig, blocks, "displacement"), axis=1)
-    force = np.linalg.norm(film_force(rig, blocks), axis=1)
-    usable = (motion > 0) & (force > 0)
-    return _SHAFT * float(np.median(motion[usable] / force[usable])) / _NANOMETRE if usable.any() else 1.0
+def _usual_ratio(first: ComplexArray, second: ComplexArray) -> float:
+    """Median ratio of the sizes of two vectors, (n, k) and (n, m); zero where no block shows both."""
+    above, below = (np.linalg.norm(vectors, axis=1) for vectors in (first, second))
+    shown = (above > 0) & (below > 0)
+    return float(np.median(above[shown] / below[shown])) if shown.any() else 0.0
 
 
 def _otherwise(fitted: Fitted, least: float) -> str:
@@ -279,13 +281,3 @@ def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> Cond
         f"filter; between the {sensors} and the housing there is none. State `delay` or `filter` of the channels"
     )
     return (Condition(OUT_OF_STEP, text),)
-
-
-def _inertia_share(rig: Rig, blocks: Blocks) -> float:
-    """Median share of the housing's inertia in the force."""
-    if len(rig.of("acceleration")) < 2:
-        return 0.0
-    inertia = rig.mass * np.linalg.norm(blocks.z[:, rig.of("acceleration")], axis=1)
-    force = np.linalg.norm(blocks.z[:, rig.of("force")], axis=1)
-    pushed = force > 0
-    return float(np.median(inertia[pushed] / force[pushed])) if pushed.any() else 0.0
