@@ -287,27 +287,28 @@ def gain_of_run(runs: PointRuns, run: int, fellows: Sequence[int]) -> WrongGain 
     shown = size_difference(turning, _HONEST_TURNING * turning[fellows].mean(axis=0), run, fellows)
     sources = dynamic, size_difference(loads, np.full(4, _HONEST * load), run, fellows), shown
     residual, noise, honest, spare = (np.array(values) for values in zip(*sources))
-    forces = np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]  # of every channel
-    covariance, tried = noise + honest, []
-    for channel, selector in enumerate(np.eye(4)):
-        own = selector * np.nan_to_num([loads[run], turning[run]])
-        pattern = np.array([_stacked(forces[:, channel]), *own])
-        weight = np.einsum("sab,sb->sa", np.linalg.inv(covariance), pattern)
-        scatter = np.einsum("sa,sab,sb->s", weight, noise, weight)
-        evidence = np.array([np.sum(weight * residual, axis=1), np.sum(weight * pattern, axis=1), scatter**2 / spare])
-        part, error, chance = _estimated(*evidence)
-        joint = _estimated(*evidence.sum(axis=1)).tolist()
-        remaining = residual - joint[0] * pattern
-        misfits = np.einsum("sa,sab,sb->s", remaining, np.linalg.inv(covariance), remaining)
-        is_consistent = np.all(np.abs(part - part[0]) <= _AGREE * np.hypot(error, error[0]))
-        if is_consistent and chance[0] <= _PHASORS_SHOW and part[0] <= _MOST_PART and misfits.max() <= 4 * _STRANGE:
-            tried.append((misfits.sum(), channel, joint))
-    least, _, (part, error, chance) = min(tried, default=(0.0, 0, (0.0, 0.0, 1.0)))
-    if abs(part) < _LEAST or chance > _CHANCE:
+    inverse = np.linalg.inv(noise + honest)
+    # what a part of a channel's own reading adds: (channel, source, row)
+    pattern = np.eye(4)[:, None] * np.nan_to_num([loads[run], loads[run], turning[run]])
+    pattern[:, 0] = _stacked(np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]).T
+    weight = np.einsum("sab,csb->csa", inverse, pattern)
+    scatter = np.einsum("csa,sab,csb->cs", weight, noise, weight)
+    evidence = np.array([np.sum(weight * residual, axis=2), np.sum(weight * pattern, axis=2), scatter**2 / spare])
+    part, error, chance = _estimated(*evidence)
+    joint = _estimated(*evidence.sum(axis=2))
+    remaining = residual - joint[0][:, None, None] * pattern
+    misfits = np.einsum("csa,sab,csb->cs", remaining, inverse, remaining)
+    is_consistent = np.all(np.abs(part - part[:, :1]) <= _AGREE * np.hypot(error, error[:, :1]), axis=1)
+    is_possible = is_consistent & (chance[:, 0] <= _PHASORS_SHOW) & (part[:, 0] <= _MOST_PART)
+    is_possible &= misfits.max(axis=1) <= 4 * _STRANGE
+    left = np.where(is_possible, misfits.sum(axis=1), np.inf)
+    order = np.argsort(left)
+    part, error, chance = joint[:, order[0]].tolist()
+    if not is_possible.any() or abs(part) < _LEAST or chance > _CHANCE:
         return None
-    alike = [channel for misfit, channel, _ in sorted(tried) if misfit < least + _AS_WELL]
+    alike = order[left[order] < left.min() + _AS_WELL]
     gain = 1 / (1 - part)
-    return WrongGain(tuple(alike), gain, gain**2 * error, chance)
+    return WrongGain(tuple(alike.tolist()), gain, gain**2 * error, chance)
 
 
 def _estimated(weighted: FloatArray, information: FloatArray, doubt: FloatArray) -> FloatArray:

@@ -143,7 +143,7 @@ class MainsEquations:
             clean = (self.D - np.exp(1j * self._angles(h)) @ self.patterns) * weight
             adjoint = np.swapaxes(clean, -1, -2).conj()
             h = np.swapaxes(np.linalg.solve(adjoint @ clean, adjoint @ (self.F * weight)), -1, -2)
-        remaining = (self.F - (self.D - np.exp(1j * self._angles(h)) @ self.patterns) @ np.swapaxes(h, -1, -2)) * weight
+        remaining = self.F * weight - clean @ np.swapaxes(h, -1, -2)
         cost = (np.abs(remaining) ** 2).sum(axis=(-1, -2))
         return h[_distinct(h, cost)]
 
