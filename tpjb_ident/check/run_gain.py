@@ -228,13 +228,14 @@ def check_agreement(runs: PointRuns) -> None:
 def _miswired(runs: PointRuns, run: int, stiffness: ComplexArray) -> str:
     """The wiring fault of probes or cells that explains a run; "" where none does."""
     probes, cells = runs.channels[:2], runs.channels[2:]
-    tried = [(words, np.hstack([repair, np.eye(2)])) for words, repair in repairs(probes, scales=True)]
-    tried += [(words, np.hstack([np.eye(2), repair])) for words, repair in repairs(cells, scales=True)]
+    tried = [(words, np.array([repair, np.eye(2)])) for words, repair in repairs(probes, scales=True)]
+    tried += [(words, np.array([np.eye(2), repair])) for words, repair in repairs(cells, scales=True)]
+    inertia = runs.inertia[run]
 
     def unexplained(repair: FloatArray) -> float:
         # the inertia part of the force stays: only the cells are supposed to be at fault
-        force = repair[:, 2:] @ (runs.force - runs.inertia)[run] + runs.inertia[run]
-        answer = stiffness @ repair[:, :2] @ runs.displacement[run]
+        force = repair[1] @ (runs.force[run] - inertia) + inertia
+        answer = stiffness @ repair[0] @ runs.displacement[run]
         return float(np.linalg.norm(force - answer) / np.linalg.norm(force))
 
     return explanation(tried, unexplained, float(runs.misfits(stiffness)[run]) / 4)

@@ -27,10 +27,12 @@ _LOCKED = 0.95
 _MIN_DIRECTIONS = 4
 #: Degrees of freedom with which the scatter seen at the other points is believed.
 _PRIOR_DOF = 8.0
-#: Starts about the plain fit, rounds in which they are run down, best ones that are polished, and their seed.
+#: Starts about the plain fit, rounds in which they are run down, best ones that are polished, in so many rounds at
+#: most, and their seed.
 _STARTS = 2000
 _SWEEPS = 25
 _POLISHED = 30
+_ROUNDS = 100
 _SEED = 5060
 
 
@@ -119,7 +121,8 @@ class MainsEquations:
 
         minima: list[Minimum] = []
         for h in self._candidates():
-            fit = least_squares(self.residual, self.start(h), method="lm")
+            start = self.start(h)
+            fit = least_squares(self.residual, start, method="lm", max_nfev=_ROUNDS * len(start))
             if fit.status <= 0 or any(np.abs(fit.x[:8] - m.x[:8]).max() < 1e-5 for m in minima):
                 continue
             normal = fit.jac.T @ fit.jac
