@@ -39,7 +39,6 @@ class Sensor(Channel):
     """A channel as the equation knows it, with the axis that the campaign has; a run's own counts in its blocks."""
 
     corner_uncertainty: float = 0.0  #: Hz: of a low corner that nobody states, one deviation
-    out_of_step: bool = False  #: leads what the springs under the housing make of the cells' force
 
     def doubted(self, gain: float, turn: float = 0.0) -> Sensor:
         """The sensor, its gain and axis [rad] known no better than this."""
@@ -86,11 +85,8 @@ class Rig:
     to_set_point: bool = True  #: whether H is that at the set points, not at the runs' own loads
     #: of the clocks of devices, relative: put right in the readings before they became phasors
     rates: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def out_of_step(self) -> bool:
-        """Whether accelerometers lead what the springs under the housing make of the cells' force."""
-        return any(sensor.out_of_step for sensor in self.sensors)
+    #: whether accelerometers lead what the springs under the housing make of the cells' force
+    out_of_step: bool = False
 
     def of(self, quantity: str) -> IntArray:
         """Rows of the sensors of a quantity."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, Conditions
-from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, State, film_force, housing_rows, vector
+from tpjb_ident.estimate.equation import Blocks, Rig, State, film_force, housing_rows, vector
 from tpjb_ident.estimate.term import OUT_OF_STEP, Fitted, Parameter, Term
 
 _NANOMETRE = 1e-9
@@ -177,27 +177,25 @@ class Housing(Term):
             return None
         return _compliance(fitted.value)
 
-    def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
+    def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
         """Cells, or probes of a floating stator, as uncertain in time as accelerometers lead them.
 
         A spring's loss is positive, late cells lower it. Accelerometers with which nothing else is wrong may have led
         by a corner of their own.
         """
-        is_stated = any(sensor.delay_uncertainty for sensor in sensors)
-        if is_stated or self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
+        is_stated = any(sensor.delay_uncertainty for sensor in rig.sensors)
+        if is_stated or rig.mount == "unknown" or len(rig.of("acceleration")) < 2:
             return None
         lag, error = float(fitted.value[-1]), float(fitted.deviation[-1])
         if not lag < -2 * error or self.is_on_foundation(fitted):
             return None
-        if self.rig.mount == "cells":
+        if rig.mount == "cells":
             compared, sound = "force", all(condition == OUT_OF_STEP for condition in self.conditions(fitted))
         else:
             compared, sound = "displacement", not (self._is_unexplained(fitted) or _otherwise(fitted, _GROSS))
-        widened = []
-        for s in sensors:
-            late = -lag / self._omega if s.quantity == compared else 0.0
-            widened.append(replace(s, delay_uncertainty=late, out_of_step=sound and s.quantity == "acceleration"))
-        return tuple(widened)
+        late = {compared: -lag / self._omega}
+        sensors = tuple(replace(s, delay_uncertainty=late.get(s.quantity, 0.0)) for s in rig.sensors)
+        return replace(rig, sensors=sensors, out_of_step=sound)
 
 
 def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
