@@ -58,7 +58,7 @@ class Housing(Term):
         self._inertia = rig.mass * _usual_ratio(blocks.z[:, rig.of("acceleration")], blocks.z[:, rig.of("force")])
         self._blocks = blocks
         usual, across, loss = _CELLS
-        if len(rig.of("acceleration")) < 2:
+        if not rig.has_acceleration:
             usual = 0.0  # the inertia stays in F, as is said of the point
         if rig.mount == "cells":
             self.sentence = "{p.name} of the cells {value:.3g} {p.unit} (standard error {error:.2g})"
@@ -71,7 +71,7 @@ class Housing(Term):
             )
         elif rig.mount == "unknown":
             self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
-        elif len(rig.of("acceleration")) > 1:
+        elif rig.has_acceleration:
             lag = Parameter("lag", "rad", _LOSS / 2 if rig.out_of_step else _SHAFT)
             differs = _PITCH if rig.out_of_step else _SHAFT
             entries = [Parameter(f"kappa_{name}", "1", differs) for name in ("xx", "xy", "yx", "yy")]
@@ -124,7 +124,7 @@ class Housing(Term):
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
-        if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
+        if self.rig.mount == "unknown" or not self.rig.has_acceleration:
             return ()
         if self.is_on_foundation(fitted):
             return ()
@@ -173,7 +173,7 @@ class Housing(Term):
 
     def standing_on(self, fitted: Fitted) -> ComplexArray | None:
         """Compliance of the springs under the housing (2, 2) [m/N]; None where no accelerometer shows it."""
-        if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2 or self.is_on_foundation(fitted):
+        if self.rig.mount != "cells" or not self.rig.has_acceleration or self.is_on_foundation(fitted):
             return None
         return _compliance(fitted.value)
 
@@ -184,7 +184,7 @@ class Housing(Term):
         by a corner of their own.
         """
         is_stated = any(sensor.delay_uncertainty for sensor in rig.sensors)
-        if is_stated or rig.mount == "unknown" or len(rig.of("acceleration")) < 2:
+        if is_stated or rig.mount == "unknown" or not rig.has_acceleration:
             return None
         lag, error = float(fitted.value[-1]), float(fitted.deviation[-1])
         if not lag < -2 * error or self.is_on_foundation(fitted):
@@ -204,8 +204,6 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
     A foundation with a resonance does, wrong accelerometers do not; at the lowest frequencies it is a spring still.
     Single lines of a band, which `check` looks at, cannot tell: there it may be one.
     """
-    if len(rig.of("acceleration")) < 2:
-        return False
     force, acceleration = (vector(rig, blocks, quantity) for quantity in ("force", "acceleration"))
     x, y = (-(blocks.omega**2)[:, None] * force).T
     none = np.zeros_like(x)
