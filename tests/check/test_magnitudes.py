@@ -41,14 +41,14 @@ def random_rig(rng: np.random.Generator, demo) -> Sizes:
     static = 0.0 if is_free else load
     force = abs(film - mass * acceleration) if is_free else film
     run = replace(demo, point=OperatingPoint(load, -math.pi / 2, 2 * math.pi * 22, omega))
-    return Sizes(run, motion, force, film, acceleration, static)
+    return Sizes(Reporter(run), motion, force, film, acceleration, static)
 
 
 def judged(check, sizes, *more):
     """Keys and severities of what one check says of the sizes of a run."""
-    report = Reporter(sizes.run)
-    check(report, *more or (sizes,))
-    return [(finding.key, finding.problem.severity) for finding in report.findings]
+    sizes = replace(sizes, report=Reporter(sizes.report.run))
+    check([sizes] if more else sizes, *more)
+    return [(finding.key, finding.problem.severity) for finding in sizes.report.findings]
 
 
 def test_rigs_of_every_size_pass():
@@ -63,10 +63,10 @@ def test_rigs_of_every_size_pass():
 @pytest.mark.parametrize(("mass", "acceleration", "severity"), [(3000, 0.05, "warning"), (3000, 0.5, "error")])
 def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(mass, acceleration, severity):
     run = load_campaign(DEMO).of_kind("dynamic")[0]
-    rig = Sizes(run, 1e-6, 2000.0, 2000.0, acceleration, run.point.static_load)
-    assert judged(check_weight, rig, [rig], mass, 5000.0) == [("weight", severity)]
-    assert judged(check_weight, rig, [rig], 30.0, 5000.0) == []
-    assert judged(check_weight, rig, [replace(rig, static=0.0)], mass, 5000.0) == [("weight", "warning")]
+    rig = Sizes(Reporter(run), 1e-6, 2000.0, 2000.0, acceleration, run.point.static_load)
+    assert judged(check_weight, rig, mass, 5000.0) == [("weight", severity)]
+    assert judged(check_weight, rig, 30.0, 5000.0) == []
+    assert judged(check_weight, replace(rig, static=0.0), mass, 5000.0) == [("weight", "warning")]
 
 
 @pytest.mark.slow
@@ -88,7 +88,7 @@ def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(
 def test_each_bound_at_its_place(changes, key, severity):
     demo = load_campaign(DEMO).of_kind("dynamic")[0]
     run = replace(demo, point=OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 157.0796))
-    good = Sizes(run, 5e-6, 1e3, 1e3, 0.02, 5000.0)
+    good = Sizes(Reporter(run), 5e-6, 1e3, 1e3, 0.02, 5000.0)
     sizes = replace(good, **changes)
     assert judged(check_sizes, sizes) == ([] if key is None else [(key, severity)])
 

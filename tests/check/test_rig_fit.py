@@ -46,14 +46,24 @@ def campaign(described, runs, mount=None):
     )
 
 
-def made(probes=TWO, gains=None, n=8, noise=1e-3, seed=0, uncertainty=None, spoil=lambda r, z: z, mount=None):
+def made(
+    probes=TWO,
+    gains=None,
+    n=8,
+    noise=1e-3,
+    seed=0,
+    uncertainty=None,
+    spoil=lambda r, z: z,
+    mount=None,
+    hertz=(40.0, 60.0),
+):
     """Campaign and runs, each with a film of its own: H differs by half from run to run."""
     rng = np.random.default_rng(seed)
     described = channels(probes, uncertainty)
     along = np.array([(np.cos(c.axis), np.sin(c.axis)) for c in described])
     runs = []
     for r in range(n):
-        omega = 2 * np.pi * (40.0, 60.0)[r % 2]
+        omega = 2 * np.pi * hertz[r % len(hertz)]
         force = 400.0 * (rng.standard_normal(2) + 1j * rng.standard_normal(2))
         motion = force / (3e8 * (1 + 0.5 * rng.random(2)) * (1 + 0.3j))
         moved = -(omega**2) * COMPLIANCE @ force
@@ -82,8 +92,16 @@ def found(case):
         ({"PXA": 1.03}, {"noise": 0.1, "n": 4}),
         ({"PXA": 1.05}, {"uncertainty": 0.03}),
         ({"PX": 1.5}, {"probes": TWO}),
+        ({}, {"probes": TWO, "n": 12, "hertz": (25.0, 40.0, 60.0, 90.0)}),
     ],
-    ids=["alike", "within what is usual", "noise is no gain", "within what is stated", "two probes are all that is"],
+    ids=[
+        "alike",
+        "within what is usual",
+        "noise is no gain",
+        "within what is stated",
+        "two probes are all that is",
+        "a film left free tells no mass",
+    ],
 )
 def test_probes_that_agree_are_not_apart(gains, how):
     assert found(made(**{"probes": PLANES, "gains": gains, **how})) == ({}, [])

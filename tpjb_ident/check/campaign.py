@@ -106,10 +106,10 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
 def _spread_doubts(observations: Sequence[Observation]) -> None:
     """Cells that are wired wrongly in many runs are so in all, also where the load does not show it."""
     judged = [observation for observation in observations if observation.run.kind in {"dynamic", "locus", "dry_pivot"}]
-    doubted = sum("force" in observation.report.doubts for observation in judged)
+    doubted = sum(observation.report.cells_doubted for observation in judged)
     if is_shared(doubted, len(judged)):
         for observation in observations:
-            observation.report.doubts.add("force")
+            observation.report.cells_doubted = True
 
 
 def _check_duplicates(observations: Sequence[Observation]) -> None:

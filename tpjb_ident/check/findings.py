@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -70,17 +70,17 @@ class Finding:
     channels: tuple[str, ...] = ()  #: whose nature it is, in whatever run they serve; none: it is the run's own
 
 
-@dataclass(frozen=True)
+@dataclass
 class Reporter:
     """Gathers the findings of one run."""
 
     run: Run
     findings: list[Finding] = field(default_factory=list)
-    doubts: set[str] = field(default_factory=set)
+    cells_doubted: bool = False  #: what they show is held against nothing any more
 
     def copy(self) -> Reporter:
         """A reporter that has found the same so far."""
-        return Reporter(self.run, list(self.findings), set(self.doubts))
+        return replace(self, findings=list(self.findings))
 
     @property
     def keys(self) -> list[str]:
@@ -248,12 +248,7 @@ def pointing(vector: FloatArray, wanted: float, within: float) -> Callable[[Floa
     return misfit
 
 
-def definiteness(matrix: FloatArray) -> float:
-    """Least over greatest eigenvalue of the symmetric part; 1 is isotropic, not above 0 impossible."""
-    low, high = np.linalg.eigvalsh((matrix + matrix.T) / 2)
-    return float(low / high) if high > 0 else -1.0
-
-
 def indefiniteness(matrix: FloatArray) -> float:
-    """One over `definiteness`; infinite where a matrix is impossible."""
-    return 1 / max(definiteness(matrix), 1e-9)
+    """Greatest over least eigenvalue of the symmetric part; 1 is isotropic, 1e9 where a matrix is impossible."""
+    low, high = np.linalg.eigvalsh((matrix + matrix.T) / 2)
+    return float(high / low) if low > 1e-9 * abs(high) else 1e9

@@ -36,7 +36,7 @@ _GRAVITY, _INERTIA = 9.81, 0.1
 class Sizes:
     """Sizes of one run at its excitation line, SI; NaN where they are not measured."""
 
-    run: Run
+    report: Reporter
     motion: float  #: m, of the shaft against the housing
     cells: float  #: N
     film: float  #: N, cells and the housing's inertia
@@ -46,13 +46,13 @@ class Sizes:
     @property
     def is_carried(self) -> bool:
         """Whether the cells carry the static load."""
-        return self.static > 0.5 * self.run.point.static_load > 0
+        return self.static > 0.5 * self.report.run.point.static_load > 0
 
 
 def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:
     """Hold every run against what a rig can show; findings go to the runs' reports."""
     largest = max((observation.run.point.static_load for observation in observations), default=0.0)
-    measured: list[tuple[Reporter, Sizes]] = []
+    measured = []
     for observation in observations:
         _check_rate(observation.report, observation.run)
         is_sine = observation.run.kind == "dynamic" and observation.run.excitation_kind == "sine"
@@ -63,11 +63,10 @@ def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:
                 for q in VECTOR_QUANTITIES
             ]
             film, static = np.linalg.norm(observation.film_force(mass)), np.linalg.norm(observation.mean("force"))
-            sizes = Sizes(observation.run, length[0], length[1], float(film), length[2], float(static))
-            measured.append((observation.report, sizes))
-    for report, run in measured:
-        check_sizes(report, run)
-        check_weight(report, [size for _, size in measured], mass, largest)
+            measured.append(Sizes(observation.report, length[0], length[1], float(film), length[2], float(static)))
+    for sizes in measured:
+        check_sizes(sizes)
+    check_weight(measured, mass, largest)
 
 
 def check_travel(observation: Observation, is_sine: bool) -> None:
@@ -84,30 +83,30 @@ def check_travel(observation: Observation, is_sine: bool) -> None:
             observation.report.ask("still", _STILL_PROBE / max(size, 1e-30), name, grave=grave, travel=size)
 
 
-def check_sizes(report: Reporter, run: Sizes) -> None:
+def check_sizes(sizes: Sizes) -> None:
     """A shaft that moves too little or too far, cells too soft or too stiff for springs."""
-    point, motion = run.run.point, run.motion
-    length = point.static_load * motion / run.film if run.film > 0 else math.nan
+    report, motion, acceleration = sizes.report, sizes.motion, sizes.acceleration
+    point = report.run.point
+    length = point.static_load * motion / sizes.film if sizes.film > 0 else math.nan
     little = _LITTLE_MOTION if length < _SHORTEST_FILM else _NO_MOTION
     if motion < little:
         report.ask("no motion", _LITTLE_MOTION / max(motion, 1e-30), motion=motion)
     bearing = max(_CLEARANCE_FLOOR, _CLEARANCE_RATIO * math.sqrt(point.static_load / _LEAST_PRESSURE))
     if length > min(bearing, _NO_CLEARANCE):
         report.ask("beyond clearance", length)
-    acceleration = run.acceleration
-    if run.is_carried and acceleration > 0:
-        stiffness = run.cells * point.excitation**2 / acceleration
+    if sizes.is_carried and acceleration > 0:
+        stiffness = sizes.cells * point.excitation**2 / acceleration
         report.ask("stiff cells", stiffness)
-        is_free = acceleration < _FREE_HOUSING * point.excitation**2 * motion
-        if not is_free:
+        if not acceleration < _FREE_HOUSING * point.excitation**2 * motion:
             report.ask("soft cells", point.static_load / max(stiffness, 1e-30))
 
 
-def check_weight(report: Reporter, measured: Sequence[Sizes], mass: float, largest: float) -> None:
+def check_weight(measured: Sequence[Sizes], mass: float, largest: float) -> None:
     """A stator that stands on its cells is made for the loads, and its inertia is no large part of their force."""
-    decides = any(run.is_carried and mass * run.acceleration > _INERTIA * run.cells for run in measured)
+    decides = any(sizes.is_carried and mass * sizes.acceleration > _INERTIA * sizes.cells for sizes in measured)
     ratio = mass * _GRAVITY / largest if largest > 0 else 0.0
-    report.ask("weight", ratio, grave="error" if decides else "warning", mass=mass, load=largest)
+    for sizes in measured:
+        sizes.report.ask("weight", ratio, grave="error" if decides else "warning", mass=mass, load=largest)
 
 
 def _check_rate(report: Reporter, run: Run) -> None:

@@ -16,7 +16,6 @@ from tpjb_ident.check.observation import Observation
 from tpjb_ident.estimate.arrowhead import free_force
 from tpjb_ident.estimate.equation import (
     Blocks,
-    Rig,
     Sensor,
     alive,
     axes_of,
@@ -27,15 +26,10 @@ from tpjb_ident.estimate.equation import (
     vector,
 )
 from tpjb_ident.estimate.scatter import Scatter
-from tpjb_ident.estimate.solve import Solution, Solver
+from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.phasors.run_data import by_channel
-from tpjb_ident.terms.axis import Axis
-from tpjb_ident.terms.corner import Corner
-from tpjb_ident.terms.delay import Delay
-from tpjb_ident.terms.gain import Gain
 from tpjb_ident.terms.housing import Housing
-from tpjb_ident.terms.registry import solved_as_learnt
-from tpjb_ident.terms.tilt import Tilt
+from tpjb_ident.terms.registry import solve, solved_as_learnt
 
 #: Degrees of freedom of a line's noise, and blocks that the terms need, at least.
 _FREEDOM, _MIN_BLOCKS = 60.0, 4
@@ -52,7 +46,7 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
 
     None where the lines are too few; `static`: cells show the static load.
     """
-    clear = [run for run in runs if "force" not in run.report.doubts and run.shows("force")]
+    clear = [run for run in runs if not run.report.cells_doubted and run.shows("force")]
     observations = tuple(run for run in clear for _ in run.lines.omega)
     if len(observations) < _MIN_BLOCKS:
         return None
@@ -63,12 +57,7 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
     if np.isfinite(start).all(axis=(1, 2)).sum() < _MIN_BLOCKS:
         return None
     shape = replace(shape, scatter=replace(Scatter.none(len(blocks), len(blocks)), together=True))
-
-    def solve(rig: Rig) -> Solution:
-        terms = [term(rig, blocks) for term in (Gain, Axis, Delay, Corner, Housing, Tilt)]
-        return Solver(rig, blocks, terms, start, shape).run()
-
-    solution = solved_as_learnt(rig, solve)
+    solution = solved_as_learnt(rig, lambda rig: solve(rig, blocks, start, shape))
     _check_accelerometers(observations, solution)
     return solution
 

@@ -7,14 +7,15 @@ Two probes and two cells serve all runs of a point. If one of them reads g times
 1 - 1/g of its own reading is too much there: at the excitation line, in what turns with the shaft, and in the mean load
 alike. Each of the three foretells the run by its fellows; the part is estimated from all of them, by generalised least
 squares: noise is what the fellows scatter by, and beside it stands what honest runs differ by: a bearing that answers a
-little softer or less damped, a load that misses its set point and moves the shaft as well, a shaft that is balanced a
-little otherwise. A gain is named where all evidence together leaves no room for chance, the excitation line shows it by
-itself, nothing contradicts it, and nothing else in the run is strange. The mean of the probe that is asked may have
-moved by anything.
+little softer or less damped, a load that misses its set point, a shaft that is balanced a little otherwise. A gain is
+named where all evidence together leaves no room for chance, the excitation line shows it by itself, nothing contradicts
+it, and nothing else in the run is strange. Mean positions tell nothing: that of the probe which is asked may have moved
+by anything, and a shaft wanders by more than a load some per cent off moves it.
 """
 
 import math
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -47,7 +48,7 @@ class PointRuns:
     """Readings of the n runs of one operating point, SI: of two probes and, as a rule, two cells."""
 
     phasors: ComplexArray  #: (n, 4)
-    means: FloatArray  #: (n, 4)
+    loads: FloatArray  #: (n, 4): means of the cells; NaN of the probes, which may have moved by anything
     inertia: ComplexArray  #: (n, 2), N: housing mass times acceleration, X and Y
     probe_plane: FloatArray  #: `probe_plane`, `cell_plane` (2, 2): from the two readings to X and Y
     cell_plane: FloatArray
@@ -111,7 +112,7 @@ def point_runs(observations: Sequence[Observation], mass: float) -> list[PointRu
         is_clear = not shaft_order(point.excitation_hz, point.shaft_speed_hz)
         is_clear &= observation.shows("force") and observation.shows("displacement")
         measured = np.array([observation.film_force(mass), observation.line("displacement")])
-        if is_clear and len(probes) == 2 and "force" not in observation.report.doubts and np.isfinite(measured).all():
+        if is_clear and len(probes) == 2 and not observation.report.cells_doubted and np.isfinite(measured).all():
             named = ((channel.name, channel.axis) for channel in [*probes, *observation.of("force")])
             groups.setdefault((point, *named), []).append(observation)
     return [_readings(group, mass) for group in groups.values()]
@@ -122,10 +123,11 @@ def _readings(runs: Sequence[Observation], mass: float) -> PointRuns:
     probes, cells = runs[0].of("displacement"), runs[0].of("force")
     places = [[*run.pick("displacement"), *run.pick("force")] for run in runs]
     rows = [(run.lines.phasor[k], run.lines.mean[k], run.shaft_line[k]) for run, k in zip(runs, places)]
-    phasors, means, turning = map(np.array, zip(*rows))
-    plane = plane_of(cells)
-    inertia = np.asarray([run.film_force(mass) for run in runs] - phasors[:, 2:] @ plane.T, dtype=complex)
-    return PointRuns(phasors, means, inertia, plane_of(probes), plane, turning, tuple(runs), (*probes, *cells))
+    phasors, loads, turning = map(np.array, zip(*rows))
+    loads[:, : len(probes)] = np.nan
+    inertia = np.nan_to_num(np.array([mass * run.line("acceleration") for run in runs], complex))
+    planes = plane_of(probes), plane_of(cells)
+    return PointRuns(phasors, loads, inertia, *planes, turning, tuple(runs), (*probes, *cells))
 
 
 def _film_like(stiffness: ComplexArray) -> float:
@@ -163,8 +165,8 @@ _MIN_RUNS, _MOST = 4, 1 / 3
 #: Stiffness, damping and static load of one run may differ from the others' by this share, one standard deviation:
 #: oil gets warmer, loads are set by hand; what turns with the shaft by the second.
 _HONEST, _HONEST_TURNING = 0.01, 0.005
-#: Least scatter that runs are credited with: phasors and mean loads as a share, mean positions [m].
-_LEAST_PHASOR, _LEAST_LOAD, _LEAST_POSITION = 1e-4, 1e-3, 10e-9
+#: Least scatter that the force of runs is credited with, as a share.
+_LEAST_PHASOR = 1e-4
 #: Probability at which chance is no explanation any more, for all runs of an operating point.
 _CHANCE = 1e-4
 #: The phasors must show the gain themselves, with this probability of chance at most.
@@ -179,9 +181,6 @@ _LEAST, _MOST_PART = 0.01, 0.9
 _AS_WELL = 2 * math.log(1e3)
 #: Variance of what is not known; keeps divisions by no information finite.
 _UNKNOWN, _NOTHING = 1e30, 1e-300
-#: Variance of a probe's mean that may have moved by anything [m^2], and what that must leave less of the squares: ln of
-#: the equations, times one more unknown.
-_ANYWHERE, _FREE = 1.0, 2.0
 #: Logarithm by which what turns with the shaft differs in one run, at one load and at others, over the median one, and
 #: runs that tell it.
 _SAME_LINE, _LIKE_LINE, _MANY_LINES, _MIN_LINES = 0.06, 0.5, 6.0, 5
@@ -229,13 +228,14 @@ def check_agreement(runs: PointRuns) -> None:
 def _miswired(runs: PointRuns, run: int, stiffness: ComplexArray) -> str:
     """The wiring fault of probes or cells that explains a run; "" where none does."""
     probes, cells = runs.channels[:2], runs.channels[2:]
-    tried = [(words, np.hstack([repair, np.eye(2)])) for words, repair in repairs(probes, scales=True)]
-    tried += [(words, np.hstack([np.eye(2), repair])) for words, repair in repairs(cells, scales=True)]
+    tried = [(words, np.array([repair, np.eye(2)])) for words, repair in repairs(probes, scales=True)]
+    tried += [(words, np.array([np.eye(2), repair])) for words, repair in repairs(cells, scales=True)]
+    inertia = runs.inertia[run]
 
     def unexplained(repair: FloatArray) -> float:
         # the inertia part of the force stays: only the cells are supposed to be at fault
-        force = repair[:, 2:] @ (runs.force - runs.inertia)[run] + runs.inertia[run]
-        answer = stiffness @ repair[:, :2] @ runs.displacement[run]
+        force = repair[1] @ (runs.force[run] - inertia) + inertia
+        answer = stiffness @ repair[0] @ runs.displacement[run]
         return float(np.linalg.norm(force - answer) / np.linalg.norm(force))
 
     return explanation(tried, unexplained, float(runs.misfits(stiffness)[run]) / 4)
@@ -283,32 +283,33 @@ def gain_of_run(runs: PointRuns, run: int, fellows: Sequence[int]) -> WrongGain 
     dynamic = dynamic_difference(runs, run, fellows, stiffness)
     if dynamic is None or len(runs.channels) != 4:
         return None
-    sources = dynamic, static_difference(runs, run, fellows, stiffness), turning_difference(runs, run, fellows)
+    loads, turning = runs.loads, runs.turning
+    load = np.linalg.norm(runs.cell_plane @ loads[fellows].mean(axis=0)[2:])
+    shown = size_difference(turning, _HONEST_TURNING * turning[fellows].mean(axis=0), run, fellows)
+    sources = dynamic, size_difference(loads, np.full(4, _HONEST * load), run, fellows), shown
     residual, noise, honest, spare = (np.array(values) for values in zip(*sources))
-    forces = np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]  # of every channel
-    tried = []
-    for channel, selector in enumerate(np.eye(4)):
-        is_probe = channel < 2
-        load = selector * runs.means[run] * (not is_probe)
-        pattern = np.array([_stacked(forces[:, channel]), load, selector * np.nan_to_num(runs.turning[run])])
-        covariance = noise + honest
-        covariance[1] += np.diag(selector * _ANYWHERE * is_probe)
-        weight = np.einsum("sab,sb->sa", np.linalg.inv(covariance), pattern)
-        scatter = np.einsum("sa,sab,sb->s", weight, noise, weight)
-        evidence = np.array([np.sum(weight * residual, axis=1), np.sum(weight * pattern, axis=1), scatter**2 / spare])
-        part, error, chance = _estimated(*evidence)
-        joint = _estimated(*evidence.sum(axis=1)).tolist()
-        remaining = residual - joint[0] * pattern
-        misfits = np.einsum("sa,sab,sb->s", remaining, np.linalg.inv(covariance), remaining)
-        is_consistent = np.all(np.abs(part - part[0]) <= _AGREE * np.hypot(error, error[0]))
-        if is_consistent and chance[0] <= _PHASORS_SHOW and part[0] <= _MOST_PART and misfits.max() <= 4 * _STRANGE:
-            tried.append((misfits.sum() + _FREE * is_probe, channel, joint))
-    least, _, (part, error, chance) = min(tried, default=(0.0, 0, (0.0, 0.0, 1.0)))
-    if abs(part) < _LEAST or chance > _CHANCE:
+    inverse = np.linalg.inv(noise + honest)
+    # what a part of a channel's own reading adds: (channel, source, row)
+    pattern = np.eye(4)[:, None] * np.nan_to_num([loads[run], loads[run], turning[run]])
+    pattern[:, 0] = _stacked(np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]).T
+    weight = np.einsum("sab,csb->csa", inverse, pattern)
+    scatter = np.einsum("csa,sab,csb->cs", weight, noise, weight)
+    evidence = np.array([np.sum(weight * residual, axis=2), np.sum(weight * pattern, axis=2), scatter**2 / spare])
+    part, error, chance = _estimated(*evidence)
+    joint = _estimated(*evidence.sum(axis=2))
+    remaining = residual - joint[0][:, None, None] * pattern
+    misfits = np.einsum("csa,sab,csb->cs", remaining, inverse, remaining)
+    is_consistent = np.all(np.abs(part - part[:, :1]) <= _AGREE * np.hypot(error, error[:, :1]), axis=1)
+    is_possible = is_consistent & (chance[:, 0] <= _PHASORS_SHOW) & (part[:, 0] <= _MOST_PART)
+    is_possible &= misfits.max(axis=1) <= 4 * _STRANGE
+    left = np.where(is_possible, misfits.sum(axis=1), np.inf)
+    order = np.argsort(left)
+    part, error, chance = joint[:, order[0]].tolist()
+    if not is_possible.any() or abs(part) < _LEAST or chance > _CHANCE:
         return None
-    alike = [channel for misfit, channel, _ in sorted(tried) if misfit < least + _AS_WELL]
+    alike = order[left[order] < left.min() + _AS_WELL]
     gain = 1 / (1 - part)
-    return WrongGain(tuple(alike), gain, gain**2 * error, chance)
+    return WrongGain(tuple(alike.tolist()), gain, gain**2 * error, chance)
 
 
 def _estimated(weighted: FloatArray, information: FloatArray, doubt: FloatArray) -> FloatArray:
@@ -352,39 +353,16 @@ def _changes(stiffness: ComplexArray, displacement: ComplexArray) -> FloatArray:
     return np.stack([_stacked(stiffness.real @ displacement), _stacked(1j * stiffness.imag @ displacement)], axis=1)
 
 
-def static_difference(runs: PointRuns, run: int, fellows: Sequence[int], stiffness: ComplexArray) -> Difference:
-    """Mean readings of `run` minus those of the others: probe, probe [m], cell, cell [N].
+def size_difference(sizes: FloatArray, honest: FloatArray, run: int, fellows: Sequence[int]) -> Difference:
+    """Sizes (n, 4) of `run` minus the others', by channel [m, N]; nothing where they are not told (NaN).
 
-    A load that misses its set point shows in the cells and, over the stiffness (2, 2) [N/m], in the probes; what
-    positions wander by besides is their scatter. Means tell nothing where the stiffness cannot carry a load.
+    `honest` (4,): by how much they may differ besides.
     """
-    means = runs.means[list(fellows)]
-    mean = means.mean(axis=0)
-    residual, others = runs.means[run] - mean, means - mean
-    if np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
-        return Difference(residual, np.zeros((4, 4)), _UNKNOWN * np.eye(4), 1)
-    compliance = np.linalg.inv(stiffness.real)
-    misses = others[:, 2:] @ runs.cell_plane.T
-    wander = others[:, :2] @ runs.probe_plane.T - misses @ compliance.T
-    spare = 2 * (len(means) - 1)
-    size = np.linalg.norm(runs.cell_plane @ mean[2:])
-    to_probes, to_cells = np.linalg.inv(runs.probe_plane), np.linalg.inv(runs.cell_plane)
-    by_load = np.vstack([to_probes @ compliance, to_cells])
-    by_place = np.vstack([to_probes, np.zeros((2, 2))])
-    squares = np.sum(misses**2) * by_load @ by_load.T + np.sum(wander**2) * by_place @ by_place.T
-    least = np.array([_LEAST_POSITION] * 2 + [max(_LEAST_LOAD * size, 1e-6)] * 2)
-    honest = (_HONEST * size) ** 2 * by_load @ by_load.T + np.diag(least**2)
-    return Difference(residual, (1 + 1 / len(means)) / spare * squares, honest, spare)
-
-
-def turning_difference(runs: PointRuns, run: int, fellows: Sequence[int]) -> Difference:
-    """Size of what turns with the shaft in `run` minus that in the others, by channel (4,) [m, N]."""
-    sizes = runs.turning[[run, *fellows]]
-    known = np.isfinite(sizes).all(axis=0)
-    size, *others = np.where(known, sizes, 0.0)
-    mean, scatter = np.mean(others, axis=0), (1 + 1 / len(others)) * np.var(others, axis=0, ddof=1)
-    honest = np.where(known, (_HONEST_TURNING * mean) ** 2 + _NOTHING, _UNKNOWN)
-    return Difference(size - mean, np.diag(scatter), np.diag(honest), len(others) - 1)
+    known = np.isfinite(sizes[[run, *fellows]]).all(axis=0)
+    size, *others = np.where(known, sizes, 0.0)[[run, *fellows]]
+    scatter = (1 + 1 / len(others)) * np.var(others, axis=0, ddof=1)
+    variance = np.where(known, honest**2 + _NOTHING, _UNKNOWN)
+    return Difference(size - np.mean(others, axis=0), np.diag(scatter), np.diag(variance), len(others) - 1)
 
 
 def _stacked(vector: ComplexArray) -> FloatArray:
@@ -394,33 +372,29 @@ def _stacked(vector: ComplexArray) -> FloatArray:
 
 def check_positions(runs: Sequence[Observation]) -> None:
     """Mean readings of the probes (gap voltage included) of dynamic runs, run against run."""
-
-    def middle(observation: Observation, place: int) -> float:
-        return float(observation.spread[1, place])
-
-    for name, observation, off in _outlying(runs, "run.point", middle, (_LEAST_STEP, _STEP, _MIN_STEPS)):
+    middles = [run.spread[1] for run in runs]
+    for name, observation, off in _outlying(runs, middles, "run.point", _LEAST_STEP, _STEP, _MIN_STEPS):
         observation.report.ask("step", 1.0, name, off=1e6 * off)
 
 
 def _outlying(
-    runs: Sequence[Observation],
-    alike: str,
-    value: Callable[[Observation, int], float],
-    limits: tuple[float, float, int],
+    runs: Sequence[Observation], values: Sequence[FloatArray], alike: str, least: float, many: float, count: int
 ) -> Iterator[tuple[str, Observation, float]]:
-    """Probe, run and distance from the median of probe and what is `alike` of values that lie `far` off."""
-    groups: dict[tuple[str, object], list[tuple[Observation, float]]] = {}
-    for observation in runs:
+    """Probe, run and distance from the median of probe and what is `alike` of values that lie `far` off.
+
+    `values` (m,) of every run, by channel; NaN where one tells nothing.
+    """
+    groups: dict[tuple[str, object], list[tuple[Observation, float]]] = defaultdict(list)
+    for observation, shown in zip(runs, values):
         for index in observation.pick("displacement"):
-            shown = value(observation, index)
-            if np.isfinite(shown):
+            if np.isfinite(shown[index]):
                 key = observation.channels[index].name, attrgetter(alike)(observation)
-                groups.setdefault(key, []).append((observation, shown))
-    for (name, _), values in groups.items():
-        off = np.array([shown for _, shown in values])
+                groups[key].append((observation, shown[index]))
+    for (name, _), members in groups.items():
+        off = np.array([shown for _, shown in members])
         off -= np.median(off)
-        for k in np.flatnonzero(far(np.abs(off), *limits)):
-            yield name, values[k][0], float(off[k])
+        for k in np.flatnonzero(far(np.abs(off), least, many, count)):
+            yield name, members[k][0], float(off[k])
 
 
 def check_shaft_lines(runs: Sequence[Observation]) -> None:
@@ -430,11 +404,8 @@ def check_shaft_lines(runs: Sequence[Observation]) -> None:
     """
     # what computed records without noise show beside their lines is rounding
     shown = [run for run in runs if len(run.shaft_line) and NO_NOISE not in run.report.keys]
-
-    def size(observation: Observation, place: int) -> float:
-        return math.log(max(np.nan_to_num(observation.shaft_line[place]), 1e-300))
-
+    sizes = [np.log(np.maximum(np.nan_to_num(run.shaft_line), _NOTHING)) for run in shown]
     for alike, least in (("run.point.static_key", _SAME_LINE), ("run.point.spin", _LIKE_LINE)):
-        for name, observation, off in _outlying(shown, alike, size, (least, _MANY_LINES, _MIN_LINES)):
+        for name, observation, off in _outlying(shown, sizes, alike, least, _MANY_LINES, _MIN_LINES):
             if f"shaft line {name}" not in observation.report.keys:
                 observation.report.ask("shaft line", math.exp(off), name)

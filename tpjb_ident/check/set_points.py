@@ -77,7 +77,7 @@ def _check_direction(observation: Observation, off: float) -> str:
     shown = math.remainder(set_point + off, 360.0)
     severity = observation.report.ask("load direction", abs(off), hint=hint, shown=shown, stated=set_point)
     if severity == "error":
-        observation.report.doubts.add("force")
+        observation.report.cells_doubted = True
     return severity
 
 
@@ -103,7 +103,7 @@ def check_speed(observation: Observation) -> None:
 def check_rotation(runs: Sequence[Observation]) -> None:
     """Warn where the 1X force clearly goes round against the stated sense of rotation."""
     for stated, other, sense in ((*ROTATIONS, 1.0), (*ROTATIONS[::-1], -1.0)):
-        alike = [r for r in runs if r.run.point.rotation == stated and "force" not in r.report.doubts]
+        alike = [r for r in runs if r.run.point.rotation == stated and not r.report.cells_doubted]
         clear = [r for r in alike if abs(r.shaft_force) > math.log(_ONE_WAY)]
         against = [r for r in clear if sense * r.shaft_force < 0.0]
         if len(against) >= max(_LEAST_RUNS, _AGREED * len(clear)):
@@ -127,8 +127,8 @@ def check_excitation(runs: Sequence[Observation], mass: float) -> None:
         if strength < least or not run.shows("force"):
             others = "".join(f"; there are {c.detail}" for c in run.conditions if c == _UNEXPECTED)
             run.report.ask("no excitation", stated=run.run.point.excitation_hz, others=others)
-            run.report.doubts.add("force")
-        elif "force" not in run.report.doubts and run.run.excitation_direction is not None:
+            run.report.cells_doubted = True
+        elif not run.report.cells_doubted and run.run.excitation_direction is not None:
             directed.append(run)
     _check_directions(directed, mass)
 
@@ -147,12 +147,12 @@ def _check_directions(runs: Sequence[Observation], mass: float) -> None:
     turned = [(run, turn) for run, turn, is_moved in zip(runs, turns, moved) if abs(turn) > _ALONG and not is_moved]
     hint = _miswired_cells(runs) if len(turned) >= _SEVERAL else ""
     for run in runs if hint else ():
-        run.report.doubts.add("force")  # the cells are wired wrongly in the other runs too
+        run.report.cells_doubted = True  # the cells are wired wrongly in the other runs too
     for run, turn in turned:
         stated = math.degrees(run.run.excitation_direction or 0.0)
         size = 90.0 if hint else abs(turn)
         if run.report.ask("excitation direction", size, hint=hint, shown=stated + turn, stated=stated) == "error":
-            run.report.doubts.add("force")
+            run.report.cells_doubted = True
 
 
 def _miswired_cells(runs: Sequence[Observation]) -> str:

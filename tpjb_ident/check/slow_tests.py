@@ -83,7 +83,7 @@ def _refuse(observation: Observation, record: DryRecord, problem: Problem) -> No
             report.ask("aside", 1.0, *names, hint=hint, grave=problem.severity, what=problem.what)
             return
     if hint and is_force:
-        report.doubts.add("force")
+        report.cells_doubted = True
     key = f"{problem.place}{hint}" if hint else problem.what
     report.note(key, problem.severity, problem.place, problem.what + hint, problem.cure)
 
@@ -93,7 +93,7 @@ def check_sweeps(runs: Sequence[Observation]) -> None:
     for observation in runs:
         before = len(observation.report.findings)
         _check_sweep(observation)
-        if len(observation.report.findings) > before or "force" in observation.report.doubts:
+        if len(observation.report.findings) > before or observation.report.cells_doubted:
             continue
         try:
             sweep_samples(live_run(observation.run))
@@ -133,7 +133,7 @@ def _gain(force: FloatArray, shaft: FloatArray) -> FloatArray | None:
 
 def _is_pushed(observation: Observation, gain: FloatArray) -> bool:
     """Whether `gain` (2, 2) [m/N] from force to displacement is positive definite, as it must be."""
-    if not np.any(gain) or "force" in observation.report.doubts:
+    if not np.any(gain) or observation.report.cells_doubted:
         return False
     if indefiniteness(gain) < 1 / _LEAST_DEFINITE:
         return True
@@ -148,7 +148,7 @@ def check_locus(runs: Sequence[Observation]) -> None:
     groups: dict[object, list[Observation]] = {}
     for run in runs:
         means = run.mean("force"), run.mean("displacement")
-        if np.isfinite(means).all() and len(run.of("displacement")) == 2 and "force" not in run.report.doubts:
+        if np.isfinite(means).all() and len(run.of("displacement")) == 2 and not run.report.cells_doubted:
             groups.setdefault((run.run.point.static_load, run.run.point.spin), []).append(run)
     for group in groups.values():
         loads, places = (np.array([run.mean(q) for run in group]) for q in ("force", "displacement"))

@@ -321,9 +321,6 @@ def free_force(D: ComplexArray, F: ComplexArray) -> tuple[Shape, ComplexArray]:
     size = np.maximum(np.linalg.norm(shown, axis=1), 1e-300)[:, None]
     across = shown.conj() / size
     start = np.where(usable[:, None, None], F[:, :, None] * (across / size)[:, None, :], np.nan)
-    columns = np.zeros((len(D), NUMBERS, 4))
-    for k in range(NUMBERS // 2):
-        i, part = k // 2, across[:, k % 2]
-        columns[:, k, i], columns[:, k, 2 + i] = part.real, -part.imag
-        columns[:, 4 + k, i], columns[:, 4 + k, 2 + i] = part.imag, part.real
+    forces = np.array([[1.0, 0.0], [0.0, 1.0], [1j, 0.0], [0.0, 1j]])
+    columns = np.stack([real_numbers(force[:, None] * across[:, None, :]) for force in forces], axis=2)
     return Shape(np.arange(len(D)), columns), start

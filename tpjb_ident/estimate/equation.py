@@ -39,7 +39,6 @@ class Sensor(Channel):
     """A channel as the equation knows it, with the axis that the campaign has; a run's own counts in its blocks."""
 
     corner_uncertainty: float = 0.0  #: Hz: of a low corner that nobody states, one deviation
-    out_of_step: bool = False  #: leads what the springs under the housing make of the cells' force
 
     def doubted(self, gain: float, turn: float = 0.0) -> Sensor:
         """The sensor, its gain and axis [rad] known no better than this."""
@@ -86,11 +85,13 @@ class Rig:
     to_set_point: bool = True  #: whether H is that at the set points, not at the runs' own loads
     #: of the clocks of devices, relative: put right in the readings before they became phasors
     rates: Mapping[str, float] = field(default_factory=dict)
+    #: whether accelerometers lead what the springs under the housing make of the cells' force
+    out_of_step: bool = False
 
     @property
-    def out_of_step(self) -> bool:
-        """Whether accelerometers lead what the springs under the housing make of the cells' force."""
-        return any(sensor.out_of_step for sensor in self.sensors)
+    def has_acceleration(self) -> bool:
+        """Whether accelerometers may tell the housing's acceleration."""
+        return len(self.of("acceleration")) > 1
 
     def of(self, quantity: str) -> IntArray:
         """Rows of the sensors of a quantity."""
@@ -198,7 +199,7 @@ def vector(rig: Rig, blocks: Blocks, quantity: str) -> ComplexArray:
 def film_force(rig: Rig, blocks: Blocks) -> ComplexArray:
     """X and Y of the force of the film (n, 2), without the housing's inertia where accelerometers measure it."""
     force = vector(rig, blocks, "force")
-    if len(rig.of("acceleration")) < 2:
+    if not rig.has_acceleration:
         return force
     return force + rig.mass * np.nan_to_num(vector(rig, blocks, "acceleration"))
 
@@ -351,12 +352,9 @@ def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
 
 def alive(sensors: Sequence[Sensor], size: FloatArray, least: float = _NOTHING) -> BoolArray:
     """Which sensors show something of what the largest of their quantity does, (m,); `size` (m,) of their phasors."""
-    largest: dict[str, float] = {}
-    for sensor, amplitude in zip(sensors, size.tolist()):
-        largest[sensor.quantity] = max(amplitude, largest.get(sensor.quantity, 0.0))
-    return np.array(
-        [amplitude > least * largest[sensor.quantity] for sensor, amplitude in zip(sensors, size)], dtype=bool
-    )
+    quantities, size = np.array([sensor.quantity for sensor in sensors]), np.nan_to_num(size)
+    largest = [size[quantities == quantity].max() for quantity in quantities]
+    return np.asarray(size > least * np.array(largest), dtype=bool)
 
 
 def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
@@ -385,12 +383,10 @@ def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated_mount: str | N
         return stated_mount
     rig = Rig(tuple(sensors), 1.0)
     carried = "cells" if _CARRIED[0] < abs(ratio) < _CARRIED[1] else "unknown"
-    if len(rig.of("acceleration")) < 2:
+    if not rig.has_acceleration:
         return carried
-    a = vector(rig, blocks, "acceleration")
-    d = vector(rig, blocks, "displacement")
-    force = vector(rig, blocks, "force")
-    usable = np.isfinite(a).all(axis=1) & np.isfinite(d).all(axis=1) & np.isfinite(force).all(axis=1)
+    d, force, a = (vector(rig, blocks, quantity) for quantity in VECTOR_QUANTITIES)
+    usable = np.isfinite(np.hstack([d, force, a])).all(axis=1)
     if not usable.any():
         return carried
     square = (blocks.omega[usable] ** 2)[:, None]

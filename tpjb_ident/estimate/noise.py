@@ -59,7 +59,7 @@ def housing_noise(rig: Rig, blocks: Blocks, motion: ComplexArray, misfit: Comple
     """
     usual = HOUSING_NOISE[rig.mount]
     size = np.linalg.norm(motion[:, 2:], axis=1)
-    if rig.mount == "unknown" or not np.any(size > 0) or len(rig.of("acceleration")) < 2:
+    if rig.mount == "unknown" or not np.any(size > 0) or not rig.has_acceleration:
         return usual
     rows = rig.of("acceleration")
     moving = size > 0

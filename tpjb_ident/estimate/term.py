@@ -14,7 +14,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Conditions
-from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, Sensor, State, film_change_rows
+from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, State, film_change_rows
 
 if TYPE_CHECKING:
     from tpjb_ident.estimate.solve import Solution
@@ -129,8 +129,8 @@ class Term:
         """What is left of the priors by what other terms have `fitted`, (q,): of parameters that no record tells."""
         return np.ones(len(self.parameters))
 
-    def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
-        """The sensors as uncertain as the records show them; None where they are as stated."""
+    def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
+        """The rig, its sensors as uncertain as the records show them; None where they are as stated."""
         return None
 
     def learnt(self, rig: Rig, solution: Solution) -> Rig:
@@ -139,10 +139,10 @@ class Term:
         What the term's test says of it stays said.
         """
         fitted = solution.fitted.get(self.name)
-        sensors = None if fitted is None else self.widened(rig.sensors, fitted)
-        if fitted is None or sensors is None:
+        widened = None if fitted is None else self.widened(rig, fitted)
+        if fitted is None or widened is None:
             return rig
-        return replace(rig, sensors=sensors, contradicted={**rig.contradicted, self.name: self.conditions(fitted)})
+        return replace(widened, contradicted={**rig.contradicted, self.name: self.conditions(fitted)})
 
     def standing_on(self, fitted: Fitted) -> ComplexArray | None:
         """Compliance of the springs under the housing (2, 2) [m/N], of the term that knows it."""

@@ -294,7 +294,7 @@ def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, 
         point = replace(run.point, excitation=2 * np.pi * frequency)
         observed = observe(replace(beginning, point=point), phasors, line)
         line_run = run if len(driven) == 1 else replace(run, point=point_of(run.point, frequency))
-        report = Reporter(line_run, observed.report.findings, observed.report.doubts)
+        report = Reporter(line_run, observed.report.findings, observed.report.cells_doubted)
         observations.append(replace(observed, run=line_run, report=report))
     return tuple(observations)
 

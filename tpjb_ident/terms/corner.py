@@ -12,7 +12,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, Conditions
-from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, State
+from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter
 
 #: Standard errors from which a corner is negative.
@@ -43,11 +43,11 @@ class Corner(Factor):
         """The high pass itself: its gain falls by half the square of the lead."""
         state.factor /= 1 - self.exponent(blocks) @ value
 
-    def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
+    def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
         """Accelerometers asked for theirs where the cells' is negative."""
-        if self.rig.out_of_step or not self.parameters or not fitted.value[0] < -fitted.deviation[0]:
+        if rig.out_of_step or not len(rig.of("acceleration")) or not fitted.value[0] < -fitted.deviation[0]:
             return None
-        return tuple(replace(s, out_of_step=s.quantity == "acceleration") for s in sensors)
+        return replace(rig, out_of_step=True)
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Accelerometers whose corner would have to be negative: something else turns them, no filter does."""

@@ -1,10 +1,12 @@
 """Gains of single sensors, as far as the manifest states their uncertainty: one number a sensor for the campaign."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition, Conditions
-from tpjb_ident.estimate.equation import Blocks, Rig, Sensor
+from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
 
 #: Difference of gains beyond any calibration: an axis, a sign or a cable is wrong.
@@ -39,12 +41,13 @@ class Gain(Factor):
             exponent[:, j, q] = blocks.calibration[:, j] == k
         return exponent
 
-    def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
+    def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
         """Gains of a quantity whose channels differ beyond what is stated, as uncertain as they differ."""
         spread = {}
         for quantity, values in self._differing(fitted).items():
             spread[quantity] = float(np.sqrt(np.sum(np.square(values)) / max(len(values) - 1, 1)))
-        return tuple(sensor.doubted(spread.get(sensor.quantity, 0.0)) for sensor in sensors) if spread else None
+        sensors = tuple(sensor.doubted(spread.get(sensor.quantity, 0.0)) for sensor in rig.sensors)
+        return replace(rig, sensors=sensors) if spread else None
 
     def _differing(self, fitted: Fitted) -> dict[str, list[float]]:
         """Gains by quantity, of those whose channels differ beyond what is stated."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, Conditions
-from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, State, film_force, housing_rows, vector
+from tpjb_ident.estimate.equation import Blocks, Rig, State, film_force, housing_rows, vector
 from tpjb_ident.estimate.term import OUT_OF_STEP, Fitted, Parameter, Term
 
 _NANOMETRE = 1e-9
@@ -55,10 +55,10 @@ class Housing(Term):
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
         self._omega = blocks.usual_omega
-        self._inertia = _inertia_share(rig, blocks)
+        self._inertia = rig.mass * _usual_ratio(blocks.z[:, rig.of("acceleration")], blocks.z[:, rig.of("force")])
         self._blocks = blocks
         usual, across, loss = _CELLS
-        if len(rig.of("acceleration")) < 2:
+        if not rig.has_acceleration:
             usual = 0.0  # the inertia stays in F, as is said of the point
         if rig.mount == "cells":
             self.sentence = "{p.name} of the cells {value:.3g} {p.unit} (standard error {error:.2g})"
@@ -71,11 +71,14 @@ class Housing(Term):
             )
         elif rig.mount == "unknown":
             self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
-        elif len(rig.of("acceleration")) > 1:
+        elif rig.has_acceleration:
             lag = Parameter("lag", "rad", _LOSS / 2 if rig.out_of_step else _SHAFT)
             differs = _PITCH if rig.out_of_step else _SHAFT
             entries = [Parameter(f"kappa_{name}", "1", differs) for name in ("xx", "xy", "yx", "yy")]
-            shaft = [Parameter(f"c_{name}", "nm/N", _shaft_compliance(rig, blocks)) for name in ("xx", "yy")]
+            # what lets the shaft move by its usual share, by the film's force per motion
+            ratio = _usual_ratio(vector(rig, blocks, "displacement"), film_force(rig, blocks))
+            compliance = _SHAFT * ratio / _NANOMETRE or 1.0
+            shaft = [Parameter(f"c_{name}", "nm/N", compliance) for name in ("xx", "yy")]
             self.parameters = (*entries, *shaft, lag)
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
@@ -121,7 +124,7 @@ class Housing(Term):
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
-        if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
+        if self.rig.mount == "unknown" or not self.rig.has_acceleration:
             return ()
         if self.is_on_foundation(fitted):
             return ()
@@ -170,31 +173,29 @@ class Housing(Term):
 
     def standing_on(self, fitted: Fitted) -> ComplexArray | None:
         """Compliance of the springs under the housing (2, 2) [m/N]; None where no accelerometer shows it."""
-        if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2 or self.is_on_foundation(fitted):
+        if self.rig.mount != "cells" or not self.rig.has_acceleration or self.is_on_foundation(fitted):
             return None
         return _compliance(fitted.value)
 
-    def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
+    def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
         """Cells, or probes of a floating stator, as uncertain in time as accelerometers lead them.
 
         A spring's loss is positive, late cells lower it. Accelerometers with which nothing else is wrong may have led
         by a corner of their own.
         """
-        is_stated = any(sensor.delay_uncertainty for sensor in sensors)
-        if is_stated or self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
+        is_stated = any(sensor.delay_uncertainty for sensor in rig.sensors)
+        if is_stated or rig.mount == "unknown" or not rig.has_acceleration:
             return None
         lag, error = float(fitted.value[-1]), float(fitted.deviation[-1])
         if not lag < -2 * error or self.is_on_foundation(fitted):
             return None
-        if self.rig.mount == "cells":
+        if rig.mount == "cells":
             compared, sound = "force", all(condition == OUT_OF_STEP for condition in self.conditions(fitted))
         else:
             compared, sound = "displacement", not (self._is_unexplained(fitted) or _otherwise(fitted, _GROSS))
-        widened = []
-        for s in sensors:
-            late = -lag / self._omega if s.quantity == compared else 0.0
-            widened.append(replace(s, delay_uncertainty=late, out_of_step=sound and s.quantity == "acceleration"))
-        return tuple(widened)
+        late = {compared: -lag / self._omega}
+        sensors = tuple(replace(s, delay_uncertainty=late.get(s.quantity, 0.0)) for s in rig.sensors)
+        return replace(rig, sensors=sensors, out_of_step=sound)
 
 
 def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
@@ -203,8 +204,6 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
     A foundation with a resonance does, wrong accelerometers do not; at the lowest frequencies it is a spring still.
     Single lines of a band, which `check` looks at, cannot tell: there it may be one.
     """
-    if len(rig.of("acceleration")) < 2:
-        return False
     force, acceleration = (vector(rig, blocks, quantity) for quantity in ("force", "acceleration"))
     x, y = (-(blocks.omega**2)[:, None] * force).T
     none = np.zeros_like(x)
@@ -246,12 +245,11 @@ def _kappa(value: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     return kappa, np.asarray(_NANOMETRE * np.diag(value[4:6]), complex)
 
 
-def _shaft_compliance(rig: Rig, blocks: Blocks) -> float:
-    """What lets the shaft of a floating stator move by its usual share, by the film's force per motion [nm/N]."""
-    motion = np.linalg.norm(vector(rig, blocks, "displacement"), axis=1)
-    force = np.linalg.norm(film_force(rig, blocks), axis=1)
-    usable = (motion > 0) & (force > 0)
-    return _SHAFT * float(np.median(motion[usable] / force[usable])) / _NANOMETRE if usable.any() else 1.0
+def _usual_ratio(first: ComplexArray, second: ComplexArray) -> float:
+    """Median ratio of the sizes of two vectors, (n, k) and (n, m); zero where no block shows both."""
+    above, below = (np.linalg.norm(vectors, axis=1) for vectors in (first, second))
+    shown = (above > 0) & (below > 0)
+    return float(np.median(above[shown] / below[shown])) if shown.any() else 0.0
 
 
 def _otherwise(fitted: Fitted, least: float) -> str:
@@ -279,13 +277,3 @@ def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> Cond
         f"filter; between the {sensors} and the housing there is none. State `delay` or `filter` of the channels"
     )
     return (Condition(OUT_OF_STEP, text),)
-
-
-def _inertia_share(rig: Rig, blocks: Blocks) -> float:
-    """Median share of the housing's inertia in the force."""
-    if len(rig.of("acceleration")) < 2:
-        return 0.0
-    inertia = rig.mass * np.linalg.norm(blocks.z[:, rig.of("acceleration")], axis=1)
-    force = np.linalg.norm(blocks.z[:, rig.of("force")], axis=1)
-    pushed = force > 0
-    return float(np.median(inertia[pushed] / force[pushed])) if pushed.any() else 0.0

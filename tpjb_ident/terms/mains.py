@@ -27,10 +27,12 @@ _LOCKED = 0.95
 _MIN_DIRECTIONS = 4
 #: Degrees of freedom with which the scatter seen at the other points is believed.
 _PRIOR_DOF = 8.0
-#: Starts about the plain fit, rounds in which they are run down, best ones that are polished, and their seed.
+#: Starts about the plain fit, rounds in which they are run down, best ones that are polished, in so many rounds at
+#: most, and their seed.
 _STARTS = 2000
 _SWEEPS = 25
 _POLISHED = 30
+_ROUNDS = 100
 _SEED = 5060
 
 
@@ -85,7 +87,7 @@ class MainsEquations:
 
     def h(self, x: FloatArray) -> ComplexArray:
         """H of the unknowns, (2, 2) [N/m]; `x` (8 + g m,)."""
-        return complex_matrix(x[:8]) * self.scale
+        return complex_matrix(self.entries(x))
 
     def entries(self, x: FloatArray) -> FloatArray:
         """The eight real entries of H [N/m]; `x` (8 + g m,)."""
@@ -99,22 +101,6 @@ class MainsEquations:
         """Weighted residuals, (4 g,); `x` (8 + g m,)."""
         r = (self.F - (self.D - self.vectors(x)) @ self.h(x).T) / self.sigma[:, None]
         return np.sqrt(2.0) * np.concatenate([r.real.ravel(), r.imag.ravel()])
-
-    def jacobian(self, x: FloatArray) -> FloatArray:
-        """D residual / d x, (4 g, 8 + g m); `x` (8 + g m,)."""
-        g, m = len(self.D), len(self.patterns)
-        h, clean = self.h(x), self.D - self.vectors(x)
-        slope = np.zeros((g, 2, 8 + g * m), dtype=complex)
-        columns = -self.scale * clean / self.sigma[:, None]
-        slope[:, 0, 0:2], slope[:, 1, 2:4] = columns, columns
-        slope[:, :, 4:8] = 1j * slope[:, :, 0:4]
-        turn = 1j * np.exp(1j * x[8:].reshape(g, m))
-        push = h @ self.patterns.T
-        rows = np.arange(g)
-        for k in range(m):
-            slope[rows, :, 8 + rows * m + k] = turn[:, k, None] * push[:, k] / self.sigma[:, None]
-        flat = slope.reshape(2 * g, -1)
-        return np.sqrt(2.0) * np.concatenate([flat.real, flat.imag])
 
     def start(self, h: ComplexArray) -> FloatArray:
         """Unknowns for a given H: the angles are those of what H leaves of the displacements; `h` (2, 2) [N/m]."""
@@ -135,7 +121,8 @@ class MainsEquations:
 
         minima: list[Minimum] = []
         for h in self._candidates():
-            fit = least_squares(self.residual, self.start(h), self.jacobian, method="lm", max_nfev=400)
+            start = self.start(h)
+            fit = least_squares(self.residual, start, method="lm", max_nfev=_ROUNDS * len(start))
             if fit.status <= 0 or any(np.abs(fit.x[:8] - m.x[:8]).max() < 1e-5 for m in minima):
                 continue
             normal = fit.jac.T @ fit.jac
@@ -159,7 +146,7 @@ class MainsEquations:
             clean = (self.D - np.exp(1j * self._angles(h)) @ self.patterns) * weight
             adjoint = np.swapaxes(clean, -1, -2).conj()
             h = np.swapaxes(np.linalg.solve(adjoint @ clean, adjoint @ (self.F * weight)), -1, -2)
-        remaining = (self.F - (self.D - np.exp(1j * self._angles(h)) @ self.patterns) @ np.swapaxes(h, -1, -2)) * weight
+        remaining = self.F * weight - clean @ np.swapaxes(h, -1, -2)
         cost = (np.abs(remaining) ** 2).sum(axis=(-1, -2))
         return h[_distinct(h, cost)]
 

@@ -47,8 +47,9 @@ class Mass(Additive):
 
     def learnt(self, rig: Rig, solution: Solution) -> Rig:
         """The rig, its mass as uncertain as the frequencies of a load contradict it; itself where they do not."""
-        compliance = solution.springs
-        return rig if compliance is None else _doubted(rig, solution, compliance)
+        compliance, numbers = solution.springs, solution.records.shape[1]
+        # a film that is left free tells no mass
+        return rig if compliance is None or numbers < NUMBERS else _doubted(rig, solution, compliance)
 
 
 def _doubted(rig: Rig, solution: Solution, compliance: ComplexArray) -> Rig:
