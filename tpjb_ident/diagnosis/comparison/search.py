@@ -202,10 +202,10 @@ class _Search:
         return again if again.posterior.total > fit.posterior.total - Deciding.better else fit
 
     def _reached(self, start: Start) -> Fit | None:
-        """Where a start leads, from each of its places that promises more than was reached."""
+        """Where a start leads, from each of its places that promises clearly more than was reached."""
         best: Fit | None = None
         for promise, linear in begun(self.run, self.problem, start):
-            if best is None or promise > best.posterior.total:
+            if best is None or promise > best.posterior.total + Deciding.better:
                 fit = self._led(start, linear)
                 best = fit if best is None else max(best, fit, key=lambda end: end.posterior.total)
         return best
