@@ -22,7 +22,6 @@ from tpjb_ident.bands.samples import Samples
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.lines import Line, LineSet
-from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.results.identification import frf_frame, models_frame
 from tpjb_ident.terms.distortion import band_change
 
@@ -40,11 +39,11 @@ def spectra(D, F, command=None, period=None) -> RunSpectra:
     none = np.zeros((windows, 4))
     z = np.concatenate([D, F], axis=2)
     point = OperatingPoint(5000.0, -np.pi / 2, 2 * np.pi * 22.0, 0.0)
-    phasors = RunPhasors("r", point, None, lines, np.zeros(windows), 10.0, CHANNELS, z, none, none, none, 0.0)
-    run = RunSpectra(phasors, command, np.zeros(n, bool), (), period, {})
+    of_band = {"command": command, "disturbed": np.zeros(n, bool), "disturbances": (), "period": period}
+    run = RunSpectra("r", point, None, lines, np.zeros(windows), 10.0, CHANNELS, z, none, none, none, 0.0, **of_band)
     place = np.arange(n)[:, None] % 7 - 3.0
     command = None if command is None else command * place
-    return replace(run, by_time=replace(run, phasors=replace(phasors, z=z * place), command=command))
+    return replace(run, by_time=replace(run, z=z * place, command=command))
 
 
 def bins(n: int, noise: float, seed: int, slope: float = 0.0) -> list[RunSpectra]:

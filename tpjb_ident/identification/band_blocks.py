@@ -78,8 +78,8 @@ def band_blocks(
         frequencies = point.frequencies.tolist()
         operating += [replace(point.point, excitation=2 * np.pi * round(f, 2)) for f in frequencies]
         for members in point.members:
-            spectra = [point.spectra[r] for r in members]
-            names = [s.phasors.run for s in spectra]
+            spectra = [point.runs[r] for r in members]
+            names = [s.run for s in spectra]
             warmth = temperatures.get(names[0], np.nan)
             channels = _described(spectra[0], sensors)
             row = channel_columns(channels, calibrations)
@@ -113,16 +113,16 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
     """What a film that is not linear may do to H, to every line (n_runs, n_bins, 2), and to lines run by run."""
     periodic = point.method == "periods"
     # two tones make nothing of one another that falls on them
-    pair = periodic and max(s.driven.sum() for s in point.spectra) < 3
+    pair = periodic and max(s.driven.sum() for s in point.runs) < 3
     # alike in all runs: more than the two that h needs do not average it away
-    repeats = np.sqrt(max(len(point.spectra), 2) / 2) if periodic and not pair and one_phase_set(point.spectra) else 0.0
-    film = film_products(point.spectra)
+    repeats = np.sqrt(max(len(point.runs), 2) / 2) if periodic and not pair and one_phase_set(point.runs) else 0.0
+    film = film_products(point.runs)
     change, scatter = film.change, film.scatter
     if not film.seen and not clearance:
         change, scatter = 0.0, np.zeros_like(scatter)
     elif not film.seen:
-        rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
-        one_sided = max(s.one_sided for s in point.spectra)
+        rms, peak = (max(getattr(s, name) for s in point.runs) / clearance for name in ("rms", "peak"))
+        one_sided = max(s.one_sided for s in point.runs)
         stated = band_change("pair" if pair else point.kind, rms, peak, one_sided)
         scatter = np.fmin(scatter, (line_scatter(rms) if film.even else stated) / np.sqrt(2))
         change = np.fmin(change, stated)
@@ -132,8 +132,8 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
 
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:
     """The run's channel of every sensor; None of one that it lacks, or that shows nothing beside its like."""
-    largest = np.abs(spectra.phasors.z).max(axis=(0, 1))
-    table = {(c.name, c.quantity): (c, size) for c, size in zip(spectra.phasors.channels, largest)}
+    largest = np.abs(spectra.z).max(axis=(0, 1))
+    table = {(c.name, c.quantity): (c, size) for c, size in zip(spectra.channels, largest)}
     described = [table.get((sensor.name, sensor.quantity), (None, 0.0)) for sensor in sensors]
     shown = alive(sensors, np.array([size for _, size in described]))
     return [channel if is_shown else None for (channel, _), is_shown in zip(described, shown)]
@@ -143,12 +143,12 @@ def _run_rows(
     point: BandPoint, runs: Sequence[RunSpectra], channels: Sequence[Channel | None], temperature: float
 ) -> list[list[dict[str, object]]]:
     """Columns of the responses of one run, group by group."""
-    names = [channel.name for channel in runs[0].phasors.channels]
+    names = [channel.name for channel in runs[0].channels]
     places = [-1 if channel is None else names.index(channel.name) for channel in channels]
     gain = np.array([1.0 if c is None else warm_gain(c, temperature) for c in channels])
     responses = [line_response(runs, bins, _INSTRUMENTS[point.method], point.open) for bins in point.bins]
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
-    time = 0.5 * len(runs[0].phasors.start) * runs[0].phasors.length
+    time = 0.5 * len(runs[0].start) * runs[0].length
     groups = []
     for response, noise, freedom in zip(responses, *pooled_noise(responses)):
         # a sensor without a channel has the last place, where there is nothing

@@ -35,6 +35,7 @@ from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means
+from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.results.linearity import FilmChange, film_change
 from tpjb_ident.runs.point_data import PointData, RunDigest
 from tpjb_ident.runs.static_load import StaticLoads, missed_load, static_loads
@@ -164,9 +165,9 @@ def unstated(campaign: Campaign) -> Conditions:
     return holding((names, "calibration-uncertainty-unstated", text))
 
 
-def run_temperatures(campaign: Campaign, measured: Iterable[tuple[str, Mapping[int, float]]]) -> dict[str, float]:
+def run_temperatures(campaign: Campaign, runs: Iterable[RunPhasors]) -> dict[str, float]:
     """Temperature at the probes by run [K]: as stated, else the mean of its thermometers."""
-    means = {run: float(np.mean(list(temperatures.values()))) for run, temperatures in measured if temperatures}
+    means = {run.run: float(np.mean(list(run.temperatures.values()))) for run in runs if run.temperatures}
     noted = {run.id: run.temperature for run in campaign.of_kind("dynamic") if run.temperature is not None}
     return means | noted
 
@@ -287,7 +288,7 @@ def solve_campaign(
 ) -> CampaignSolution:
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
     sensors = sensors_of(campaign)
-    temperatures = run_temperatures(campaign, [(digest.run, digest.temperatures) for digest in digests])
+    temperatures = run_temperatures(campaign, digests)
     common = MeansTask(sensors, temperatures=temperatures)
     loads = static_loads(campaign, points)
 
@@ -323,7 +324,7 @@ def solve_campaign(
 
 
 def _film(data: PointData, point: PointMeans) -> FilmChange:
-    lines = [digest.harmonics[line] for digest, line in zip(data.digests, data.lines) if digest.harmonics]
+    lines = [run.harmonics[line] for run, line in zip(data.runs, data.lines) if run.harmonics]
     return film_change(lines, point.start)
 
 

@@ -157,7 +157,7 @@ def assemble(
     finished, checked = check_finished(campaign, finished)
     digests = finished.digests
     dry = dry or DryTest()
-    gathered = gather([digest.phasors for digest in digests], digests)
+    gathered = gather(digests)
     report("estimating", 0, len(gathered))
     solved = solve_campaign(campaign, gathered, digests, workers, settings.correct, dry.stiffness)
     jobs = []
@@ -212,7 +212,7 @@ def identify_bands(
         if not points:
             raise excluded[0].error
         loads = static_loads(campaign, points)
-        temperatures = run_temperatures(campaign, [(s.phasors.run, s.temperatures) for p in points for s in p.spectra])
+        temperatures = run_temperatures(campaign, [run for point in points for run in point.runs])
         data = band_blocks(points, sensors, loads, temperatures, settings.clearance)
         known = {"bare": bare, "rates": rates, "to_set_point": settings.correct}
         return solve_bands(campaign_rig(campaign, loads.doubted(sensors), data.blocks, loads.common, **known), data)
@@ -223,7 +223,7 @@ def identify_bands(
     for b, point in enumerate(points):
         of_loads = solved.data.loads.conditions(b), check_conditions(checked, point.names)
         without = without_runs(point.point, excluded, any_excitation=True)
-        of_records = (spectra.phasors.conditions for spectra in point.spectra)
+        of_records = (run.conditions for run in point.runs)
         of_lines = solved.solution.conditions(), band_conditions(point, solved, b)
         quality = merged(*of_loads, without, *of_records, *of_lines)
         result, parts = _result(solved, b, quality, settings.clearance)
@@ -270,7 +270,7 @@ def _result(solved: BandSolution, b: int, quality: Conditions, clearance: float 
     by_noise = [replace(p, stiffness=replace(p.stiffness, dof=dof)) for p, dof in zip(points, free)]
     fits = fits_over_frequency(by_noise, _shared(solved, parts)[0])
     models, chosen = (fits[0].fits, fits[0].supported) if fits else ({}, "raw H")
-    figures = data.names, data.spectra[0].period, data.resolution, tuple(points)
+    figures = data.names, data.runs[0].period, data.resolution, tuple(points)
     return BandResult(data.point, data.kind, lines, models, chosen, quality, *figures), parts
 
 
@@ -292,11 +292,11 @@ def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float |
     point = solved.data.points[b]
     est, budget = _estimate(solved, solved.part, q, lines, f"band-{point.method}")
     inside = [solved.classic[k] for k in lines if solved.usable[k]]
-    amplitude = max(s.amplitude for s in point.spectra)
+    amplitude = max(s.amplitude for s in point.runs)
     film = FilmChange(float(solved.data.blocks.bent[lines[0]]))
     bent = change_conditions(film, budget, est, amplitude, clearance)
     return PointResult(
-        **of_runs(point, [s.temperatures for s in point.spectra]),
+        **of_runs(point),
         point=replace(point.point, excitation=2 * np.pi * round(est.omega / (2 * np.pi), 3)),
         stiffness=est,
         by_method={est.method: est},
@@ -321,7 +321,7 @@ def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> Condition
     alike, few = condition > ONE_LINE, len(usable) < max(_LEAST_LINES * len(driven), 1)
     one_line = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
     weak = f"{len(usable)} of {mine.sum()} lines stand {STRONG:g} times (F ratio) above the noise"
-    spectra = point.spectra[0]
+    spectra = point.runs[0]
     low, high = spectra.frequencies[0], spectra.frequencies[-1]
     held = [f"{d.name} {d.frequency:.4g} Hz" for d in spectra.disturbances if low <= d.frequency <= high]
     bare = solved.solution.rig.bare
@@ -330,7 +330,7 @@ def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> Condition
     coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0
     text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"
     return merged(
-        fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.spectra)),
+        fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.runs)),
         differing_runs(solved.run_scatter),
         holding(
             (alike, "fewer-than-two-directions", one_line),

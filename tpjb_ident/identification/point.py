@@ -144,7 +144,7 @@ def finished_point(settings: IdentifySettings, share: PointShare) -> PointResult
         share.checks,
     )
     return PointResult(
-        **of_runs(data, [digest.temperatures for digest in data.digests]),
+        **of_runs(data),
         point=data.point,
         stiffness=best,
         by_method=by_method,

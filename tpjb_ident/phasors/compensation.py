@@ -10,6 +10,7 @@ linear makes of the shaft's own motion stands at X - f and 2X - f, and is no ima
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -43,6 +44,10 @@ _ORDERS = {1: "held", 2: "interpolated", 4: "interpolated (splines)"}
 _EVEN = 3e-4
 #: Images to either side of a line that a spline's own factor is summed over.
 _IMAGES = 20
+
+
+#: Of any run.
+Phasors = TypeVar("Phasors", bound=RunPhasors)
 
 
 @dataclass(frozen=True)
@@ -169,9 +174,7 @@ def _filling_order(size: FloatArray, k: int) -> int | None:
     return order if abs(shown - order) < _AGREE * order else None
 
 
-def compensated(
-    result: RunPhasors, run: Run, slower: Mapping[str, SlowerChannel], delays: Mapping[str, float]
-) -> RunPhasors:
+def compensated(result: Phasors, run: Run, slower: Mapping[str, SlowerChannel], delays: Mapping[str, float]) -> Phasors:
     """The run's phasors as channels without filters, filling and delays would have given them.
 
     `delays` [s]: of whole quantities.

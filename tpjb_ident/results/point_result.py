@@ -118,15 +118,15 @@ def quality_cell(conditions: Sequence[str]) -> str:
     return "; ".join(conditions) or "ok"
 
 
-def of_runs(recorded: RunsOfPoint, temperatures: Sequence[dict[int, float]]) -> dict[str, Any]:
-    """What a point's result has of its runs, by name; `temperatures` of every run by pad [K]."""
+def of_runs(recorded: RunsOfPoint) -> dict[str, Any]:
+    """What a point's result has of its runs, by name."""
     positions, runs = recorded.mean_positions, len(recorded.names)
     error = positions.std(axis=0, ddof=1) / np.sqrt(runs) if runs > 1 else np.full(2, np.nan)
     return {
         "static_load_measured": float(np.abs(recorded.mean_loads.mean())),
         "position": positions.mean(axis=0),
         "position_se": error,
-        "temperatures": pad_means(temperatures),
+        "temperatures": pad_means([run.temperatures for run in recorded.runs]),
         "n_records": runs,
         "runs": recorded.names,
         "inertia_corrected": not recorded.inertia,

@@ -71,7 +71,7 @@ _NOT_OURS = (
 )
 #: Classes that a result is made of, field by field, and series of values.
 _RECORDS = (
-    RunDigest, RunPhasors, OperatingPoint, LineSet, Line, FilmLine,
+    RunDigest, OperatingPoint, LineSet, Line, FilmLine,
     Observation, RecordLines, Reporter, Finding, Problem,
 )  # fmt: skip
 _MADE: dict[str, Any] = {kind.__name__: kind for kind in (*_RECORDS, tuple, list, set)}
@@ -238,7 +238,7 @@ def _dead_accelerometers(digests: Sequence[RunDigest]) -> dict[str, Problem]:
     cure = "Check sensor, cable and amplifier; repeat the run"
     dead = {}
     for run in digests:
-        for condition in run.phasors.conditions:
+        for condition in run.conditions:
             if condition == _DEAD_ACCELEROMETER:
                 dead[run.run] = Problem("error", run.observations[0].run.file, "", condition.detail, cure, run.run)
     return dead if 2 * len(dead) < len(digests) else {}
@@ -279,8 +279,9 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDiges
         repairs = [f"{p.file}, {p.place}: {p.what}" for p in run.reader.problems() if p.severity == "warning"]
         repaired = holding((repairs, "record-damaged", "; ".join(repairs)))
         conditions = merged(phasors.conditions, dead, repaired)
-        result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(cached, phasors))
-        return digest(result, mean_temperatures(cached), run.sample_rate, observations)
+        phases, temperatures = shaft_phases(cached, phasors), mean_temperatures(cached)
+        result = replace(phasors, conditions=conditions, shaft_phase=phases, temperatures=temperatures)
+        return digest(result, run.sample_rate, observations)
 
 
 def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
