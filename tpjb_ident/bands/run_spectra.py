@@ -37,7 +37,7 @@ from tpjb_ident.bands.samples import (
 )
 from tpjb_ident.phasors.compensation import compensated, filled_channels
 from tpjb_ident.phasors.lines import Line, LineSet
-from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.phasors.run_data import SHORT, PhasorSettings, RunPhasors, beginning_of
 from tpjb_ident.runs.point_data import mean_temperatures
 
 #: Periods that a record must hold.
@@ -262,6 +262,7 @@ def run_spectra(
         slower = filled_channels(run)
         samples = read_samples(run, seconds, fast, band[1])
         temperatures = mean_temperatures(run)
+        temperature = beginning_of(run, SHORT).mean_temperature() or np.nan
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.lines.mains, band[1])
     cut, period = _period(run, samples, band, lines)
     length, width = (cut.length, LEFT_OUT) if period is None else (period, LEFT_OUT_OF_PERIOD)
@@ -287,6 +288,7 @@ def run_spectra(
             housing_mass,
             record.conditions,
             temperatures=temperatures,
+            temperature=temperature,
             command=None if record.command is None else _bins(record.command, length, places),
             disturbed=bins_taken(frequencies, lines, seconds, width),
             disturbances=lines,
@@ -320,7 +322,7 @@ def _turned(spectra: RunSpectra, samples: Samples, places: IntArray) -> RunSpect
 
 def _motion(samples: Samples) -> tuple[float, float, float]:
     """Rms and peak of the motion [m], and how far the drive goes to one side."""
-    motion = samples.vector("displacement")
+    motion = samples.plane("displacement", samples.rows.T).real.T
     size = np.linalg.norm(motion, axis=0)
     drive = motion if samples.command is None else samples.command
     along = np.linalg.eigh(drive @ drive.T)[1][:, -1] @ drive

@@ -20,7 +20,7 @@ from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
-from rigdata.vector import directions, inverse_directions
+from rigdata.vector import directions
 from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.line_fit import BAD_LIMIT, even_design, robust_deviation
@@ -60,11 +60,6 @@ class Samples(Directed):
     def length(self) -> int:
         """Samples per channel."""
         return int(self.rows.shape[1])
-
-    def vector(self, quantity: str) -> FloatArray:
-        """X and Y of a quantity, (2, n)."""
-        places = self.pick(quantity)
-        return inverse_directions(tuple(float(self.channels[j].axis or 0.0) for j in places)) @ self.rows[places]
 
     def signals(self) -> FloatArray:
         """Rows (k, n) about their means, each quantity of unit power: an idle channel weighs nothing beside others.

@@ -6,7 +6,7 @@ share one departure from the curve of K-C-M that is nearest to the band's lines:
 bend h within the part.
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,7 +26,6 @@ from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.estimate.term import worth_stating
 from tpjb_ident.identification.campaign_solution import channel_columns
-from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.runs.static_load import StaticLoads, missed_load
 from tpjb_ident.terms.distortion import band_change, line_scatter
 from tpjb_ident.terms.registry import solve, solved_as_learnt
@@ -64,7 +63,6 @@ def band_blocks(
     points: Sequence[BandPoint],
     sensors: tuple[Sensor, ...],
     loads: StaticLoads,
-    temperatures: Mapping[str, float],
     clearance: float | None,
 ) -> BandBlocks:
     """Responses of all runs."""
@@ -80,11 +78,10 @@ def band_blocks(
         for members in point.members:
             spectra = [point.runs[r] for r in members]
             names = [s.run for s in spectra]
-            warmth = temperatures.get(names[0], np.nan)
             channels = _described(spectra[0], sensors)
             row = channel_columns(channels, calibrations)
-            row |= {"run": len(runs), "temperature": warmth, "miss": missed_load(miss, members)}
-            for place, response in enumerate(_run_rows(point, spectra, channels, warmth)):
+            row |= {"run": len(runs), "temperature": spectra[0].temperature, "miss": missed_load(miss, members)}
+            for place, response in enumerate(_run_rows(point, spectra, channels)):
                 bins = point.bins[place]
                 at = {"point": first + place, "omega": 2 * np.pi * frequencies[place]}
                 at["uneven"] = uneven[members[0], bins].mean(axis=0)
@@ -140,12 +137,11 @@ def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel |
 
 
 def _run_rows(
-    point: BandPoint, runs: Sequence[RunSpectra], channels: Sequence[Channel | None], temperature: float
+    point: BandPoint, runs: Sequence[RunSpectra], channels: Sequence[Channel | None]
 ) -> list[list[dict[str, object]]]:
     """Columns of the responses of one run, group by group."""
     names = [channel.name for channel in runs[0].channels]
     places = [-1 if channel is None else names.index(channel.name) for channel in channels]
-    gain = np.array([1.0 if c is None else warm_gain(c, temperature) for c in channels])
     responses = [line_response(runs, bins, _INSTRUMENTS[point.method], point.open) for bins in point.bins]
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
     time = 0.5 * len(runs[0].start) * runs[0].length
@@ -153,9 +149,8 @@ def _run_rows(
     for response, noise, freedom in zip(responses, *pooled_noise(responses)):
         # a sensor without a channel has the last place, where there is nothing
         single = np.pad(noise + response.count * np.diag(least**2), (0, 1))[np.ix_(places, places)]
-        single = single / np.outer(gain, gain)
         covariance = np.asarray(single / response.count, complex)
-        z, slope = (np.pad(rows, ((0, 0), (0, 1)))[:, places] / gain for rows in (response.z, response.slope))
+        z, slope = (np.pad(rows, ((0, 0), (0, 1)))[:, places] for rows in (response.z, response.slope))
         row = {"noise": covariance, "dof": freedom, "time": time, "windows": response.repeats}
         moving = zip(z, slope, response.slope_size)
         groups.append([row | {"z": a, "slope": change, "slope_noise": single * size} for a, change, size in moving])

@@ -9,7 +9,6 @@ turn as the windows of sines do.
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -35,7 +34,6 @@ from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means
-from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.results.linearity import FilmChange, film_change
 from tpjb_ident.runs.point_data import PointData, RunDigest
 from tpjb_ident.runs.static_load import StaticLoads, missed_load, static_loads
@@ -165,21 +163,13 @@ def unstated(campaign: Campaign) -> Conditions:
     return holding((names, "calibration-uncertainty-unstated", text))
 
 
-def run_temperatures(campaign: Campaign, runs: Iterable[RunPhasors]) -> dict[str, float]:
-    """Temperature at the probes by run [K]: as stated, else the mean of its thermometers."""
-    means = {run.run: float(np.mean(list(run.temperatures.values()))) for run in runs if run.temperatures}
-    noted = {run.id: run.temperature for run in campaign.of_kind("dynamic") if run.temperature is not None}
-    return means | noted
-
-
 def campaign_blocks(
     points: Sequence[PointData],
     means: Sequence[PointMeans],
     misses: Sequence[ComplexArray],
     bent: FloatArray,
-    temperatures: Mapping[str, float],
 ) -> Blocks:
-    """Stack the runs of all points; `bent` (P,), `temperatures` [K] by run."""
+    """Stack the runs of all points; `bent` (P,)."""
     noises, freedoms = _pooled_noise(means, [data.runs[0].length for data in points])
     names: list[str] = []
     calibrations: list[list[Hashable]] = []
@@ -207,7 +197,7 @@ def campaign_blocks(
                 "slope_noise": (noises[p] + w.motion) / max(float(w.spread[g]), 1e-12),
                 "windows": w.count[g],
                 "time": w.time[g],
-                "temperature": temperatures.get(run.run, np.nan),
+                "temperature": run.temperature,
                 "miss": missed_load(miss, [g]),
                 "miss_error": error / load if load > 0 else _LOAD_ERROR,
                 "shaft": point.shaft[g],
@@ -264,11 +254,6 @@ class CampaignSolution:
     mains: dict[int, MainsFit] = field(default_factory=dict)  #: by point
     in_cells: dict[int, FloatArray] = field(default_factory=dict)  #: by point, (8, 8): mains in the cells
 
-    @cached_property
-    def misfits(self) -> FloatArray:
-        """Force of every block that H leaves, over its force, (n,)."""
-        return misfits(self.solution)
-
     @property
     def h(self) -> ComplexArray:
         """H of every point at the frequency found, (P, 2, 2) [N/m]."""
@@ -288,16 +273,14 @@ def solve_campaign(
 ) -> CampaignSolution:
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
     sensors = sensors_of(campaign)
-    temperatures = run_temperatures(campaign, digests)
-    common = MeansTask(sensors, temperatures=temperatures)
     loads = static_loads(campaign, points)
 
     def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> CampaignSolution:
-        task = replace(common, channels=sensors, rates=rates)
+        task = MeansTask(sensors, rates)
         means = tuple(workers.map(point_means, [(data,) for data in points], task))
-        film = tuple(_film(data, point) for data, point in zip(points, means))
+        film = tuple(film_change(data.film_lines, point.start) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])
-        blocks = campaign_blocks(points, means, loads.misses, bent, temperatures)
+        blocks = campaign_blocks(points, means, loads.misses, bent)
         rig = campaign_rig(
             campaign, loads.doubted(sensors), blocks, loads.common, bare=bare, rates=rates, to_set_point=correct
         )
@@ -321,11 +304,6 @@ def solve_campaign(
     D = vector(solution.rig, blocks, "displacement")
     in_cells = {p: force_pickup_spread(D[blocks.point == p], force) for p in on_line if force.any()}
     return replace(last, in_cells=in_cells)
-
-
-def _film(data: PointData, point: PointMeans) -> FilmChange:
-    lines = [run.harmonics[line] for run, line in zip(data.runs, data.lines) if run.harmonics]
-    return film_change(lines, point.start)
 
 
 def _mains(

@@ -23,7 +23,6 @@ from tpjb_ident.identification.band_blocks import ONE_LINE, STRONG, BandSolution
 from tpjb_ident.identification.campaign_solution import (
     RUN_TERMS,
     estimate_of,
-    run_temperatures,
     shared_changes,
     solve_campaign,
     solved_with_clocks,
@@ -212,8 +211,7 @@ def identify_bands(
         if not points:
             raise excluded[0].error
         loads = static_loads(campaign, points)
-        temperatures = run_temperatures(campaign, [run for point in points for run in point.runs])
-        data = band_blocks(points, sensors, loads, temperatures, settings.clearance)
+        data = band_blocks(points, sensors, loads, settings.clearance)
         known = {"bare": bare, "rates": rates, "to_set_point": settings.correct}
         return solve_bands(campaign_rig(campaign, loads.doubted(sensors), data.blocks, loads.common, **known), data)
 

@@ -1,4 +1,4 @@
-"""What the channels' electronics did to the phasors, taken out: filters, delays, slower sampling.
+"""What the channels' electronics did to the phasors, taken out: filters, delays, warmth, slower sampling.
 
 A channel sampled at f_s and written at a higher rate (filled up by a logger program) holds an image of all that it
 shows at f, noise too, at f_s - f and f_s + f, of size (f / (f_s -+ f))^n: n = 1 where values are held, 2 along straight
@@ -175,7 +175,7 @@ def _filling_order(size: FloatArray, k: int) -> int | None:
 
 
 def compensated(result: Phasors, run: Run, slower: Mapping[str, SlowerChannel], delays: Mapping[str, float]) -> Phasors:
-    """The run's phasors as channels without filters, filling and delays would have given them.
+    """The run's phasors as channels without filters, filling, delays and warmth would have given them.
 
     `delays` [s]: of whole quantities.
     """
@@ -191,6 +191,9 @@ def compensated(result: Phasors, run: Run, slower: Mapping[str, SlowerChannel], 
                 cure = "Extend filter_table, or check filter"
                 raise refuse(run.file, f"channel {channel.name}", f"{text}, or nothing comes through", cure, run.id)
             gains[:, k] *= np.where(unknown, 1.0, gain)  # 1 at disturbing lines that a table does not reach
+        if channel.temperature_reference is not None and not np.isnan(result.temperature):
+            warmer = result.temperature - channel.temperature_reference
+            gains[:, k] *= 1 + channel.temperature_coefficient * warmer
         if channel.name in slower:
             gains[:, k] *= slower[channel.name].at(frequencies)
     rates = ", ".join(f"{name} {_ORDERS[s.order]} from {s.rate:.4g} Hz" for name, s in slower.items())

@@ -123,6 +123,7 @@ class RunPhasors(Directed):
     residual: tuple[ComplexArray, ...] = ()
     rounding: FloatArray = field(default_factory=lambda: np.empty(0))  #: (n_channels,), SI^2: by it on a line, at most
     temperatures: dict[int, float] = field(default_factory=dict)  #: K: mean by pad
+    temperature: float = np.nan  #: K: at the probes, as stated, else the mean of the thermometers
 
     @cached_property
     def displacement(self) -> ComplexArray:

@@ -172,6 +172,11 @@ class PointData(RunsOfPoint):
         return self.point.excitation if abs(frequency - self.point.excitation_hz) < 1e-6 else 2 * np.pi * frequency
 
     @property
+    def film_lines(self) -> list[FilmLines | None]:
+        """What the film makes of the line in every run that says so."""
+        return [run.harmonics[line] for run, line in zip(self.runs, self.lines) if run.harmonics]
+
+    @property
     def whole(self) -> BoolArray:
         """Windows that have phasors of displacement and force, (n,)."""
         return np.asarray(np.isfinite(self.D).all(axis=1) & np.isfinite(self.F).all(axis=1))
