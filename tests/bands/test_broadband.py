@@ -64,7 +64,7 @@ def bins(n: int, noise: float, seed: int, slope: float = 0.0) -> list[RunSpectra
 
 def by_command(runs: list[RunSpectra], n: int) -> np.ndarray:
     """H of the runs' responses to their commands, one each."""
-    z = np.concatenate([line_response([run], np.arange(n), "command", ends=True).z for run in runs])
+    z = np.concatenate([line_response([run], np.arange(n), "iv", ends=True).z for run in runs])
     return np.linalg.solve(z[:, :2], z[:, 2:]).T
 
 
@@ -111,7 +111,7 @@ def test_a_quiet_record_that_begins_and_ends_in_motion_leaks_next_to_nothing(tmp
 def test_h_over_the_bins_of_a_response_may_slope(seed):
     runs = bins(12, 0.0, seed, slope=3.0)
     assert np.abs(by_command(runs, 12) - H).max() < 1e-9 * np.abs(H).max()
-    assert abs(line_response(runs[:1], np.arange(12), "command", ends=True).freedom - 8) < 1e-9
+    assert abs(line_response(runs[:1], np.arange(12), "iv", ends=True).freedom - 8) < 1e-9
 
 
 def test_noise_on_the_displacements_pulls_h1_down_and_leaves_the_command_s_estimate_alone():
@@ -133,7 +133,7 @@ def test_what_the_displacement_explains_is_h1():
     """Without an instrument the responses of both runs together give what analysers give."""
     runs = bins(60, 0.3, 4)
     classic = classic_line(runs, np.arange(60), ends=True).h
-    z = line_response(runs, np.arange(60), "displacement", ends=True).z
+    z = line_response(runs, np.arange(60), "hv", ends=True).z
     h = np.linalg.solve(z[:, :2], z[:, 2:]).T
     assert np.abs(h - classic["h1"]).max() < 0.05 * np.abs(H).max()
     assert classic["h1"][1, 1].real < classic["hv"][1, 1].real
@@ -155,7 +155,7 @@ def test_a_command_at_rest_is_no_source():
     command = np.stack([_complex(rng, 30), 0.01 * _complex(rng, 30)], axis=1)
     D = command[:, :1] * np.array([2e-6, 3e-7])
     run = spectra(D[None], (D @ H.T)[None], command[None])
-    assert line_response([run], np.arange(12), "command", ends=True).z.shape == (1, 4)
+    assert line_response([run], np.arange(12), "iv", ends=True).z.shape == (1, 4)
 
 
 @pytest.mark.slow

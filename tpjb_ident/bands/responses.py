@@ -46,20 +46,20 @@ class LineResponse:
     repeats: float  #: rows that tell it
 
 
-def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, ends: bool) -> LineResponse:
-    """Response over the bins of a line; `instrument` is "periods", "command" or "displacement".
+def line_response(runs: Sequence[RunSpectra], bins: IntArray, method: str, ends: bool) -> LineResponse:
+    """Response over the bins of a line; the `method` is "periods", "iv" by the command, or "hv" by the displacement.
 
     Runs are taken together where there is no instrument of their own: each moves the shaft along one line, and what it
     shows across that is noise.
     """
-    if instrument == "periods":
+    if method == "periods":
         rows, start = runs[0].z[:, bins[0]], runs[0].start
         n, mean, time = len(rows), rows.mean(axis=0), start - start.mean()
         remaining, spread = rows - mean, max(float(time @ time), 1e-300)
         slope, size = time @ remaining / spread, np.array([1 / spread])
         return LineResponse(mean[None], float(n), _outer(remaining), n - 1.0, slope[None], size, float(n))
     z = np.concatenate([run.z[0, bins] for run in runs])
-    sources = [_sources(run, instrument) for run in runs]
+    sources = [_sources(run, method) for run in runs]
     u, by_time = (np.concatenate([part[bins] for part in parts]) for parts in zip(*sources))
     return _regressed(z, u, by_time, nuisance(runs, bins, u, ends))
 
@@ -77,11 +77,11 @@ def nuisance(runs: Sequence[RunSpectra], bins: IntArray, sources: ComplexArray, 
     return np.concatenate([sloped, np.kron(np.eye(len(runs)), np.vander(place, 2, increasing=True))], axis=1)
 
 
-def _sources(run: RunSpectra, instrument: str) -> tuple[ComplexArray, ComplexArray]:
+def _sources(run: RunSpectra, method: str) -> tuple[ComplexArray, ComplexArray]:
     """What drives the run (n_bins, k), and its product with time [s] over the record."""
     assert run.by_time is not None
     parts = run, run.by_time
-    if instrument == "command":
+    if method == "iv":
         commands = [part.command[0] for part in parts if part.command is not None]
         # in directions in which the command acts: what rests would be noise alone
         power, along = np.linalg.eigh((commands[0].T @ commands[0].conj()).real)

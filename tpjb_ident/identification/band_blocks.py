@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.bands.film_products import film_products
 from tpjb_ident.bands.responses import BandPoint, ClassicLine, line_response, one_phase_set, pooled_noise
@@ -35,8 +34,6 @@ from tpjb_ident.terms.run_gain import RunGain
 STRONG = 10.0
 #: and coherence of the force with the displacements where nothing else tells signal from noise.
 _LEAST_COHERENCE = 0.5
-#: What is taken for the source of motion by method: without an instrument all noise is the force's.
-_INSTRUMENTS = {"periods": "periods", "iv": "command", "hv": "displacement"}
 #: Noise that responses have at least, of the run's largest: one without an instrument may have none.
 _LEAST = 1e-8
 
@@ -78,10 +75,11 @@ def band_blocks(
         for members in point.members:
             spectra = [point.runs[r] for r in members]
             names = [s.run for s in spectra]
-            channels = _described(spectra[0], sensors)
+            places = _places(spectra[0], sensors)
+            channels = [None if k < 0 else spectra[0].channels[k] for k in places]
             row = channel_columns(channels, calibrations)
             row |= {"run": len(runs), "temperature": spectra[0].temperature, "miss": missed_load(miss, members)}
-            for place, response in enumerate(_run_rows(point, spectra, channels)):
+            for place, response in enumerate(_run_rows(point, spectra, places)):
                 bins = point.bins[place]
                 at = {"point": first + place, "omega": 2 * np.pi * frequencies[place]}
                 at["uneven"] = uneven[members[0], bins].mean(axis=0)
@@ -127,29 +125,24 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
     return worth_stating(change + film.orbit), uneven, film.turning
 
 
-def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:
-    """The run's channel of every sensor; None of one that it lacks, or that shows nothing beside its like."""
-    largest = np.abs(spectra.z).max(axis=(0, 1))
-    table = {(c.name, c.quantity): (c, size) for c, size in zip(spectra.channels, largest)}
-    described = [table.get((sensor.name, sensor.quantity), (None, 0.0)) for sensor in sensors]
-    shown = alive(sensors, np.array([size for _, size in described]))
-    return [channel if is_shown else None for (channel, _), is_shown in zip(described, shown)]
+def _places(spectra: RunSpectra, sensors: Sequence[Sensor]) -> IntArray:
+    """Place of every sensor's channel in a run (m,); -1 of one that it lacks, or that shows nothing beside its like."""
+    named = {(channel.name, channel.quantity): k for k, channel in enumerate(spectra.channels)}
+    places = np.array([named.get((sensor.name, sensor.quantity), -1) for sensor in sensors])
+    largest = np.append(np.abs(spectra.z).max(axis=(0, 1)), 0.0)
+    return np.where(alive(sensors, largest[places]), places, -1)
 
 
-def _run_rows(
-    point: BandPoint, runs: Sequence[RunSpectra], channels: Sequence[Channel | None]
-) -> list[list[dict[str, object]]]:
-    """Columns of the responses of one run, group by group."""
-    names = [channel.name for channel in runs[0].channels]
-    places = [-1 if channel is None else names.index(channel.name) for channel in channels]
-    responses = [line_response(runs, bins, _INSTRUMENTS[point.method], point.open) for bins in point.bins]
+def _run_rows(point: BandPoint, runs: Sequence[RunSpectra], places: IntArray) -> list[list[dict[str, object]]]:
+    """Columns of the responses of one run, group by group; `places` (m,) of the sensors' channels."""
+    responses = [line_response(runs, bins, point.method, point.open) for bins in point.bins]
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
     time = 0.5 * len(runs[0].start) * runs[0].length
     groups = []
     for response, noise, freedom in zip(responses, *pooled_noise(responses)):
         # a sensor without a channel has the last place, where there is nothing
         single = np.pad(noise + response.count * np.diag(least**2), (0, 1))[np.ix_(places, places)]
-        covariance = np.asarray(single / response.count, complex)
+        covariance = single / response.count
         z, slope = (np.pad(rows, ((0, 0), (0, 1)))[:, places] for rows in (response.z, response.slope))
         row = {"noise": covariance, "dof": freedom, "time": time, "windows": response.repeats}
         moving = zip(z, slope, response.slope_size)

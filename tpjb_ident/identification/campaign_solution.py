@@ -7,7 +7,7 @@ rate explains the slopes of all runs; where the manifest states clocks, they are
 turn as the windows of sines do.
 """
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -32,7 +32,6 @@ from tpjb_ident.estimate.equation import (
 )
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.solve import Solution
-from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means
 from tpjb_ident.results.linearity import FilmChange, film_change
 from tpjb_ident.runs.point_data import PointData, RunDigest
@@ -349,23 +348,18 @@ def misfits(solution: Solution) -> FloatArray:
 RUN_TERMS = ("load miss", "load direction")
 
 
-def estimate_of(
-    solution: Solution, point: int, h: ComplexArray, omega: float, method: str, by_run: Sequence[str] = ()
-) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
-    """H (2, 2) of a point of a solve, and its covariances (8, 8) by source; what scatters `by_run` is random."""
+def covariances_of(
+    solution: Solution, point: int, by_run: Sequence[str] = ()
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Covariances (8, 8) of a point of a solve by source, random and shared ones; what scatters `by_run` is random."""
     shared = {name: share[point] for name, share in solution.shares.items() if np.any(share[point])}
     random = {"random": solution.records[point]}
-    random |= {name: shared.pop(name) for name in by_run if name in shared}
-    covariance, freedom = total(random.values()), solution.freedom(point)
-    estimate = DynamicStiffness(
-        h, omega, covariance, freedom, method, np.ones((1, 2)), systematic=total(shared.values())
-    )
-    return estimate, random | shared
+    return random | {name: shared.pop(name) for name in by_run if name in shared}, shared
 
 
-def total(covariances: Iterable[FloatArray]) -> FloatArray:
-    """Sum of covariances (8, 8)."""
-    return np.sum([np.zeros((8, 8)), *covariances], axis=0)
+def total(covariances: Mapping[str, FloatArray]) -> FloatArray:
+    """Sum of covariances (8, 8) by source."""
+    return np.sum([np.zeros((8, 8)), *covariances.values()], axis=0)
 
 
 def shared_changes(

@@ -22,10 +22,11 @@ from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.band_blocks import ONE_LINE, STRONG, BandSolution, band_blocks, solve_bands
 from tpjb_ident.identification.campaign_solution import (
     RUN_TERMS,
-    estimate_of,
+    covariances_of,
     shared_changes,
     solve_campaign,
     solved_with_clocks,
+    total,
     unstated,
 )
 from tpjb_ident.identification.point import SOLVED, finished_point, point_share
@@ -250,11 +251,13 @@ def _estimate(
     Without an instrument all noise was the force's: H is in the middle of H1 and H2, as uncertain as a rectangle.
     """
     k, half = lines[len(lines) // 2], solved.bracket(lines)
-    est, budget = estimate_of(solution, group, solution.h[k] + half, float(solved.data.omega[k]), method)
+    random, shared = covariances_of(solution, group)
     if half.any():
-        budget[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
-        est = replace(est, systematic=est.systematic + budget[_BRACKET])
-    return replace(est, condition=float(np.median(solved.condition[lines]))), budget
+        shared[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
+    about = float(solved.data.omega[k]), total(random), solution.freedom(group), method, np.ones((1, 2))
+    condition = float(np.median(solved.condition[lines]))
+    est = DynamicStiffness(solution.h[k] + half, *about, condition=condition, systematic=total(shared))
+    return est, random | shared
 
 
 def _result(solved: BandSolution, b: int, quality: Conditions, clearance: float | None) -> tuple[BandResult, list[int]]:

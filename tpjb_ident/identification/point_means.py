@@ -91,7 +91,7 @@ def _residual_density(
     if means is not None:
         bins = bins - motion_in(bins, np.ones(len(bins)), means.mean, film)
     freedom = float(len(bins))
-    return np.asarray(bins.T @ bins.conj() / max(freedom, 1.0), complex), freedom
+    return bins.T @ bins.conj() / max(freedom, 1.0), freedom
 
 
 def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple[ComplexArray, Conditions]:
