@@ -180,10 +180,9 @@ ONE_LINE = 1e6
 
 
 @dataclass(frozen=True, repr=False)
-class BandSolution:
-    """All bands of a campaign; L lines."""
+class BandSolution(BandBlocks):
+    """All bands of a campaign, solved."""
 
-    data: BandBlocks
     solution: Solution  #: of the lines
     usable: BoolArray  #: (L,): lines that the excitation tells
     parts: tuple[IntArray, ...]  #: lines of every part: h is that at the middle one
@@ -194,15 +193,15 @@ class BandSolution:
     @cached_property
     def classic(self) -> list[ClassicLine]:
         """All lines by the methods of analysers."""
-        return [line for point in self.data.points for line in point.classic]
+        return [line for point in self.points for line in point.classic]
 
     def usable_of(self, b: int) -> IntArray:
         """Lines of a band with an answer."""
-        return np.flatnonzero(self.usable & (self.data.band == b))
+        return np.flatnonzero(self.usable & (self.band == b))
 
     def bracket(self, lines: IntArray) -> ComplexArray:
         """Half of what H2 lies above H1 at some lines (2, 2) [N/m], between which H is if nothing tells noise."""
-        blind = [k for k in lines if self.usable[k] and self.data.points[self.data.band[k]].method == "hv"]
+        blind = [k for k in lines if self.usable[k] and self.points[self.band[k]].method == "hv"]
         halves = [0.5 * (self.classic[k].h["h2"] - self.classic[k].h["h1"]) for k in blind]
         return np.mean([*halves], axis=0) if halves else np.zeros((2, 2), complex)
 
@@ -216,7 +215,10 @@ def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
     away = np.abs(lines.h - crude).max(axis=(1, 2))
     usable &= away < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
     parts = _parts(data, used, usable)
-    return BandSolution(data, lines, usable, parts, _part_solution(data, lines, parts, usable), condition, size)
+    part = _part_solution(data, lines, parts, usable)
+    return BandSolution(
+        **vars(data), solution=lines, usable=usable, parts=parts, part=part, condition=condition, run_scatter=size
+    )
 
 
 def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Solution, float]:

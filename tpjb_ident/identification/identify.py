@@ -218,9 +218,9 @@ def identify_bands(
 
     solved = solved_with_clocks(sensors_of(campaign), min(run.sample_rate for run in runs), solve)
     results, numbers = [], []
-    points = solved.data.points
+    points = solved.points
     for b, point in enumerate(points):
-        of_loads = solved.data.loads.conditions(b), check_conditions(checked, point.names)
+        of_loads = solved.loads.conditions(b), check_conditions(checked, point.names)
         without = without_runs(point.point, excluded, any_excitation=True)
         of_records = (run.conditions for run in point.runs)
         of_lines = solved.solution.conditions(), band_conditions(point, solved, b)
@@ -254,7 +254,7 @@ def _estimate(
     random, shared = covariances_of(solution, group)
     if half.any():
         shared[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
-    about = float(solved.data.omega[k]), total(random), solution.freedom(group), method, np.ones((1, 2))
+    about = float(solved.omega[k]), total(random), solution.freedom(group), method, np.ones((1, 2))
     condition = float(np.median(solved.condition[lines]))
     est = DynamicStiffness(solution.h[k] + half, *about, condition=condition, systematic=total(shared))
     return est, random | shared
@@ -262,9 +262,9 @@ def _estimate(
 
 def _result(solved: BandSolution, b: int, quality: Conditions, clearance: float | None) -> tuple[BandResult, list[int]]:
     """Lines, models and points of one band, and the numbers of its parts."""
-    data, usable = solved.data.points[b], solved.usable_of(b)
+    data, usable = solved.points[b], solved.usable_of(b)
     lines = tuple(_line(solved, data, int(k)) for k in usable)
-    parts = [q for q, part in enumerate(solved.parts) if solved.data.band[part[0]] == b and len(usable)]
+    parts = [q for q, part in enumerate(solved.parts) if solved.band[part[0]] == b and len(usable)]
     points = [_point(solved, q, quality, clearance) for q in parts]
     # what runs scatter by is one for all parts: no chance between them
     free = [np.full(8, solved.part.noise_freedom(q)) for q in parts]
@@ -289,12 +289,12 @@ def _line(solved: BandSolution, point: BandPoint, k: int) -> BandLine:
 def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float | None) -> PointResult:
     """One part of a band as a point: its lines alone tell its h; K-C-M only says how h changes within it."""
     lines = solved.parts[q]
-    b = int(solved.data.band[lines[0]])
-    point = solved.data.points[b]
+    b = int(solved.band[lines[0]])
+    point = solved.points[b]
     est, budget = _estimate(solved, solved.part, q, lines, f"band-{point.method}")
     inside = [solved.classic[k] for k in lines if solved.usable[k]]
     amplitude = max(s.amplitude for s in point.runs)
-    film = FilmChange(float(solved.data.blocks.bent[lines[0]]))
+    film = FilmChange(float(solved.blocks.bent[lines[0]]))
     bent = change_conditions(film, budget, est, amplitude, clearance)
     return PointResult(
         **of_runs(point),
@@ -307,7 +307,7 @@ def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float |
         amplitude=amplitude,
         quality=merged(quality, physics(est, point.inertia), bent),
         rejected=(),
-        load_miss=solved.data.loads.misses[b],
+        load_miss=solved.loads.misses[b],
         clearance=clearance,
         budget=budget,
         scattering=("random",),
@@ -316,8 +316,8 @@ def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float |
 
 def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> Conditions:
     """What the lines of one band say, and its runs beside each other."""
-    mine = solved.data.band == b
-    driven, usable = np.flatnonzero(mine & solved.data.driven), solved.usable_of(b)
+    mine = solved.band == b
+    driven, usable = np.flatnonzero(mine & solved.driven), solved.usable_of(b)
     condition = float(np.median(solved.condition[driven])) if len(driven) else 0.0
     alike, few = condition > ONE_LINE, len(usable) < max(_LEAST_LINES * len(driven), 1)
     one_line = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
@@ -326,7 +326,7 @@ def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> Condition
     low, high = spectra.frequencies[0], spectra.frequencies[-1]
     held = [f"{d.name} {d.frequency:.4g} Hz" for d in spectra.disturbances if low <= d.frequency <= high]
     bare = solved.solution.rig.bare
-    unknown = int((~bare.known(solved.data.omega[usable])).sum()) if len(bare.omega) else 0
+    unknown = int((~bare.known(solved.omega[usable])).sum()) if len(bare.omega) else 0
     blind = point.method == "hv" and len(usable) > 0
     coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0
     text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"
