@@ -1,6 +1,6 @@
 """A campaign's dynamic runs to dynamic coefficients: the whole path, point by point; runs over a band by their own."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -105,42 +105,40 @@ def identify(
     solver, _ = method_of(settings.method)
     dry = dry_test(campaign, settings.phasors, SOLVED if solver == "iv" else solver)  # it has no command
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
-    bands = None
+    parts = []
     if any(is_broadband(run) for run in runs):
-        bands = identify_bands(campaign, settings, report, dry.stiffness)
-    identification = Identification(campaign.id, settings.method, (), np.zeros((1, 0)))
+        parts.append(identify_bands(campaign, settings, report, dry.stiffness))
     if sines.of_kind("dynamic"):
         finished = all_runs(sines, settings.phasors, report, workers, store)
-        identification = assemble(sines, finished, settings, report, workers, dry)
-    return _doubted(identification if bands is None else _joined(identification, bands), campaign)
+        parts.insert(0, assemble(sines, finished, settings, report, workers, dry))
+    return _joined(campaign, parts)
 
 
-def _doubted(identification: Identification, campaign: Campaign) -> Identification:
-    """Points that other frequencies contradict; positions are as uncertain as the probes' stated zeros."""
-    zero = zero_uncertainty(campaign.channels.values(), "displacement")
-    points = with_frequency_outliers(identification.points)
-    return replace(identification, points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in points))
+def _joined(campaign: Campaign, parts: Sequence[Identification]) -> Identification:
+    """The points of sines and those of bands together, sorted; sources of one name are one source.
 
-
-def _joined(sines: Identification, bands: Identification) -> Identification:
-    """The points of sines and those of bands together, sorted as ever; sources of one name are one source."""
-    points = [*sines.points, *bands.points]
-    names = tuple(dict.fromkeys((*sines.calibration_names, *bands.calibration_names)))
-    changes = np.zeros((max(len(names), 1), len(points), 8))
-    for part, places in ((sines, slice(len(sines.points))), (bands, slice(len(sines.points), None))):
+    Points that other frequencies contradict say so; positions are as uncertain as the probes' stated zeros.
+    """
+    points = [point for part in parts for point in part.points]
+    names = tuple(dict.fromkeys(name for part in parts for name in part.calibration_names))
+    changes, stop = np.zeros((max(len(names), 1), len(points), 8)), 0
+    for part in parts:
+        first, stop = stop, stop + len(part.points)
         scale = np.sqrt(len(changes) / max(len(part.calibration_names), 1))
         for name, row in zip(part.calibration_names, part.calibration_changes):
-            changes[names.index(name), places] = scale * row.reshape(-1, 8)
+            changes[names.index(name), first:stop] = scale * row.reshape(-1, 8)
     order = sorted(range(len(points)), key=lambda i: points[i].point)
-    conditions = {condition.sentence(): condition for condition in (*sines.conditions, *bands.conditions)}
+    zero = zero_uncertainty(campaign.channels.values(), "displacement")
+    checked = with_frequency_outliers([points[i] for i in order])
+    conditions = {condition.sentence(): condition for part in parts for condition in part.conditions}
     return replace(
-        sines,
-        points=tuple(points[i] for i in order),
+        parts[0],
+        points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in checked),
         calibration_changes=changes[:, order].reshape(len(changes), -1),
         conditions=tuple(conditions.values()),
-        bands=bands.bands,
+        bands=parts[-1].bands,
         calibration_names=names,
-        cell_stiffness=sines.cell_stiffness or bands.cell_stiffness,
+        cell_stiffness=parts[0].cell_stiffness or parts[-1].cell_stiffness,
     )
 
 
