@@ -171,7 +171,7 @@ def campaign_blocks(
     """Stack the runs of all points; `bent` (P,)."""
     noises, freedoms = _pooled_noise(means, [data.runs[0].length for data in points])
     names: list[str] = []
-    calibrations: list[list[Hashable]] = []
+    calibrations: list[list[Hashable]] = [[] for _ in means[0].channels[0]]
     rows: list[dict[str, Any]] = []
     for p, (data, point, miss) in enumerate(zip(points, means, misses)):
         w = point.means
@@ -179,7 +179,6 @@ def campaign_blocks(
             if w is None or not w.count[g] > 0:
                 continue
             channels = point.channels[g]
-            calibrations = calibrations or [[] for _ in channels]
             load, loads = data.point.static_load, run.means("force")
             loads = loads[np.isfinite(loads).all(axis=1)]
             # standard error of the size of the run's mean cell force
@@ -203,7 +202,7 @@ def campaign_blocks(
             }
             names.append(run.run)
             rows.append(row)
-    return stacked([data.point for data in points], names, len(means[0].channels[0]), rows, bent)
+    return stacked([data.point for data in points], names, len(calibrations), rows, bent)
 
 
 def channel_columns(channels: Sequence[Channel | None], tables: list[list[Hashable]]) -> dict[str, Any]:

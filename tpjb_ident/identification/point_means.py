@@ -119,23 +119,19 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
     What clocks run ahead is off it.
     """
     z = np.full((len(data.run_index), len(task.channels)), np.nan + 0j)
-    described: list[dict[int, Channel]] = []
     for g, (run, line) in enumerate(zip(data.runs, data.lines)):
-        named = {(channel.name, channel.quantity): channel for channel in run.channels}
         phasors = by_channel(run.z[:, line], run.channels, task.channels)
         least = _LEAST_WINDOWS * np.isfinite(run.z[:, line]).mean(axis=0).max(initial=0.0)
-        described.append({})
         # in more than a share of the windows, and not zeros throughout
         usable = (np.isfinite(phasors).mean(axis=0) > least) & np.nan_to_num(phasors).any(axis=0)
-        for j in np.flatnonzero(usable).tolist():
-            described[g][j] = named[task.channels[j].name, task.channels[j].quantity]
-            z[data.run_index == g, j] = phasors[:, j]
+        z[data.run_index == g] = np.where(usable, phasors, np.nan)
     # channels that show nothing of what others of their quantity do
     z[:, ~alive(task.channels, np.abs(np.nan_to_num(z)).max(axis=0, initial=0.0))] = np.nan
     living = []
-    for g, channels in enumerate(described):
-        shown = np.isfinite(z[data.run_index == g]).any(axis=0)
-        living.append(tuple(channels.get(j) if is_shown else None for j, is_shown in enumerate(shown)))
+    for g, run in enumerate(data.runs):
+        named = {(channel.name, channel.quantity): channel for channel in run.channels}
+        shown = zip(task.channels, np.isfinite(z[data.run_index == g]).any(axis=0))
+        living.append(tuple(named[sensor.name, sensor.quantity] if is_shown else None for sensor, is_shown in shown))
     # how far the devices' clocks have run ahead
     rates = [task.rates.get(sensor.clock, 0.0) for sensor in task.channels]
     omega = 2 * np.pi * np.array([r.lines.driven[i] for r, i in zip(data.runs, data.lines)])
