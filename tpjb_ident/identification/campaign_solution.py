@@ -9,6 +9,7 @@ turn as the windows of sines do.
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -251,6 +252,11 @@ class CampaignSolution:
     mains_shift: ComplexArray  #: (n, m), SI: pick-up taken off the blocks' readings
     mains: dict[int, MainsFit] = field(default_factory=dict)  #: by point
     in_cells: dict[int, FloatArray] = field(default_factory=dict)  #: by point, (8, 8): mains in the cells
+
+    @cached_property
+    def misfits(self) -> FloatArray:
+        """Force of every block that H leaves, over its force, (n,)."""
+        return misfits(self.solution)
 
     @property
     def h(self) -> ComplexArray:

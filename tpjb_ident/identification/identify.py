@@ -45,7 +45,6 @@ from tpjb_ident.runs.run_jobs import (
     all_runs,
     campaign_verdicts,
     check_conditions,
-    check_finished,
     dry_test,
 )
 from tpjb_ident.runs.static_load import static_loads
@@ -152,7 +151,8 @@ def assemble(
 ) -> Identification:
     """Estimate all points from runs already turned to phasors."""
     workers = workers or Workers()
-    finished, checked = check_finished(campaign, finished)
+    checked = campaign_verdicts(campaign, [seen for digest in finished.digests for seen in digest.observations])
+    finished = finished.without(checked.unusable)
     digests = finished.digests
     dry = dry or DryTest()
     gathered = gather(digests)

@@ -10,7 +10,7 @@ from tpjb_ident.conditions import Conditions, holding, merged
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, method_of, not_locked
 from tpjb_ident.estimators.r_matrix import phasor_table
 from tpjb_ident.estimators.stiffness import DynamicStiffness
-from tpjb_ident.identification.campaign_solution import RUN_TERMS, CampaignSolution, covariances_of, misfits, total
+from tpjb_ident.identification.campaign_solution import RUN_TERMS, CampaignSolution, covariances_of, total
 from tpjb_ident.identification.point_means import channel_windows, means_attenuation, vectors
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.run_data import RunPhasors, complex_median
@@ -76,7 +76,7 @@ def _without_shaft(run: RunPhasors) -> RunPhasors:
 
 
 def _conditions(solved: CampaignSolution, p: int) -> Conditions:
-    counted = misfits(solved.solution)[solved.solution.blocks_of(p) & (solved.solution.scatter.weights > 0)]
+    counted = solved.misfits[solved.solution.blocks_of(p) & (solved.solution.scatter.weights > 0)]
     # two runs fix H: what is left over is shared by all of them
     share = np.sqrt(np.sum(counted**2) / (len(counted) - 2)) if len(counted) > 2 else 0.0
     conditions = [*differing_runs(float(share)), *solved.loads.conditions(p), *solved.solution.conditions()]

@@ -329,17 +329,10 @@ _STATIC = ("dry_pivot", "clearance", "locus")
 _CONTRADICTED, _DOUBTFUL, _RUN_GAIN = "records-contradicted", "records-doubtful", "run-gain-off"
 
 
-def check_finished(campaign: Campaign, finished: FinishedRuns) -> tuple[FinishedRuns, Verdicts]:
-    """Judge all finished runs beside each other; those with an error of their own are left out."""
-    observed = [observation for digest in finished.digests for observation in digest.observations]
-    if not observed:  # runs that are no files
-        return finished, Verdicts()
-    result = campaign_verdicts(campaign, observed)
-    return finished.without(result.unusable), result
-
-
 def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -> Verdicts:
     """What the checks say of dynamic runs, by run; static runs say what they show of the channels."""
+    if not observations:  # runs that are no files
+        return Verdicts()
     static = [observe(run) for run in campaign.runs if run.kind in _STATIC]
     reports = [observation.report for observation in judged(campaign, [*observations, *static])[0]]
     reach(reports)
