@@ -13,6 +13,7 @@ from rigdata.problem import RigDataError
 from tests.command_line import ended, tpjb
 from tests.phasors.phasor_cases import vector_channels
 from tests.rigs import closed_form as cf
+from tests.rigs.acquisition import Acquisition, write_campaign
 from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandRig, band_plans, stiffness
 from tests.studies.band_coverage import true_parameters
@@ -400,6 +401,29 @@ def test_a_band_is_compared_and_stands_beside_sines(tmp_path):
     assert compared.exit_code in (0, 3), compared.output
     table = pd.read_csv(tmp_path / "compared" / "comparison.csv")
     assert set(table["excitation_Hz"]) == set(frequencies)
+
+
+@pytest.mark.slow
+def test_sines_and_a_band_of_one_campaign_are_sorted_and_share_what_their_sensors_do(tmp_path):
+    sines = cf.Rig(frequencies=(25.0,), directions=(0.0, 60.0, 120.0), seconds=3.0)
+    band = replace(sines, excitation="random", directions=(20.0, 110.0), seconds=4.0)
+    sensors = cf.channels_of(band)
+    rig = cf.campaign(band, sensors, [1])
+    beside = [replace(run, name=f"sine {run.name}") for run in cf.campaign(sines, sensors, [2]).runs]
+    setup = replace(Acquisition(), noise=cf.noise_of(band))
+    result = identify(load_campaign(write_campaign(tmp_path, replace(rig, runs=(*rig.runs, *beside)), setup, [3])))
+    assert sorted(result.points, key=lambda p: p.point) == list(result.points)
+    assert [p.point.excitation_hz for p in result.points if p.stiffness.method == "mm-eiv"] == [25.0]
+    assert len(set(result.calibration_names)) == len(result.calibration_names)
+    covariance = result.systematic.reshape(9, 8, 9, 8)[:, 3, :, 3]  # of kyy: probes and cells are the same
+    error = np.sqrt(np.diag(covariance))
+    assert (covariance / np.outer(error, error) > 0.4).all()
+    inside = []
+    for p in result.points:
+        h = sines.film.h(np.array([p.point.excitation_hz]), 5000.0)[0]
+        away = p.stiffness.vector - np.concatenate([h.real.ravel(), h.imag.ravel()])
+        inside.append(np.abs(away) <= p.stiffness.half_width())
+    assert np.mean(inside) > 0.88
 
 
 @pytest.mark.slow
