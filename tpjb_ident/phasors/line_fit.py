@@ -16,7 +16,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.calibration import OVERFLOW
-from tpjb_ident.phasors.lines import design_columns, line_design, line_waves
+from tpjb_ident.phasors.lines import line_design
 
 #: A residual is no smaller than this share of the largest: what stands still has none, and is not divided by.
 _ROUNDING = 1e-100
@@ -133,13 +133,15 @@ class LineFitter:
         self.length, self.rate = length, rate
         self.frequencies = np.asarray(frequencies, dtype=float)
         if time is None:
+            duration = length / rate
             self.design = even_design(length, rate, self.frequencies, drift_order)
         else:  # (length,) [s]: of samples with jitter or gaps
+            duration = float(time[-1] - time[0])
             self.design = line_design(time - time[0], self.frequencies, drift_order)
         self._gram = self.design.T @ self.design
         # Lines that a window tells apart leave a well-conditioned Gram matrix; its size is a dozen.
         self._gram_inverse = np.linalg.pinv(self._gram, rcond=1e-12, hermitian=True)
-        self._level = _level(self.design, self.frequencies, length / rate)
+        self._level = _level(self.design, self.frequencies, duration)
 
     def fit(self, rows: FloatArray, start: FloatArray, usual: FloatArray | None = None) -> WindowFit:
         """Fit windows; `rows` (n_channels, n_windows, length), `start` (n_windows,), `usual` (n_channels,)."""
@@ -240,10 +242,16 @@ class LineFitter:
 
 def even_design(length: int, rate: float, frequencies: FloatArray, drift_order: int = 1) -> FloatArray:
     """The columns of `line_design` on an even grid: waves of one block, turned from block to block."""
-    starts = line_waves(np.arange(0, length, BLOCK) / rate, frequencies)
-    block = line_waves(np.arange(BLOCK) / rate, frequencies)
-    waves = (starts[:, None] * block).reshape(-1, len(frequencies))[:length]
-    return design_columns(waves, np.linspace(-1.0, 1.0, length), drift_order)
+    if length < 2 * BLOCK:
+        return line_design(np.arange(length) / rate, frequencies, drift_order)
+    tau, starts = np.arange(BLOCK) / rate, np.arange(0, length, BLOCK) / rate
+    design = np.empty((length, 2 * len(frequencies) + drift_order + 1))
+    for k, frequency in enumerate(frequencies):
+        turn = np.exp(2j * np.pi * frequency * starts)
+        wave = np.multiply.outer(turn, np.exp(2j * np.pi * frequency * tau)).ravel()[:length]
+        design[:, 2 * k], design[:, 2 * k + 1] = wave.real, -wave.imag
+    design[:, 2 * len(frequencies) :] = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, length), drift_order)
+    return design
 
 
 def _level(design: FloatArray, frequencies: FloatArray, duration: float) -> FloatArray:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.errors import TpjbError
 
@@ -195,18 +195,13 @@ def line_design(time: FloatArray, frequencies: FloatArray, drift_order: int = 1)
 
     `time` (n,), `frequencies` (n_lines,) [Hz].
     """
+    phase = 2 * np.pi * np.multiply.outer(time, frequencies)
     middle, half = 0.5 * (time[0] + time[-1]), 0.5 * (time[-1] - time[0]) or 1.0
-    return design_columns(line_waves(time, frequencies), (time - middle) / half, drift_order)
-
-
-def line_waves(time: FloatArray, frequencies: FloatArray) -> ComplexArray:
-    """Waves cos - i sin of every line at some times (n,), (n, n_lines)."""
-    return np.exp(-2j * np.pi * np.multiply.outer(time, frequencies))
-
-
-def design_columns(waves: ComplexArray, place: FloatArray, drift_order: int) -> FloatArray:
-    """Columns cos and - sin of every line, and of a drift at places (n,) from -1 to 1; `waves` (n, n_lines)."""
-    return np.concatenate([waves.view(float), np.polynomial.legendre.legvander(place, drift_order)], axis=1)
+    slow = np.polynomial.legendre.legvander((time - middle) / half, drift_order)
+    waves = np.empty((len(time), 2 * len(frequencies)))
+    waves[:, 0::2] = np.cos(phase)
+    waves[:, 1::2] = -np.sin(phase)
+    return np.concatenate([waves, slow], axis=1)
 
 
 def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, rate: float) -> float:
