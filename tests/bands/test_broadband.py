@@ -13,6 +13,7 @@ from rigdata.problem import RigDataError
 from tests.command_line import ended, tpjb
 from tests.phasors.phasor_cases import vector_channels
 from tests.rigs import closed_form as cf
+from tests.rigs.acquisition import Acquisition, write_campaign
 from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandRig, band_plans, stiffness
 from tests.studies.band_coverage import true_parameters
@@ -22,7 +23,6 @@ from tpjb_ident.bands.samples import Samples
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.lines import Line, LineSet
-from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.results.identification import frf_frame, models_frame
 from tpjb_ident.terms.distortion import band_change
 
@@ -40,11 +40,11 @@ def spectra(D, F, command=None, period=None) -> RunSpectra:
     none = np.zeros((windows, 4))
     z = np.concatenate([D, F], axis=2)
     point = OperatingPoint(5000.0, -np.pi / 2, 2 * np.pi * 22.0, 0.0)
-    phasors = RunPhasors("r", point, None, lines, np.zeros(windows), 10.0, CHANNELS, z, none, none, none, 0.0)
-    run = RunSpectra(phasors, command, np.zeros(n, bool), (), period, {})
+    of_band = {"command": command, "disturbed": np.zeros(n, bool), "disturbances": (), "period": period}
+    run = RunSpectra("r", point, None, lines, np.zeros(windows), 10.0, CHANNELS, z, none, none, none, 0.0, **of_band)
     place = np.arange(n)[:, None] % 7 - 3.0
     command = None if command is None else command * place
-    return replace(run, by_time=replace(run, phasors=replace(phasors, z=z * place), command=command))
+    return replace(run, by_time=replace(run, z=z * place, command=command))
 
 
 def bins(n: int, noise: float, seed: int, slope: float = 0.0) -> list[RunSpectra]:
@@ -65,7 +65,7 @@ def bins(n: int, noise: float, seed: int, slope: float = 0.0) -> list[RunSpectra
 
 def by_command(runs: list[RunSpectra], n: int) -> np.ndarray:
     """H of the runs' responses to their commands, one each."""
-    z = np.concatenate([line_response([run], np.arange(n), "command", ends=True).z for run in runs])
+    z = np.concatenate([line_response([run], np.arange(n), "iv", ends=True).z for run in runs])
     return np.linalg.solve(z[:, :2], z[:, 2:]).T
 
 
@@ -112,7 +112,7 @@ def test_a_quiet_record_that_begins_and_ends_in_motion_leaks_next_to_nothing(tmp
 def test_h_over_the_bins_of_a_response_may_slope(seed):
     runs = bins(12, 0.0, seed, slope=3.0)
     assert np.abs(by_command(runs, 12) - H).max() < 1e-9 * np.abs(H).max()
-    assert abs(line_response(runs[:1], np.arange(12), "command", ends=True).freedom - 8) < 1e-9
+    assert abs(line_response(runs[:1], np.arange(12), "iv", ends=True).freedom - 8) < 1e-9
 
 
 def test_noise_on_the_displacements_pulls_h1_down_and_leaves_the_command_s_estimate_alone():
@@ -134,7 +134,7 @@ def test_what_the_displacement_explains_is_h1():
     """Without an instrument the responses of both runs together give what analysers give."""
     runs = bins(60, 0.3, 4)
     classic = classic_line(runs, np.arange(60), ends=True).h
-    z = line_response(runs, np.arange(60), "displacement", ends=True).z
+    z = line_response(runs, np.arange(60), "hv", ends=True).z
     h = np.linalg.solve(z[:, :2], z[:, 2:]).T
     assert np.abs(h - classic["h1"]).max() < 0.05 * np.abs(H).max()
     assert classic["h1"][1, 1].real < classic["hv"][1, 1].real
@@ -156,7 +156,7 @@ def test_a_command_at_rest_is_no_source():
     command = np.stack([_complex(rng, 30), 0.01 * _complex(rng, 30)], axis=1)
     D = command[:, :1] * np.array([2e-6, 3e-7])
     run = spectra(D[None], (D @ H.T)[None], command[None])
-    assert line_response([run], np.arange(12), "command", ends=True).z.shape == (1, 4)
+    assert line_response([run], np.arange(12), "iv", ends=True).z.shape == (1, 4)
 
 
 @pytest.mark.slow
@@ -401,6 +401,29 @@ def test_a_band_is_compared_and_stands_beside_sines(tmp_path):
     assert compared.exit_code in (0, 3), compared.output
     table = pd.read_csv(tmp_path / "compared" / "comparison.csv")
     assert set(table["excitation_Hz"]) == set(frequencies)
+
+
+@pytest.mark.slow
+def test_sines_and_a_band_of_one_campaign_are_sorted_and_share_what_their_sensors_do(tmp_path):
+    sines = cf.Rig(frequencies=(25.0,), directions=(0.0, 60.0, 120.0), seconds=3.0)
+    band = replace(sines, excitation="random", directions=(20.0, 110.0), seconds=4.0)
+    sensors = cf.channels_of(band)
+    rig = cf.campaign(band, sensors, [1])
+    beside = [replace(run, name=f"sine {run.name}") for run in cf.campaign(sines, sensors, [2]).runs]
+    setup = replace(Acquisition(), noise=cf.noise_of(band))
+    result = identify(load_campaign(write_campaign(tmp_path, replace(rig, runs=(*rig.runs, *beside)), setup, [3])))
+    assert sorted(result.points, key=lambda p: p.point) == list(result.points)
+    assert [p.point.excitation_hz for p in result.points if p.stiffness.method == "mm-eiv"] == [25.0]
+    assert len(set(result.calibration_names)) == len(result.calibration_names)
+    covariance = result.systematic.reshape(9, 8, 9, 8)[:, 3, :, 3]  # of kyy: probes and cells are the same
+    error = np.sqrt(np.diag(covariance))
+    assert (covariance / np.outer(error, error) > 0.4).all()
+    inside = []
+    for p in result.points:
+        h = sines.film.h(np.array([p.point.excitation_hz]), 5000.0)[0]
+        away = p.stiffness.vector - np.concatenate([h.real.ravel(), h.imag.ravel()])
+        inside.append(np.abs(away) <= p.stiffness.half_width())
+    assert np.mean(inside) > 0.88
 
 
 @pytest.mark.slow

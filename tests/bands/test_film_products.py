@@ -38,8 +38,8 @@ def static_film(numbers, cube, square, seed, orbit=0.0):
         command = np.broadcast_to(line[1:81, None] * along, (3, 80, 2))
         noise = 1e-6 * np.abs(F).max() * rng.standard_normal((3, 80, 2))
         run = spectra(np.broadcast_to(D, (3, 80, 2)), F + noise, command, period=1.0)
-        lines = tuple(replace(line, frequency=float(k + 1)) for k, line in enumerate(run.phasors.lines.excitation))
-        runs.append(replace(run, phasors=replace(run.phasors, lines=replace(run.phasors.lines, excitation=lines))))
+        lines = tuple(replace(line, frequency=float(k + 1)) for k, line in enumerate(run.lines.excitation))
+        runs.append(replace(run, lines=replace(run.lines, excitation=lines)))
     return runs
 
 
@@ -49,7 +49,7 @@ def test_left_out_odd_lines_tell_the_change_of_h_and_the_scatter_of_lines(seed):
     lines = film_products(runs)
     assert lines.change == pytest.approx(1.3 * 3e-3, rel=0.5)
     driven = runs[0].driven & np.isin(np.arange(1, 81), SOME_ODD)
-    off = runs[0].F[0, driven, 0] / runs[0].D[0, driven, 0] / STIFFNESS - 1
+    off = runs[0].force[0, driven, 0] / runs[0].displacement[0, driven, 0] / STIFFNESS - 1
     assert np.median(lines.scatter[0, driven, 0]) == pytest.approx(1.3 * np.sqrt(2) * np.std(off), rel=0.6)
     assert lines.scatter[0, driven, 1].max() < 0.01 * lines.scatter[0, driven, 0].min()
 

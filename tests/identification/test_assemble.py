@@ -45,7 +45,9 @@ def run_at(name, direction, load, turn, rng, noise):
 
 def finished(runs, left_out=()):
     """Finished runs."""
-    return FinishedRuns((*(digest(run, {1: 300.0 + k * k, 2: 310.0}) for k, run in enumerate(runs)), *left_out))
+    return FinishedRuns(
+        (*(digest(replace(run, temperatures={1: 300.0 + k * k, 2: 310.0})) for k, run in enumerate(runs)), *left_out)
+    )
 
 
 @pytest.fixture(scope="module")

@@ -98,13 +98,13 @@ def test_windows_of_a_point_follow_their_runs():
         means = {quantity: rng.standard_normal((n, 2)) for quantity in ("displacement", "force")}
         return SimpleNamespace(
             run=name, lines=SimpleNamespace(driven=(25.0, 25.0)),
-            displacement=blocks[0], oil_force=lambda line: blocks[1][:, line], means=means.get,
+            displacement=blocks[0], force=blocks[1], means=means.get,
         )  # fmt: skip
 
     a, b = run("a", 3), run("b", 2)
     data = point_data(at(), [(a, 1), (b, 0)])
     np.testing.assert_array_equal(data.D, np.concatenate([a.displacement[:, 1], b.displacement[:, 0]]))
-    np.testing.assert_array_equal(data.F, np.concatenate([a.oil_force(1), b.oil_force(0)]))
+    np.testing.assert_array_equal(data.F, np.concatenate([a.force[:, 1], b.force[:, 0]]))
     np.testing.assert_array_equal(data.run_index, [0, 0, 0, 1, 1])
     assert data.lines == (1, 0)
     assert data.omega == at().excitation

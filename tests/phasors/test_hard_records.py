@@ -51,7 +51,7 @@ def test_channels_stand_in_order_and_make_the_vectors():
     assert result.device == ("",) * 6
     assert error(result) < 1e-3
     np.testing.assert_allclose(result.displacement, result.z[:, :, :2])
-    np.testing.assert_allclose(result.oil_force(0), result.z[:, 0, 2:4] + 30.0 * result.z[:, 0, 4:])
+    np.testing.assert_allclose(result.force[:, 0], result.z[:, 0, 2:4] + 30.0 * result.z[:, 0, 4:])
     # phasors of the whole record, with the film's own lines, and the noise beside the excitation
     assert [line.name for line in result.lines.faint] == ["3X", "4X", "harmonic 3", "2X-f", "2f-X"]
     assert result.record.shape == (len(result.lines.whole), 6)

@@ -59,8 +59,8 @@ def counted(monkeypatch):
 
 
 def all_runs(*arguments, **named):
-    """What `FinishedRuns` gives back of every run: its digest and the phasors of its excitation lines."""
-    return [(digest.phasors, digest) for digest in gathered_runs(*arguments, **named).digests]
+    """What `FinishedRuns` gives back of every run."""
+    return gathered_runs(*arguments, **named).digests
 
 
 def silent(text, done, total):
@@ -77,13 +77,13 @@ def stop_after(count):
 
 def same(first, second) -> bool:
     """Whether all that was read of the runs is alike, bit for bit."""
-    for (a, of_a), (b, of_b) in zip(first, second, strict=True):
-        blocks = [(a.start, b.start), (of_a.mains, of_b.mains)]
-        blocks += [(getattr(a, name), getattr(b, name)) for name in ("z", "mean", "scale", "lost", "record")]
+    for a, b in zip(first, second, strict=True):
+        names = ("start", "mains", "z", "mean", "scale", "lost", "record")
+        blocks = [(getattr(a, name), getattr(b, name)) for name in names]
         for x, y in blocks:
             if (x is None) != (y is None) or (x is not None and not np.array_equal(x, y, equal_nan=True)):
                 return False
-        if (of_a.temperatures, a.lines) != (of_b.temperatures, b.lines):
+        if (a.temperatures, a.lines) != (b.temperatures, b.lines):
             return False
         if [c.sentence() for c in a.conditions] != [c.sentence() for c in b.conditions]:
             return False
@@ -206,9 +206,9 @@ def test_an_error_leaves_nothing_behind(path, tmp_path):
 
 DAMAGES = {
     "without mark": lambda meta: meta.pop("fingerprint"),
-    "of another kind": lambda meta: meta["result"]["RunDigest"].update(phasors={"set": 5}),
+    "of another kind": lambda meta: meta["result"]["RunDigest"].update(lines={"set": 5}),
     "with a mark that is none": lambda meta: meta.update(fingerprint={"a": 1}),
-    "without blocks": lambda meta: meta["result"]["RunDigest"].pop("phasors"),
+    "without blocks": lambda meta: meta["result"]["RunDigest"].pop("z"),
 }
 
 

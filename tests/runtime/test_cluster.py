@@ -130,7 +130,7 @@ def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign
     plain = RunStore.keep
 
     def keep(store, mark, result):
-        kept.append(store._file(result.phasors.run).name)
+        kept.append(store._file(result.run).name)
         plain(store, mark, result)
 
     monkeypatch.setattr(RunStore, "keep", keep)

@@ -57,7 +57,7 @@ def run_with_lines(excitation, z, seed=1):
     phasors = complex_normal(np.random.default_rng(seed), 5, len(lines.frequencies), 2)
     if "mains" in names:
         phasors[:, 1 + names.index("mains")] = z
-    return SimpleNamespace(lines=lines, displacement=phasors, oil_force=lambda line: 1e8 * phasors[:, line])
+    return SimpleNamespace(lines=lines, displacement=phasors, force=1e8 * phasors)
 
 
 def test_the_mains_line_of_a_run_is_its_typical_phasor():

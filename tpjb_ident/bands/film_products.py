@@ -68,7 +68,7 @@ def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
     falls_on_lines = [bool((driven & places).any()) for places in beside]
     shaft = orbit, float(np.linalg.norm(np.multiply(falls_on_lines, turned)))
     undriven = ~np.any([*beside, *(run.driven | run.disturbed for run in runs)], axis=0)
-    motion = [np.sum(np.abs(run.D.mean(axis=0)) ** 2, axis=1) * run.driven for run in runs]
+    motion = [np.sum(np.abs(run.displacement.mean(axis=0)) ** 2, axis=1) * run.driven for run in runs]
     sums = np.array([_sums(number, power / 4) for power in motion])
     usual = sums.mean(axis=0)
     reached = usual > _REACHED * np.median(usual[driven | undriven], axis=0)
@@ -86,7 +86,7 @@ def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
     stiffness = np.sqrt(film.force / np.mean(motion, axis=0)[driven].mean())
     cube = max(cube, (_STANDS_IN * square / stiffness) ** 2)
     change = 3 * np.sqrt(cube) * max(run.rms for run in runs) ** 2 / stiffness
-    force = np.array([np.sum(np.abs(run.F.mean(axis=0)) ** 2, axis=1) for run in runs])
+    force = np.array([np.sum(np.abs(run.force.mean(axis=0)) ** 2, axis=1) for run in runs])
     scatter = np.sqrt(np.einsum("rnk,rak->rna", sums, curvature) / np.maximum(force, 1e-300)[:, :, None])
     scatter = scatter[:, np.searchsorted(runs[0].frequencies, within - 0.5 / runs[0].period)]
     return FilmProducts(ALLOWED_CHANGE * float(change), ALLOWED_CHANGE * scatter, *shaft, even, seen)
@@ -106,7 +106,7 @@ def _beside_shaft(run: RunSpectra, order: int) -> IntArray:
     """Numbers of the lines n X + f and n X - f of every driven f, of a shaft that turns with the period; else none."""
     assert run.period is not None
     turns = order * run.shaft * run.period
-    if not turns or abs(turns - round(turns)) * len(run.phasors.start) > _ON_LINE:
+    if not turns or abs(turns - round(turns)) * len(run.start) > _ON_LINE:
         return np.zeros(0, dtype=int)
     number = np.round(run.frequencies[run.driven] * run.period).astype(int)
     return np.abs(round(turns) + np.concatenate([number, -number]))
@@ -159,7 +159,7 @@ class _Film:
         """
         squares, noises = [], []
         for run in runs:
-            force = self.unexplained(run.D[:, places], run.F[:, places], run.frequencies[places])
+            force = self.unexplained(run.displacement[:, places], run.force[:, places], run.frequencies[places])
             noise = np.var(force, axis=0, ddof=1) / len(force)
             squares.append((np.abs(force.mean(axis=0)) ** 2 - noise).T)
             noises.append(median_filter(noise, (_NEIGHBOURS, 1), mode="nearest").T)  # few windows tell a line's badly
@@ -170,8 +170,8 @@ class _Film:
         squares = [0.0]
         for run in runs:
             if order in run.turned:
-                turned, motion = run.turned[order], run.D.mean(axis=0)[self.driven]
-                D, F = turned.displacement, turned.oil_force(slice(None))
+                turned, motion = run.turned[order], run.displacement.mean(axis=0)[self.driven]
+                D, F = turned.displacement, turned.force
                 force = self.unexplained(D, F, run.frequencies - order * run.shaft)[0, self.driven]
                 coherent = motion @ np.linalg.lstsq(motion, force, rcond=_ACROSS)[0]
                 noise = np.sum(np.abs(force - coherent) ** 2) * 2 / max(len(force) - 2, 1)
@@ -184,7 +184,7 @@ def _film(runs: Sequence[RunSpectra], driven: BoolArray) -> _Film:
     omega = 2 * np.pi * runs[0].frequencies[driven]
     middle = np.median(omega)
     columns = complex_matrix(power_columns(omega / middle, MODELS["K-C-M"]).transpose(0, 2, 1))
-    D, F = (np.array([getattr(run, name).mean(axis=0)[driven] for run in runs]) for name in "DF")
+    D, F = (np.array([getattr(run, name).mean(axis=0)[driven] for run in runs]) for name in ("displacement", "force"))
     design = np.einsum("kqij,rkj->rkiq", columns, D).reshape(-1, columns.shape[1])
     rows = np.concatenate([design.real, design.imag])
     numbers = np.linalg.lstsq(rows, np.concatenate([F.real.ravel(), F.imag.ravel()]), rcond=None)[0]

@@ -46,20 +46,20 @@ class LineResponse:
     repeats: float  #: rows that tell it
 
 
-def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, ends: bool) -> LineResponse:
-    """Response over the bins of a line; `instrument` is "periods", "command" or "displacement".
+def line_response(runs: Sequence[RunSpectra], bins: IntArray, method: str, ends: bool) -> LineResponse:
+    """Response over the bins of a line; the `method` is "periods", "iv" by the command, or "hv" by the displacement.
 
     Runs are taken together where there is no instrument of their own: each moves the shaft along one line, and what it
     shows across that is noise.
     """
-    if instrument == "periods":
-        rows, start = runs[0].phasors.z[:, bins[0]], runs[0].phasors.start
+    if method == "periods":
+        rows, start = runs[0].z[:, bins[0]], runs[0].start
         n, mean, time = len(rows), rows.mean(axis=0), start - start.mean()
         remaining, spread = rows - mean, max(float(time @ time), 1e-300)
         slope, size = time @ remaining / spread, np.array([1 / spread])
         return LineResponse(mean[None], float(n), _outer(remaining), n - 1.0, slope[None], size, float(n))
-    z = np.concatenate([run.phasors.z[0, bins] for run in runs])
-    sources = [_sources(run, instrument) for run in runs]
+    z = np.concatenate([run.z[0, bins] for run in runs])
+    sources = [_sources(run, method) for run in runs]
     u, by_time = (np.concatenate([part[bins] for part in parts]) for parts in zip(*sources))
     return _regressed(z, u, by_time, nuisance(runs, bins, u, ends))
 
@@ -77,23 +77,23 @@ def nuisance(runs: Sequence[RunSpectra], bins: IntArray, sources: ComplexArray, 
     return np.concatenate([sloped, np.kron(np.eye(len(runs)), np.vander(place, 2, increasing=True))], axis=1)
 
 
-def _sources(run: RunSpectra, instrument: str) -> tuple[ComplexArray, ComplexArray]:
+def _sources(run: RunSpectra, method: str) -> tuple[ComplexArray, ComplexArray]:
     """What drives the run (n_bins, k), and its product with time [s] over the record."""
     assert run.by_time is not None
     parts = run, run.by_time
-    if instrument == "command":
+    if method == "iv":
         commands = [part.command[0] for part in parts if part.command is not None]
         # in directions in which the command acts: what rests would be noise alone
         power, along = np.linalg.eigh((commands[0].T @ commands[0].conj()).real)
         first, by_time = (command @ along[:, power > _AT_REST * power[-1]] for command in commands)
     else:
-        first, by_time = (part.D[0] for part in parts)
+        first, by_time = (part.displacement[0] for part in parts)
     return first, by_time
 
 
 def one_phase_set(runs: Sequence[RunSpectra]) -> bool:
     """Whether too few runs of a periodic excitation have phases of their own for its distortion to show."""
-    means = [run.D.mean(axis=0) for run in runs]
+    means = [run.displacement.mean(axis=0) for run in runs]
     waves = [mean @ np.linalg.eigh((mean.T @ mean.conj()).real)[1][:, -1] for mean in means]
     different: list[ComplexArray] = []
     for wave in waves:
@@ -164,7 +164,9 @@ class ClassicLine:
 
 def classic_line(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> ClassicLine:
     """H1, H2, Hv and coherence over all rows of a line: periods, or bins."""
-    rows = np.concatenate([np.concatenate([s.D[:, bins], s.F[:, bins]], axis=2).reshape(-1, 4) for s in spectra])
+    rows = np.concatenate(
+        [np.concatenate([s.displacement[:, bins], s.force[:, bins]], axis=2).reshape(-1, 4) for s in spectra]
+    )
     used = 0  # columns that slope and leakage take
     if spectra[0].period is None:
         basis = np.linalg.qr(nuisance(spectra, bins, rows[:, :2], ends))[0]
@@ -193,30 +195,29 @@ class BandPoint(RunsOfPoint):
     """Runs at one operating point, excited alike and transformed."""
 
     kind: str
-    spectra: list[RunSpectra]
     bins: tuple[IntArray, ...]  #: of every line: one of a period, or some neighbouring ones of a whole record
 
     @property
     def frequencies(self) -> FloatArray:
         """Of the lines, (n_lines,) [Hz]."""
-        return np.array([self.spectra[0].frequencies[bins].mean() for bins in self.bins])
+        return np.array([self.runs[0].frequencies[bins].mean() for bins in self.bins])
 
     @property
     def resolution(self) -> float:
         """Width of a line [Hz]."""
-        return max(map(len, self.bins), default=1) / self.spectra[0].phasors.length
+        return max(map(len, self.bins), default=1) / self.runs[0].length
 
     @property
     def method(self) -> str:
         """What tells noise from motion: the periods, the command, or nothing."""
-        if self.spectra[0].period is not None:
+        if self.runs[0].period is not None:
             return "periods"
-        return "iv" if all(s.command is not None for s in self.spectra) else "hv"
+        return "iv" if all(s.command is not None for s in self.runs) else "hv"
 
     @property
     def members(self) -> list[list[int]]:
         """Runs that are taken together: each by itself, all of them where nothing tells noise from motion."""
-        places = list(range(len(self.spectra)))
+        places = list(range(len(self.runs)))
         return [places] if self.method == "hv" else [[place] for place in places]
 
     @property
@@ -227,7 +228,7 @@ class BandPoint(RunsOfPoint):
     @cached_property
     def classic(self) -> list[ClassicLine]:
         """Every line by the methods of analysers."""
-        return [classic_line(self.spectra, bins, self.open) for bins in self.bins]
+        return [classic_line(self.runs, bins, self.open) for bins in self.bins]
 
 
 def read_point(
@@ -250,8 +251,7 @@ def read_point(
         return None, unusable
     _refuse_unlike(spectra)
     point = replace(first.point, excitation=0.0)
-    phasors = tuple(s.phasors for s in spectra)
-    return BandPoint(point, phasors, first.excitation_kind, spectra, bins_of_lines(spectra)), unusable
+    return BandPoint(point, tuple(spectra), first.excitation_kind, bins_of_lines(spectra)), unusable
 
 
 def _common_band(runs: Sequence[Run]) -> tuple[float, float]:
@@ -271,11 +271,9 @@ def _refuse_unlike(spectra: Sequence[RunSpectra]) -> None:
     for spectrum in spectra[1:]:
         is_same = len(spectrum.frequencies) == len(first.frequencies)
         if not is_same or np.abs(spectrum.frequencies / first.frequencies - 1).max() > 1e-3:
-            sentences = [
-                f"{s.phasors.run} {'none' if s.period is None else f'{s.period:.4g} s'}" for s in (first, spectrum)
-            ]
+            sentences = [f"{s.run} {'none' if s.period is None else f'{s.period:.4g} s'}" for s in (first, spectrum)]
             raise BadInputError(
-                f"runs at {first.phasors.point} repeat with different periods ({', '.join(sentences)}); "
+                f"runs at {first.point} repeat with different periods ({', '.join(sentences)}); "
                 "excite the runs of one point with one period, or list them as different kinds of excitation"
             )
 
@@ -296,10 +294,10 @@ def bins_of_lines(spectra: Sequence[RunSpectra]) -> tuple[IntArray, ...]:
     n = len(free)
     count = n // max(_BINS, math.ceil(n / _LINES))
     if count < _LEAST_LINES:
-        have = spectra[0].phasors.length
+        have = spectra[0].length
         need = have * _LEAST_LINES * _BINS / max(n, 1)
         raise BadInputError(
-            f"run {spectra[0].phasors.run}: {have:.3g} s resolve {n} bins of its band, {_LEAST_LINES * _BINS} are "
+            f"run {spectra[0].run}: {have:.3g} s resolve {n} bins of its band, {_LEAST_LINES * _BINS} are "
             f"needed; record {need:.3g} s or excite a wider band"
         )
     lines = [part[free[part]] for part in np.array_split(np.arange(n), count)]

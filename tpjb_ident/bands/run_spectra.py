@@ -37,7 +37,7 @@ from tpjb_ident.bands.samples import (
 )
 from tpjb_ident.phasors.compensation import compensated, filled_channels
 from tpjb_ident.phasors.lines import Line, LineSet
-from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.phasors.run_data import SHORT, PhasorSettings, RunPhasors, beginning_of
 from tpjb_ident.runs.point_data import mean_temperatures
 
 #: Periods that a record must hold.
@@ -196,38 +196,26 @@ def is_broadband(run: Run) -> bool:
     return run.excitation_kind != "sine"
 
 
-@dataclass(frozen=True, repr=False)
-class RunSpectra:
-    """Phasors of one run over the band: every period's, or those of the whole record's bins."""
+@dataclass(frozen=True, repr=False, kw_only=True)
+class RunSpectra(RunPhasors):
+    """One run over the band: lines are bins, windows are periods, or the whole record is one."""
 
-    phasors: RunPhasors  #: channel by channel
     command: ComplexArray | None  #: (n_windows, n_bins, 2) complex
     disturbed: BoolArray  #: (n_bins,): bins that lines of shaft or mains may have spoiled
     disturbances: tuple[Line, ...]
     period: float | None
-    temperatures: dict[int, float]
     clean_rms: float = 0.0  #: m: of the motion without disturbing lines
     peak: float = 0.0  #: m: largest motion
     one_sided: float = 0.0  #: 1 where what drives goes to one side only, 0 where to both alike
     by_time: RunSpectra | None = None  #: of the record times the time from its middle [s]
     wide: RunSpectra | None = None  #: of a period, and beyond the band, where the film answers
     #: by order n the phasors (1, n_bins, ..) of the record turned n times as fast as the shaft: at f, what is at f - nX
-    turned: dict[int, RunPhasors] = field(default_factory=dict)
+    turned: dict[int, RunSpectra] = field(default_factory=dict)
 
     @property
     def frequencies(self) -> FloatArray:
         """Of the bins, (n_bins,) [Hz]."""
-        return self.phasors.lines.frequencies
-
-    @cached_property
-    def D(self) -> ComplexArray:
-        """Displacement, (n_windows, n_bins, 2) [m]."""
-        return self.phasors.displacement
-
-    @cached_property
-    def F(self) -> ComplexArray:
-        """Oil force by the accelerometers where there are any, (n_windows, n_bins, 2) [N]."""
-        return self.phasors.oil_force(slice(None))
+        return self.lines.frequencies
 
     @property
     def shaft(self) -> float:
@@ -239,7 +227,7 @@ class RunSpectra:
         """Bins (n_bins,) that the excitation drives; of a period the film fills others by its curvature."""
         if self.period is None:
             return np.ones(len(self.frequencies), dtype=bool)
-        drives = [self.D, self.F] if self.command is None else [self.command]
+        drives = [self.displacement, self.force] if self.command is None else [self.command]
         sizes = [np.linalg.norm(drive.mean(axis=0), axis=1) for drive in drives]
         share = np.max([size / max(size.max(), 1e-300) for size in sizes], axis=0)
         if self.command is None:
@@ -251,14 +239,14 @@ class RunSpectra:
     @property
     def amplitude(self) -> float:
         """Of a sine that moves the shaft as much as all bins of the band together do [m]."""
-        return float(np.sqrt(np.sum(np.mean(np.abs(self.D) ** 2, axis=0))))
+        return float(np.sqrt(np.sum(np.mean(np.abs(self.displacement) ** 2, axis=0))))
 
     @property
     def rms(self) -> float:
         """Rms of the motion that the excitation makes [m]."""
         if self.period is None:
             return self.clean_rms
-        return float(np.linalg.norm(self.D.mean(axis=0)[self.driven & ~self.disturbed]) / np.sqrt(2))
+        return float(np.linalg.norm(self.displacement.mean(axis=0)[self.driven & ~self.disturbed]) / np.sqrt(2))
 
 
 def run_spectra(
@@ -274,33 +262,51 @@ def run_spectra(
         slower = filled_channels(run)
         samples = read_samples(run, seconds, fast, band[1])
         temperatures = mean_temperatures(run)
+        temperature = beginning_of(run, SHORT).mean_temperature() or np.nan
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.lines.mains, band[1])
     cut, period = _period(run, samples, band, lines)
     length, width = (cut.length, LEFT_OUT) if period is None else (period, LEFT_OUT_OF_PERIOD)
     clean = without_disturbances(cut, lines, period)
-    places, motion = _places(clean.rate, length, band), _motion(clean)
+    seconds, mean, motion = length / clean.rate, samples.rows.mean(axis=1), _motion(clean)
 
-    def transformed(record: Samples, places: IntArray) -> tuple[RunPhasors, ComplexArray | None]:
-        phasors = _phasors(run, record, _bins(record.rows, length, places), places, samples.rows.mean(axis=1))
-        phasors = replace(phasors, housing_mass=housing_mass, conditions=samples.conditions)
-        command = None if record.command is None else _bins(record.command, length, places)
-        return compensated(phasors, run, slower, settings.delays), command
+    def transformed(record: Samples, places: IntArray) -> RunSpectra:
+        z = _bins(record.rows, length, places)
+        frequencies = np.asarray(np.fft.rfftfreq(length, 1 / clean.rate)[places], dtype=float)
+        none = np.zeros((len(z), len(mean)))
+        spectra = RunSpectra(
+            run.id,
+            run.point,
+            run.excitation_direction,
+            LineSet(tuple(Line("excitation", f) for f in frequencies.tolist()), (), (), run.point.shaft_speed_hz),
+            seconds * np.arange(float(len(z))),
+            seconds,
+            record.channels,
+            z,
+            np.tile(mean, (len(z), 1)),
+            none,
+            none,
+            housing_mass,
+            record.conditions,
+            temperatures=temperatures,
+            temperature=temperature,
+            command=None if record.command is None else _bins(record.command, length, places),
+            disturbed=bins_taken(frequencies, lines, seconds, width),
+            disturbances=lines,
+            period=None if period is None else seconds,
+            clean_rms=motion[0],
+            peak=motion[1],
+            one_sided=motion[2],
+        )
+        return compensated(spectra, run, slower, settings.delays)
 
-    def spectra_of(places: IntArray) -> RunSpectra:
-        phasors, command = transformed(clean, places)
-        seconds = length / clean.rate
-        disturbed = bins_taken(phasors.lines.frequencies, lines, seconds, width)
-        repeat = None if period is None else seconds
-        return RunSpectra(phasors, command, disturbed, lines, repeat, temperatures, *motion)
-
-    spectra = spectra_of(places)
+    places = _places(clean.rate, length, band)
+    spectra = transformed(clean, places)
     if period is not None:
         beyond = _places(clean.rate, length, (0.0, _WIDE * band[1]))
-        return replace(spectra, wide=_turned(spectra_of(beyond), clean, beyond))
+        return replace(spectra, wide=_turned(transformed(clean, beyond), clean, beyond))
     spectra = _turned(spectra, clean, places)
     time = (np.arange(clean.length) - 0.5 * (clean.length - 1)) / clean.rate  # from the middle of the record
-    phasors, command = transformed(clean.mapped(lambda rows: rows * time), places)
-    return replace(spectra, by_time=replace(spectra, phasors=phasors, command=command))
+    return replace(spectra, by_time=transformed(clean.mapped(lambda rows: rows * time), places))
 
 
 def _turned(spectra: RunSpectra, samples: Samples, places: IntArray) -> RunSpectra:
@@ -309,14 +315,14 @@ def _turned(spectra: RunSpectra, samples: Samples, places: IntArray) -> RunSpect
     orders = (1, 2) if spectra.period is not None else (2,)  # what is at f - X meets lines of a period alone
     for order in orders if spectra.shaft else ():
         wave = np.exp(2j * np.pi * order * spectra.shaft / samples.rate * np.arange(samples.length))
-        bins = np.fft.fft(samples.rows * wave, axis=1)[:, places * len(spectra.phasors.start)]
-        turned[order] = replace(spectra.phasors, z=bins.T[None] * (2 / samples.length))
+        bins = np.fft.fft(samples.rows * wave, axis=1)[:, places * len(spectra.start)]
+        turned[order] = replace(spectra, z=bins.T[None] * (2 / samples.length))
     return replace(spectra, turned=turned)
 
 
 def _motion(samples: Samples) -> tuple[float, float, float]:
     """Rms and peak of the motion [m], and how far the drive goes to one side."""
-    motion = samples.vector("displacement")
+    motion = samples.plane("displacement", samples.rows.T).real.T
     size = np.linalg.norm(motion, axis=0)
     drive = motion if samples.command is None else samples.command
     along = np.linalg.eigh(drive @ drive.T)[1][:, -1] @ drive
@@ -357,25 +363,3 @@ def _bins(rows: FloatArray, length: int, places: IntArray) -> ComplexArray:
     folded = rows.reshape(len(rows), -1, length)
     spectra = np.fft.rfft(folded, axis=2)[:, :, places] * (2.0 / length)
     return spectra.transpose(1, 2, 0)
-
-
-def _phasors(run: Run, samples: Samples, z: ComplexArray, places: IntArray, mean: FloatArray) -> RunPhasors:
-    """Phasors as recorded, `z` (n_windows, n_bins, m), about the readings' `mean` (m,)."""
-    length = samples.length // len(z)
-    seconds, frequencies = length / samples.rate, np.fft.rfftfreq(length, 1 / samples.rate)[places]
-    lines = LineSet(tuple(Line("excitation", float(f)) for f in frequencies), (), (), run.point.shaft_speed_hz)
-    none = np.zeros((len(z), z.shape[2]))
-    return RunPhasors(
-        run.id,
-        run.point,
-        run.excitation_direction,
-        lines,
-        seconds * np.arange(float(len(z))),
-        seconds,
-        samples.channels,
-        z,
-        np.tile(mean, (len(z), 1)),
-        none,
-        none,
-        0.0,
-    )

@@ -20,7 +20,7 @@ from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
-from rigdata.vector import directions, inverse_directions
+from rigdata.vector import directions
 from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.line_fit import BAD_LIMIT, even_design, robust_deviation
@@ -61,11 +61,6 @@ class Samples(Directed):
         """Samples per channel."""
         return int(self.rows.shape[1])
 
-    def vector(self, quantity: str) -> FloatArray:
-        """X and Y of a quantity, (2, n)."""
-        places = self.pick(quantity)
-        return inverse_directions(tuple(float(self.channels[j].axis or 0.0) for j in places)) @ self.rows[places]
-
     def signals(self) -> FloatArray:
         """Rows (k, n) about their means, each quantity of unit power: an idle channel weighs nothing beside others.
 
@@ -90,38 +85,13 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
     `fast`: channels by whose clock time runs faster than the first's, relative; `highest`: frequency [Hz] that every
     device must show.
     """
-    rate = run.sample_rate
-    n = min(run.length, round(seconds * rate))
-    recorded = _on_first_grid(run, n, highest)
-    inside = np.ones(n, dtype=bool)
-    for _, values, at in recorded:  # as far as the kernel reaches; of its own times every one
-        inside &= _is_own(values, at) | (at >= _TAPS) & (at <= len(values) - 1 - _TAPS)
-    channels, rows, lost, command = [], [], 0.0, np.zeros((2, n))
-    single = len(run.of("command")) == 1
-    for channel, values, at in recorded:
-        if channel.quantity == "command":
-            angle = channel.axis or 0.0
-            if single and run.excitation_direction is not None:
-                angle = run.excitation_direction
-            readings = _at(_bridged(run, channel, values), at)
-            command += np.outer(directions(angle), readings - readings.mean())
-            continue
-        values = values if run.excitation_kind == "impact" else without_glitches(values)  # a blow is sudden itself
-        if _lost(values) > _MAX_LOST and is_spare(channel, [c for c, _, _ in recorded]):
-            continue
-        channels.append(channel)
-        rows.append(_at(_bridged(run, channel, values), at * (1 + fast.get(channel.name, 0.0))))
-        lost = max(lost, (~np.isfinite(values)).mean())
-    bridged = holding((lost > _TOLD_LOST, "samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"))
-    driven = command[:, inside] if command.any() else None
-    return Samples(rate, tuple(channels), np.array(rows)[:, inside], driven, bridged)
-
-
-def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, FloatArray, FloatArray]]:
-    """Channels with their readings and the places [samples] among them of the first device's times, (n,) each."""
+    n = min(run.length, round(seconds * run.sample_rate))
     readers = device_readers(run, command=True)
-    recorded: list[tuple[Channel, FloatArray, FloatArray]] = []
-    begins, places = [], np.arange(float(n))
+    described = [channel for reader in readers for channel in reader.channels]
+    single = len(run.of("command")) == 1
+    recorded: list[tuple[Channel, FloatArray]] = []
+    begins, lost, command = [], 0.0, np.zeros((2, n))
+    inside, grid = np.ones(n, dtype=bool), np.arange(float(n))
     for reader in readers:
         if highest >= HIGHEST * reader.rate:
             text = f"the band reaches {highest:g} Hz, more than 0.45 of the sample rate of {reader.rate:g} Hz"
@@ -129,11 +99,28 @@ def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, Floa
         is_alike = reader.length == readers[0].length and abs(reader.rate / readers[0].rate - 1) <= _ALIKE
         time, rows = reader.read(0, n if is_alike else reader.length)
         begins.append(_begin(run, time, reader.rate))
+        at = grid  # the places [samples] of the first device's times
         if not is_alike:
             _refuse_unlike(run, reader.channels[0].name, reader.rate, highest)
-        at = places if is_alike else (places / run.sample_rate + begins[0] - begins[-1]) * reader.rate
-        recorded += [(channel, values, at) for channel, values in zip(reader.channels, rows)]
-    return sorted(recorded, key=lambda record: (*VECTOR_QUANTITIES, "command").index(record[0].quantity))
+            at = (grid / run.sample_rate + begins[0] - begins[-1]) * reader.rate
+            inside &= (at >= _TAPS) & (at <= reader.length - 1 - _TAPS)  # as far as the kernel reaches
+        for channel, values in zip(reader.channels, rows):
+            if channel.quantity == "command":
+                is_stated = single and run.excitation_direction is not None
+                angle = run.excitation_direction if is_stated else channel.axis
+                readings = _at(_bridged(run, channel, values), at)
+                command += np.outer(directions(angle or 0.0), readings - readings.mean())
+                continue
+            values = values if run.excitation_kind == "impact" else without_glitches(values)  # a blow is sudden itself
+            if _lost(values) <= _MAX_LOST or not is_spare(channel, described):
+                faster = 1 + fast.get(channel.name, 0.0)
+                recorded.append((channel, _at(_bridged(run, channel, values), at * faster)))
+                lost = max(lost, (~np.isfinite(values)).mean())
+    recorded.sort(key=lambda record: VECTOR_QUANTITIES.index(record[0].quantity))
+    channels, readings_of = zip(*recorded)
+    bridged = holding((lost > _TOLD_LOST, "samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"))
+    driven = command[:, inside] if command.any() else None
+    return Samples(run.sample_rate, channels, np.array(readings_of)[:, inside], driven, bridged)
 
 
 def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
@@ -147,10 +134,6 @@ def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
         raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
     return float(np.median(off)) / rate
-
-
-def _is_own(values: FloatArray, at: FloatArray) -> bool:
-    return np.array_equal(at, np.arange(len(values)))
 
 
 def _refuse_unlike(run: Run, name: str, rate: float, highest: float) -> None:
@@ -212,7 +195,7 @@ def _bridged(run: Run, channel: Channel, values: FloatArray) -> FloatArray:
 
 def _at(values: FloatArray, places: FloatArray) -> FloatArray:
     """A channel (n,) at places [samples] of its own grid."""
-    if _is_own(values, places):
+    if np.array_equal(places, np.arange(len(values))):
         return values
     mean = values.mean()
     return interpolated((values - mean)[None], places)[0] + mean

@@ -280,7 +280,7 @@ class Shape:
 def complex_matrix(numbers: FloatArray) -> ComplexArray:
     """H (.., 2, 2) of its eight numbers (.., 8)."""
     h = numbers[..., :4] + 1j * numbers[..., 4:]
-    return np.asarray(h.reshape(*numbers.shape[:-1], 2, 2), complex)
+    return h.reshape(*numbers.shape[:-1], 2, 2)
 
 
 def real_numbers(h: ComplexArray) -> FloatArray:

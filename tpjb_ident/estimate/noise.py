@@ -30,7 +30,7 @@ _LEAST = 1e-7
 
 def unbiased_noise(noise: ComplexArray, freedom: float) -> ComplexArray:
     """A covariance (m, m) of few degrees of freedom, whose inverse would be too large on average, made larger."""
-    return np.asarray(noise * max(freedom / max(freedom - len(noise), 1.0), 1.0), complex)
+    return noise * max(freedom / max(freedom - len(noise), 1.0), 1.0)
 
 
 def covariance(rig: Rig, blocks: Blocks, state: State, scatter: FloatArray, housing: float) -> ComplexArray:

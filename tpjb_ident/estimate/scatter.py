@@ -74,7 +74,7 @@ class ForceScatter:
         excess = np.maximum(variance * size**2, _LEAST * mean) - mean
         covariance = np.eye(COMPONENTS) + (triangle * excess[:, None, :]) @ triangle.transpose(0, 2, 1)
         root = np.linalg.inv(np.linalg.cholesky(covariance))
-        return ForceScatter(basis, np.asarray(triangle, dtype=float), root, size)
+        return ForceScatter(basis, triangle, root, size)
 
     def white(self, rows: FloatArray) -> FloatArray:
         """Rows (n, k, ..) brought to unit variance."""
@@ -186,7 +186,7 @@ class Scatter:
         # where too few good runs remain all count in full, and nothing has to be made up for
         corrected = np.where(weights < 1.0, weights / _expected(fit.rows), 1.0)
         chi = totals(group, corrected[:, None] * fit.force, points)
-        rows = totals(group, np.asarray(used), points)[:, None]
+        rows = totals(group, used, points)[:, None]
         information = totals(group, corrected[:, None] * fit.information, points)
         spare = np.where(solvable[:, None], rows - totals(group, used[:, None] * fit.spent, points), 0.0)
         usable = (spare > _LEAST_SPARE) & (information > 0)

@@ -289,7 +289,7 @@ class Solver:
         size = np.abs(np.einsum("nii->ni", R[:, :UNKNOWNS]))
         untold = size <= _UNTOLD * size.max(axis=1, keepdims=True)
         regular = R[:, :UNKNOWNS] + untold[:, :, None] * np.eye(UNKNOWNS)
-        state.u = np.asarray(np.linalg.solve(regular, Q1 @ white)[:, :, 0])
+        state.u = np.linalg.solve(regular, Q1 @ white)[:, :, 0]
         film = film_columns(rig, blocks, state) * self.unit
         by_point = [term.columns(blocks, state) for term in self.by_point.terms]
         shared = [term.columns(blocks, state) for term in self.shared.terms]

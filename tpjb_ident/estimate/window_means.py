@@ -215,4 +215,4 @@ def motion_in(residual: ComplexArray, weights: FloatArray, means: ComplexArray, 
     power, axes = np.linalg.eigh(unit.T @ unit.conj() / total)
     excess = np.where(power > _AS_NOISE, 1 - 1 / np.sqrt(np.maximum(power, _TINY)), 0.0)
     part = size @ (axes * excess) @ axes.conj().T @ size.conj().T
-    return np.asarray(along @ part.T @ pattern.T * scale, dtype=complex)
+    return along @ part.T @ pattern.T * scale

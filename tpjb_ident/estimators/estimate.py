@@ -372,7 +372,7 @@ def _with_scatter(table: PhasorTable, fit: TableFit, variance: float) -> TableFi
     spare = max(weights.sum() - 2.0, 1e-12)
     noise = (weights * residual).T @ residual.conj() / spare
     inverse = np.linalg.inv((weights * table.D.conj()).T @ table.D)
-    covariance = complex_to_real_covariance(np.asarray(np.kron(noise, inverse), dtype=complex))
+    covariance = complex_to_real_covariance(np.kron(noise, inverse))
     factor = 1.0 if "no-robust-start" in fit.conditions else variance
     return replace(fit, covariance=factor * covariance, dof=np.full(8, max(2.0 * spare, 1.0)))
 

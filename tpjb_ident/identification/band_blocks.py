@@ -6,14 +6,13 @@ share one departure from the curve of K-C-M that is nearest to the band's lines:
 bend h within the part.
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.bands.film_products import film_products
 from tpjb_ident.bands.responses import BandPoint, ClassicLine, line_response, one_phase_set, pooled_noise
@@ -26,7 +25,6 @@ from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.estimate.term import worth_stating
 from tpjb_ident.identification.campaign_solution import channel_columns
-from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.runs.static_load import StaticLoads, missed_load
 from tpjb_ident.terms.distortion import band_change, line_scatter
 from tpjb_ident.terms.registry import solve, solved_as_learnt
@@ -36,8 +34,6 @@ from tpjb_ident.terms.run_gain import RunGain
 STRONG = 10.0
 #: and coherence of the force with the displacements where nothing else tells signal from noise.
 _LEAST_COHERENCE = 0.5
-#: What is taken for the source of motion by method: without an instrument all noise is the force's.
-_INSTRUMENTS = {"periods": "periods", "iv": "command", "hv": "displacement"}
 #: Noise that responses have at least, of the run's largest: one without an instrument may have none.
 _LEAST = 1e-8
 
@@ -64,7 +60,6 @@ def band_blocks(
     points: Sequence[BandPoint],
     sensors: tuple[Sensor, ...],
     loads: StaticLoads,
-    temperatures: Mapping[str, float],
     clearance: float | None,
 ) -> BandBlocks:
     """Responses of all runs."""
@@ -78,13 +73,13 @@ def band_blocks(
         frequencies = point.frequencies.tolist()
         operating += [replace(point.point, excitation=2 * np.pi * round(f, 2)) for f in frequencies]
         for members in point.members:
-            spectra = [point.spectra[r] for r in members]
-            names = [s.phasors.run for s in spectra]
-            warmth = temperatures.get(names[0], np.nan)
-            channels = _described(spectra[0], sensors)
+            spectra = [point.runs[r] for r in members]
+            names = [s.run for s in spectra]
+            places = _places(spectra[0], sensors)
+            channels = [None if k < 0 else spectra[0].channels[k] for k in places]
             row = channel_columns(channels, calibrations)
-            row |= {"run": len(runs), "temperature": warmth, "miss": missed_load(miss, members)}
-            for place, response in enumerate(_run_rows(point, spectra, channels, warmth)):
+            row |= {"run": len(runs), "temperature": spectra[0].temperature, "miss": missed_load(miss, members)}
+            for place, response in enumerate(_run_rows(point, spectra, places)):
                 bins = point.bins[place]
                 at = {"point": first + place, "omega": 2 * np.pi * frequencies[place]}
                 at["uneven"] = uneven[members[0], bins].mean(axis=0)
@@ -113,16 +108,16 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
     """What a film that is not linear may do to H, to every line (n_runs, n_bins, 2), and to lines run by run."""
     periodic = point.method == "periods"
     # two tones make nothing of one another that falls on them
-    pair = periodic and max(s.driven.sum() for s in point.spectra) < 3
+    pair = periodic and max(s.driven.sum() for s in point.runs) < 3
     # alike in all runs: more than the two that h needs do not average it away
-    repeats = np.sqrt(max(len(point.spectra), 2) / 2) if periodic and not pair and one_phase_set(point.spectra) else 0.0
-    film = film_products(point.spectra)
+    repeats = np.sqrt(max(len(point.runs), 2) / 2) if periodic and not pair and one_phase_set(point.runs) else 0.0
+    film = film_products(point.runs)
     change, scatter = film.change, film.scatter
     if not film.seen and not clearance:
         change, scatter = 0.0, np.zeros_like(scatter)
     elif not film.seen:
-        rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
-        one_sided = max(s.one_sided for s in point.spectra)
+        rms, peak = (max(getattr(s, name) for s in point.runs) / clearance for name in ("rms", "peak"))
+        one_sided = max(s.one_sided for s in point.runs)
         stated = band_change("pair" if pair else point.kind, rms, peak, one_sided)
         scatter = np.fmin(scatter, (line_scatter(rms) if film.even else stated) / np.sqrt(2))
         change = np.fmin(change, stated)
@@ -130,32 +125,25 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
     return worth_stating(change + film.orbit), uneven, film.turning
 
 
-def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:
-    """The run's channel of every sensor; None of one that it lacks, or that shows nothing beside its like."""
-    largest = np.abs(spectra.phasors.z).max(axis=(0, 1))
-    table = {(c.name, c.quantity): (c, size) for c, size in zip(spectra.phasors.channels, largest)}
-    described = [table.get((sensor.name, sensor.quantity), (None, 0.0)) for sensor in sensors]
-    shown = alive(sensors, np.array([size for _, size in described]))
-    return [channel if is_shown else None for (channel, _), is_shown in zip(described, shown)]
+def _places(spectra: RunSpectra, sensors: Sequence[Sensor]) -> IntArray:
+    """Place of every sensor's channel in a run (m,); -1 of one that it lacks, or that shows nothing beside its like."""
+    named = {(channel.name, channel.quantity): k for k, channel in enumerate(spectra.channels)}
+    places = np.array([named.get((sensor.name, sensor.quantity), -1) for sensor in sensors])
+    largest = np.append(np.abs(spectra.z).max(axis=(0, 1)), 0.0)
+    return np.where(alive(sensors, largest[places]), places, -1)
 
 
-def _run_rows(
-    point: BandPoint, runs: Sequence[RunSpectra], channels: Sequence[Channel | None], temperature: float
-) -> list[list[dict[str, object]]]:
-    """Columns of the responses of one run, group by group."""
-    names = [channel.name for channel in runs[0].phasors.channels]
-    places = [-1 if channel is None else names.index(channel.name) for channel in channels]
-    gain = np.array([1.0 if c is None else warm_gain(c, temperature) for c in channels])
-    responses = [line_response(runs, bins, _INSTRUMENTS[point.method], point.open) for bins in point.bins]
+def _run_rows(point: BandPoint, runs: Sequence[RunSpectra], places: IntArray) -> list[list[dict[str, object]]]:
+    """Columns of the responses of one run, group by group; `places` (m,) of the sensors' channels."""
+    responses = [line_response(runs, bins, point.method, point.open) for bins in point.bins]
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
-    time = 0.5 * len(runs[0].phasors.start) * runs[0].phasors.length
+    time = 0.5 * len(runs[0].start) * runs[0].length
     groups = []
     for response, noise, freedom in zip(responses, *pooled_noise(responses)):
         # a sensor without a channel has the last place, where there is nothing
         single = np.pad(noise + response.count * np.diag(least**2), (0, 1))[np.ix_(places, places)]
-        single = single / np.outer(gain, gain)
-        covariance = np.asarray(single / response.count, complex)
-        z, slope = (np.pad(rows, ((0, 0), (0, 1)))[:, places] / gain for rows in (response.z, response.slope))
+        covariance = single / response.count
+        z, slope = (np.pad(rows, ((0, 0), (0, 1)))[:, places] for rows in (response.z, response.slope))
         row = {"noise": covariance, "dof": freedom, "time": time, "windows": response.repeats}
         moving = zip(z, slope, response.slope_size)
         groups.append([row | {"z": a, "slope": change, "slope_noise": single * size} for a, change, size in moving])
@@ -192,10 +180,9 @@ ONE_LINE = 1e6
 
 
 @dataclass(frozen=True, repr=False)
-class BandSolution:
-    """All bands of a campaign; L lines."""
+class BandSolution(BandBlocks):
+    """All bands of a campaign, solved."""
 
-    data: BandBlocks
     solution: Solution  #: of the lines
     usable: BoolArray  #: (L,): lines that the excitation tells
     parts: tuple[IntArray, ...]  #: lines of every part: h is that at the middle one
@@ -206,15 +193,15 @@ class BandSolution:
     @cached_property
     def classic(self) -> list[ClassicLine]:
         """All lines by the methods of analysers."""
-        return [line for point in self.data.points for line in point.classic]
+        return [line for point in self.points for line in point.classic]
 
     def usable_of(self, b: int) -> IntArray:
         """Lines of a band with an answer."""
-        return np.flatnonzero(self.usable & (self.data.band == b))
+        return np.flatnonzero(self.usable & (self.band == b))
 
     def bracket(self, lines: IntArray) -> ComplexArray:
         """Half of what H2 lies above H1 at some lines (2, 2) [N/m], between which H is if nothing tells noise."""
-        blind = [k for k in lines if self.usable[k] and self.data.points[self.data.band[k]].method == "hv"]
+        blind = [k for k in lines if self.usable[k] and self.points[self.band[k]].method == "hv"]
         halves = [0.5 * (self.classic[k].h["h2"] - self.classic[k].h["h1"]) for k in blind]
         return np.mean([*halves], axis=0) if halves else np.zeros((2, 2), complex)
 
@@ -228,7 +215,10 @@ def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
     away = np.abs(lines.h - crude).max(axis=(1, 2))
     usable &= away < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
     parts = _parts(data, used, usable)
-    return BandSolution(data, lines, usable, parts, _part_solution(data, lines, parts, usable), condition, size)
+    part = _part_solution(data, lines, parts, usable)
+    return BandSolution(
+        **vars(data), solution=lines, usable=usable, parts=parts, part=part, condition=condition, run_scatter=size
+    )
 
 
 def _lines(rig: Rig, data: BandBlocks, start: ComplexArray) -> tuple[Solution, float]:

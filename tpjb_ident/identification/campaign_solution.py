@@ -7,7 +7,7 @@ rate explains the slopes of all runs; where the manifest states clocks, they are
 turn as the windows of sines do.
 """
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -33,7 +33,6 @@ from tpjb_ident.estimate.equation import (
 )
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.solve import Solution
-from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means
 from tpjb_ident.results.linearity import FilmChange, film_change
 from tpjb_ident.runs.point_data import PointData, RunDigest
@@ -164,24 +163,16 @@ def unstated(campaign: Campaign) -> Conditions:
     return holding((names, "calibration-uncertainty-unstated", text))
 
 
-def run_temperatures(campaign: Campaign, measured: Iterable[tuple[str, Mapping[int, float]]]) -> dict[str, float]:
-    """Temperature at the probes by run [K]: as stated, else the mean of its thermometers."""
-    means = {run: float(np.mean(list(temperatures.values()))) for run, temperatures in measured if temperatures}
-    noted = {run.id: run.temperature for run in campaign.of_kind("dynamic") if run.temperature is not None}
-    return means | noted
-
-
 def campaign_blocks(
     points: Sequence[PointData],
     means: Sequence[PointMeans],
     misses: Sequence[ComplexArray],
     bent: FloatArray,
-    temperatures: Mapping[str, float],
 ) -> Blocks:
-    """Stack the runs of all points; `bent` (P,), `temperatures` [K] by run."""
+    """Stack the runs of all points; `bent` (P,)."""
     noises, freedoms = _pooled_noise(means, [data.runs[0].length for data in points])
     names: list[str] = []
-    calibrations: list[list[Hashable]] = []
+    calibrations: list[list[Hashable]] = [[] for _ in means[0].channels[0]]
     rows: list[dict[str, Any]] = []
     for p, (data, point, miss) in enumerate(zip(points, means, misses)):
         w = point.means
@@ -189,7 +180,6 @@ def campaign_blocks(
             if w is None or not w.count[g] > 0:
                 continue
             channels = point.channels[g]
-            calibrations = calibrations or [[] for _ in channels]
             load, loads = data.point.static_load, run.means("force")
             loads = loads[np.isfinite(loads).all(axis=1)]
             # standard error of the size of the run's mean cell force
@@ -206,14 +196,14 @@ def campaign_blocks(
                 "slope_noise": (noises[p] + w.motion) / max(float(w.spread[g]), 1e-12),
                 "windows": w.count[g],
                 "time": w.time[g],
-                "temperature": temperatures.get(run.run, np.nan),
+                "temperature": run.temperature,
                 "miss": missed_load(miss, [g]),
                 "miss_error": error / load if load > 0 else _LOAD_ERROR,
                 "shaft": point.shaft[g],
             }
             names.append(run.run)
             rows.append(row)
-    return stacked([data.point for data in points], names, len(means[0].channels[0]), rows, bent)
+    return stacked([data.point for data in points], names, len(calibrations), rows, bent)
 
 
 def channel_columns(channels: Sequence[Channel | None], tables: list[list[Hashable]]) -> dict[str, Any]:
@@ -287,16 +277,14 @@ def solve_campaign(
 ) -> CampaignSolution:
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
     sensors = sensors_of(campaign)
-    temperatures = run_temperatures(campaign, [(digest.run, digest.temperatures) for digest in digests])
-    common = MeansTask(sensors, temperatures=temperatures)
     loads = static_loads(campaign, points)
 
     def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> CampaignSolution:
-        task = replace(common, channels=sensors, rates=rates)
+        task = MeansTask(sensors, rates)
         means = tuple(workers.map(point_means, [(data,) for data in points], task))
-        film = tuple(_film(data, point) for data, point in zip(points, means))
+        film = tuple(film_change(data.film_lines, point.start) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])
-        blocks = campaign_blocks(points, means, loads.misses, bent, temperatures)
+        blocks = campaign_blocks(points, means, loads.misses, bent)
         rig = campaign_rig(
             campaign, loads.doubted(sensors), blocks, loads.common, bare=bare, rates=rates, to_set_point=correct
         )
@@ -320,11 +308,6 @@ def solve_campaign(
     D = vector(solution.rig, blocks, "displacement")
     in_cells = {p: force_pickup_spread(D[blocks.point == p], force) for p in on_line if force.any()}
     return replace(last, in_cells=in_cells)
-
-
-def _film(data: PointData, point: PointMeans) -> FilmChange:
-    lines = [digest.harmonics[line] for digest, line in zip(data.digests, data.lines) if digest.harmonics]
-    return film_change(lines, point.start)
 
 
 def _mains(
@@ -370,23 +353,18 @@ def misfits(solution: Solution) -> FloatArray:
 RUN_TERMS = ("load miss", "load direction")
 
 
-def estimate_of(
-    solution: Solution, point: int, h: ComplexArray, omega: float, method: str, by_run: Sequence[str] = ()
-) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
-    """H (2, 2) of a point of a solve, and its covariances (8, 8) by source; what scatters `by_run` is random."""
+def covariances_of(
+    solution: Solution, point: int, by_run: Sequence[str] = ()
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Covariances (8, 8) of a point of a solve by source, random and shared ones; what scatters `by_run` is random."""
     shared = {name: share[point] for name, share in solution.shares.items() if np.any(share[point])}
     random = {"random": solution.records[point]}
-    random |= {name: shared.pop(name) for name in by_run if name in shared}
-    covariance, freedom = total(random.values()), solution.freedom(point)
-    estimate = DynamicStiffness(
-        h, omega, covariance, freedom, method, np.ones((1, 2)), systematic=total(shared.values())
-    )
-    return estimate, random | shared
+    return random | {name: shared.pop(name) for name in by_run if name in shared}, shared
 
 
-def total(covariances: Iterable[FloatArray]) -> FloatArray:
-    """Sum of covariances (8, 8)."""
-    return np.sum([np.zeros((8, 8)), *covariances], axis=0)
+def total(covariances: Mapping[str, FloatArray]) -> FloatArray:
+    """Sum of covariances (8, 8) by source."""
+    return np.sum([np.zeros((8, 8)), *covariances.values()], axis=0)
 
 
 def shared_changes(

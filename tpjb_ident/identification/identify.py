@@ -1,6 +1,6 @@
 """A campaign's dynamic runs to dynamic coefficients: the whole path, point by point; runs over a band by their own."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,11 +22,11 @@ from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.band_blocks import ONE_LINE, STRONG, BandSolution, band_blocks, solve_bands
 from tpjb_ident.identification.campaign_solution import (
     RUN_TERMS,
-    estimate_of,
-    run_temperatures,
+    covariances_of,
     shared_changes,
     solve_campaign,
     solved_with_clocks,
+    total,
     unstated,
 )
 from tpjb_ident.identification.point import SOLVED, finished_point, point_share
@@ -45,7 +45,6 @@ from tpjb_ident.runs.run_jobs import (
     all_runs,
     campaign_verdicts,
     check_conditions,
-    check_finished,
     dry_test,
 )
 from tpjb_ident.runs.static_load import static_loads
@@ -105,42 +104,40 @@ def identify(
     solver, _ = method_of(settings.method)
     dry = dry_test(campaign, settings.phasors, SOLVED if solver == "iv" else solver)  # it has no command
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
-    bands = None
+    parts = []
     if any(is_broadband(run) for run in runs):
-        bands = identify_bands(campaign, settings, report, dry.stiffness)
-    identification = Identification(campaign.id, settings.method, (), np.zeros((1, 0)))
+        parts.append(identify_bands(campaign, settings, report, dry.stiffness))
     if sines.of_kind("dynamic"):
         finished = all_runs(sines, settings.phasors, report, workers, store)
-        identification = assemble(sines, finished, settings, report, workers, dry)
-    return _doubted(identification if bands is None else _joined(identification, bands), campaign)
+        parts.insert(0, assemble(sines, finished, settings, report, workers, dry))
+    return _joined(campaign, parts)
 
 
-def _doubted(identification: Identification, campaign: Campaign) -> Identification:
-    """Points that other frequencies contradict; positions are as uncertain as the probes' stated zeros."""
-    zero = zero_uncertainty(campaign.channels.values(), "displacement")
-    points = with_frequency_outliers(identification.points)
-    return replace(identification, points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in points))
+def _joined(campaign: Campaign, parts: Sequence[Identification]) -> Identification:
+    """The points of sines and those of bands together, sorted; sources of one name are one source.
 
-
-def _joined(sines: Identification, bands: Identification) -> Identification:
-    """The points of sines and those of bands together, sorted as ever; sources of one name are one source."""
-    points = [*sines.points, *bands.points]
-    names = tuple(dict.fromkeys((*sines.calibration_names, *bands.calibration_names)))
-    changes = np.zeros((max(len(names), 1), len(points), 8))
-    for part, places in ((sines, slice(len(sines.points))), (bands, slice(len(sines.points), None))):
+    Points that other frequencies contradict say so; positions are as uncertain as the probes' stated zeros.
+    """
+    points = [point for part in parts for point in part.points]
+    names = tuple(dict.fromkeys(name for part in parts for name in part.calibration_names))
+    changes, stop = np.zeros((max(len(names), 1), len(points), 8)), 0
+    for part in parts:
+        first, stop = stop, stop + len(part.points)
         scale = np.sqrt(len(changes) / max(len(part.calibration_names), 1))
         for name, row in zip(part.calibration_names, part.calibration_changes):
-            changes[names.index(name), places] = scale * row.reshape(-1, 8)
+            changes[names.index(name), first:stop] = scale * row.reshape(-1, 8)
     order = sorted(range(len(points)), key=lambda i: points[i].point)
-    conditions = {condition.sentence(): condition for condition in (*sines.conditions, *bands.conditions)}
+    zero = zero_uncertainty(campaign.channels.values(), "displacement")
+    checked = with_frequency_outliers([points[i] for i in order])
+    conditions = {condition.sentence(): condition for part in parts for condition in part.conditions}
     return replace(
-        sines,
-        points=tuple(points[i] for i in order),
+        parts[0],
+        points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in checked),
         calibration_changes=changes[:, order].reshape(len(changes), -1),
         conditions=tuple(conditions.values()),
-        bands=bands.bands,
+        bands=parts[-1].bands,
         calibration_names=names,
-        cell_stiffness=sines.cell_stiffness or bands.cell_stiffness,
+        cell_stiffness=parts[0].cell_stiffness or parts[-1].cell_stiffness,
     )
 
 
@@ -154,10 +151,11 @@ def assemble(
 ) -> Identification:
     """Estimate all points from runs already turned to phasors."""
     workers = workers or Workers()
-    finished, checked = check_finished(campaign, finished)
+    checked = campaign_verdicts(campaign, [seen for digest in finished.digests for seen in digest.observations])
+    finished = finished.without(checked.unusable)
     digests = finished.digests
     dry = dry or DryTest()
-    gathered = gather([digest.phasors for digest in digests], digests)
+    gathered = gather(digests)
     report("estimating", 0, len(gathered))
     solved = solve_campaign(campaign, gathered, digests, workers, settings.correct, dry.stiffness)
     jobs = []
@@ -212,18 +210,17 @@ def identify_bands(
         if not points:
             raise excluded[0].error
         loads = static_loads(campaign, points)
-        temperatures = run_temperatures(campaign, [(s.phasors.run, s.temperatures) for p in points for s in p.spectra])
-        data = band_blocks(points, sensors, loads, temperatures, settings.clearance)
+        data = band_blocks(points, sensors, loads, settings.clearance)
         known = {"bare": bare, "rates": rates, "to_set_point": settings.correct}
         return solve_bands(campaign_rig(campaign, loads.doubted(sensors), data.blocks, loads.common, **known), data)
 
     solved = solved_with_clocks(sensors_of(campaign), min(run.sample_rate for run in runs), solve)
     results, numbers = [], []
-    points = solved.data.points
+    points = solved.points
     for b, point in enumerate(points):
-        of_loads = solved.data.loads.conditions(b), check_conditions(checked, point.names)
+        of_loads = solved.loads.conditions(b), check_conditions(checked, point.names)
         without = without_runs(point.point, excluded, any_excitation=True)
-        of_records = (spectra.phasors.conditions for spectra in point.spectra)
+        of_records = (run.conditions for run in point.runs)
         of_lines = solved.solution.conditions(), band_conditions(point, solved, b)
         quality = merged(*of_loads, without, *of_records, *of_lines)
         result, parts = _result(solved, b, quality, settings.clearance)
@@ -252,25 +249,27 @@ def _estimate(
     Without an instrument all noise was the force's: H is in the middle of H1 and H2, as uncertain as a rectangle.
     """
     k, half = lines[len(lines) // 2], solved.bracket(lines)
-    est, budget = estimate_of(solution, group, solution.h[k] + half, float(solved.data.omega[k]), method)
+    random, shared = covariances_of(solution, group)
     if half.any():
-        budget[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
-        est = replace(est, systematic=est.systematic + budget[_BRACKET])
-    return replace(est, condition=float(np.median(solved.condition[lines]))), budget
+        shared[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
+    about = float(solved.omega[k]), total(random), solution.freedom(group), method, np.ones((1, 2))
+    condition = float(np.median(solved.condition[lines]))
+    est = DynamicStiffness(solution.h[k] + half, *about, condition=condition, systematic=total(shared))
+    return est, random | shared
 
 
 def _result(solved: BandSolution, b: int, quality: Conditions, clearance: float | None) -> tuple[BandResult, list[int]]:
     """Lines, models and points of one band, and the numbers of its parts."""
-    data, usable = solved.data.points[b], solved.usable_of(b)
+    data, usable = solved.points[b], solved.usable_of(b)
     lines = tuple(_line(solved, data, int(k)) for k in usable)
-    parts = [q for q, part in enumerate(solved.parts) if solved.data.band[part[0]] == b and len(usable)]
+    parts = [q for q, part in enumerate(solved.parts) if solved.band[part[0]] == b and len(usable)]
     points = [_point(solved, q, quality, clearance) for q in parts]
     # what runs scatter by is one for all parts: no chance between them
     free = [np.full(8, solved.part.noise_freedom(q)) for q in parts]
     by_noise = [replace(p, stiffness=replace(p.stiffness, dof=dof)) for p, dof in zip(points, free)]
     fits = fits_over_frequency(by_noise, _shared(solved, parts)[0])
     models, chosen = (fits[0].fits, fits[0].supported) if fits else ({}, "raw H")
-    figures = data.names, data.spectra[0].period, data.resolution, tuple(points)
+    figures = data.names, data.runs[0].period, data.resolution, tuple(points)
     return BandResult(data.point, data.kind, lines, models, chosen, quality, *figures), parts
 
 
@@ -288,15 +287,15 @@ def _line(solved: BandSolution, point: BandPoint, k: int) -> BandLine:
 def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float | None) -> PointResult:
     """One part of a band as a point: its lines alone tell its h; K-C-M only says how h changes within it."""
     lines = solved.parts[q]
-    b = int(solved.data.band[lines[0]])
-    point = solved.data.points[b]
+    b = int(solved.band[lines[0]])
+    point = solved.points[b]
     est, budget = _estimate(solved, solved.part, q, lines, f"band-{point.method}")
     inside = [solved.classic[k] for k in lines if solved.usable[k]]
-    amplitude = max(s.amplitude for s in point.spectra)
-    film = FilmChange(float(solved.data.blocks.bent[lines[0]]))
+    amplitude = max(s.amplitude for s in point.runs)
+    film = FilmChange(float(solved.blocks.bent[lines[0]]))
     bent = change_conditions(film, budget, est, amplitude, clearance)
     return PointResult(
-        **of_runs(point, [s.temperatures for s in point.spectra]),
+        **of_runs(point),
         point=replace(point.point, excitation=2 * np.pi * round(est.omega / (2 * np.pi), 3)),
         stiffness=est,
         by_method={est.method: est},
@@ -306,7 +305,7 @@ def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float |
         amplitude=amplitude,
         quality=merged(quality, physics(est, point.inertia), bent),
         rejected=(),
-        load_miss=solved.data.loads.misses[b],
+        load_miss=solved.loads.misses[b],
         clearance=clearance,
         budget=budget,
         scattering=("random",),
@@ -315,22 +314,22 @@ def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float |
 
 def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> Conditions:
     """What the lines of one band say, and its runs beside each other."""
-    mine = solved.data.band == b
-    driven, usable = np.flatnonzero(mine & solved.data.driven), solved.usable_of(b)
+    mine = solved.band == b
+    driven, usable = np.flatnonzero(mine & solved.driven), solved.usable_of(b)
     condition = float(np.median(solved.condition[driven])) if len(driven) else 0.0
     alike, few = condition > ONE_LINE, len(usable) < max(_LEAST_LINES * len(driven), 1)
     one_line = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
     weak = f"{len(usable)} of {mine.sum()} lines stand {STRONG:g} times (F ratio) above the noise"
-    spectra = point.spectra[0]
+    spectra = point.runs[0]
     low, high = spectra.frequencies[0], spectra.frequencies[-1]
     held = [f"{d.name} {d.frequency:.4g} Hz" for d in spectra.disturbances if low <= d.frequency <= high]
     bare = solved.solution.rig.bare
-    unknown = int((~bare.known(solved.data.omega[usable])).sum()) if len(bare.omega) else 0
+    unknown = int((~bare.known(solved.omega[usable])).sum()) if len(bare.omega) else 0
     blind = point.method == "hv" and len(usable) > 0
     coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0
     text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"
     return merged(
-        fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.spectra)),
+        fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.runs)),
         differing_runs(solved.run_scatter),
         holding(
             (alike, "fewer-than-two-directions", one_line),

@@ -10,7 +10,7 @@ from tpjb_ident.conditions import Conditions, holding, merged
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, method_of, not_locked
 from tpjb_ident.estimators.r_matrix import phasor_table
 from tpjb_ident.estimators.stiffness import DynamicStiffness
-from tpjb_ident.identification.campaign_solution import RUN_TERMS, CampaignSolution, estimate_of
+from tpjb_ident.identification.campaign_solution import RUN_TERMS, CampaignSolution, covariances_of, total
 from tpjb_ident.identification.point_means import channel_windows, means_attenuation, vectors
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.run_data import RunPhasors, complex_median
@@ -96,29 +96,31 @@ def _estimate(
     windows = means.means
     if not np.isfinite(solution.h[p]).all() or windows is None:
         return None, {}
-    omega = float(np.median(solution.blocks.omega[solution.blocks_of(p)]))
-    estimate, budget = estimate_of(solution, p, solved.h[p], omega, SOLVED, RUN_TERMS)
+    random, shared = covariances_of(solution, p, RUN_TERMS)
+    freedom = solution.freedom(p)
     if p in solved.mains:
-        fit = solved.mains[p]
-        budget["mains"] = fit.covariance
-        freedom = np.minimum(estimate.dof, fit.dof)
-        estimate = replace(estimate, covariance=estimate.covariance + fit.covariance, dof=freedom)
+        random["mains"] = solved.mains[p].covariance
+        freedom = np.minimum(freedom, solved.mains[p].dof)
     if p in solved.in_cells:
-        budget["mains on the cells"] = solved.in_cells[p]
-        estimate = replace(estimate, systematic=estimate.systematic + solved.in_cells[p])
+        shared["mains on the cells"] = solved.in_cells[p]
     weights = windows.weights * run_weight[data.run_index]
     runs = int((run_weight > 0).sum())
     flags = fit_conditions(means.condition, weights[data.whole], runs)
-    estimate = replace(
-        estimate,
-        weights=np.repeat(weights[:, None], 2, axis=1),
-        status=(*means.status, *flags, *not_locked(windows.wandering, runs)),
-        condition=means.condition,
-        chi_square=float(solution.chi_square[p]),
-        spare_equations=int(max(solution.spare[p], 0)),
-        attenuation=means_attenuation(windows, solved.task),
+    estimate = DynamicStiffness(
+        solved.h[p],
+        float(np.median(solution.blocks.omega[solution.blocks_of(p)])),
+        total(random),
+        freedom,
+        SOLVED,
+        np.repeat(weights[:, None], 2, axis=1),
+        (*means.status, *flags, *not_locked(windows.wandering, runs)),
+        means.condition,
+        float(solution.chi_square[p]),
+        int(max(solution.spare[p], 0)),
+        means_attenuation(windows, solved.task),
+        total(shared),
     )
-    return estimate, budget
+    return estimate, random | shared
 
 
 def finished_point(settings: IdentifySettings, share: PointShare) -> PointResult:
@@ -144,7 +146,7 @@ def finished_point(settings: IdentifySettings, share: PointShare) -> PointResult
         share.checks,
     )
     return PointResult(
-        **of_runs(data, [digest.temperatures for digest in data.digests]),
+        **of_runs(data),
         point=data.point,
         stiffness=best,
         by_method=by_method,

@@ -44,7 +44,6 @@ class MeansTask(Directed):
 
     channels: tuple[Sensor, ...]
     rates: Mapping[str, float] = field(default_factory=dict)  #: of the devices' clocks, relative
-    temperatures: Mapping[str, float] = field(default_factory=dict)  #: of the runs, at the probes [K]
 
     @property
     def along(self) -> FloatArray:
@@ -92,7 +91,7 @@ def _residual_density(
     if means is not None:
         bins = bins - motion_in(bins, np.ones(len(bins)), means.mean, film)
     freedom = float(len(bins))
-    return np.asarray(bins.T @ bins.conj() / max(freedom, 1.0), complex), freedom
+    return bins.T @ bins.conj() / max(freedom, 1.0), freedom
 
 
 def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple[ComplexArray, Conditions]:
@@ -117,39 +116,27 @@ def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple
 def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tuple[tuple[Channel | None, ...], ...]]:
     """Phasors of the windows channel by channel (n, m), NaN where there is none, and the channels of each run (g, m).
 
-    Off it are what clocks run ahead and, as far as it is known, the drift of a channel's gain with the temperature.
+    What clocks run ahead is off it.
     """
     z = np.full((len(data.run_index), len(task.channels)), np.nan + 0j)
-    described: list[dict[int, Channel]] = []
     for g, (run, line) in enumerate(zip(data.runs, data.lines)):
-        named = {(channel.name, channel.quantity): channel for channel in run.channels}
         phasors = by_channel(run.z[:, line], run.channels, task.channels)
         least = _LEAST_WINDOWS * np.isfinite(run.z[:, line]).mean(axis=0).max(initial=0.0)
-        described.append({})
         # in more than a share of the windows, and not zeros throughout
         usable = (np.isfinite(phasors).mean(axis=0) > least) & np.nan_to_num(phasors).any(axis=0)
-        for j in np.flatnonzero(usable).tolist():
-            channel = described[g][j] = named[task.channels[j].name, task.channels[j].quantity]
-            gain = warm_gain(channel, task.temperatures.get(run.run, np.nan))
-            z[data.run_index == g, j] = phasors[:, j] / gain
+        z[data.run_index == g] = np.where(usable, phasors, np.nan)
     # channels that show nothing of what others of their quantity do
     z[:, ~alive(task.channels, np.abs(np.nan_to_num(z)).max(axis=0, initial=0.0))] = np.nan
     living = []
-    for g, channels in enumerate(described):
-        shown = np.isfinite(z[data.run_index == g]).any(axis=0)
-        living.append(tuple(channels.get(j) if is_shown else None for j, is_shown in enumerate(shown)))
+    for g, run in enumerate(data.runs):
+        named = {(channel.name, channel.quantity): channel for channel in run.channels}
+        shown = zip(task.channels, np.isfinite(z[data.run_index == g]).any(axis=0))
+        living.append(tuple(named[sensor.name, sensor.quantity] if is_shown else None for sensor, is_shown in shown))
     # how far the devices' clocks have run ahead
     rates = [task.rates.get(sensor.clock, 0.0) for sensor in task.channels]
     omega = 2 * np.pi * np.array([r.lines.driven[i] for r, i in zip(data.runs, data.lines)])
     ahead = np.multiply.outer(omega[data.run_index] * _window_times(data), rates)
     return z * np.exp(1j * ahead), tuple(living)
-
-
-def warm_gain(channel: Channel, temperature: float) -> float:
-    """Gain of a channel beside that of its reference temperature, which may not be known (NaN)."""
-    if not channel.temperature_coefficient or np.isnan(temperature) or channel.temperature_reference is None:
-        return 1.0
-    return 1 + channel.temperature_coefficient * (temperature - channel.temperature_reference)
 
 
 def vectors(z: ComplexArray, data: PointData, task: MeansTask) -> tuple[ComplexArray, ComplexArray]:

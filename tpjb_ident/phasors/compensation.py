@@ -1,4 +1,4 @@
-"""What the channels' electronics did to the phasors, taken out: filters, delays, slower sampling.
+"""What the channels' electronics did to the phasors, taken out: filters, delays, warmth, slower sampling.
 
 A channel sampled at f_s and written at a higher rate (filled up by a logger program) holds an image of all that it
 shows at f, noise too, at f_s - f and f_s + f, of size (f / (f_s -+ f))^n: n = 1 where values are held, 2 along straight
@@ -10,6 +10,7 @@ linear makes of the shaft's own motion stands at X - f and 2X - f, and is no ima
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -43,6 +44,10 @@ _ORDERS = {1: "held", 2: "interpolated", 4: "interpolated (splines)"}
 _EVEN = 3e-4
 #: Images to either side of a line that a spline's own factor is summed over.
 _IMAGES = 20
+
+
+#: Of any run.
+Phasors = TypeVar("Phasors", bound=RunPhasors)
 
 
 @dataclass(frozen=True)
@@ -169,10 +174,8 @@ def _filling_order(size: FloatArray, k: int) -> int | None:
     return order if abs(shown - order) < _AGREE * order else None
 
 
-def compensated(
-    result: RunPhasors, run: Run, slower: Mapping[str, SlowerChannel], delays: Mapping[str, float]
-) -> RunPhasors:
-    """The run's phasors as channels without filters, filling and delays would have given them.
+def compensated(result: Phasors, run: Run, slower: Mapping[str, SlowerChannel], delays: Mapping[str, float]) -> Phasors:
+    """The run's phasors as channels without filters, filling, delays and warmth would have given them.
 
     `delays` [s]: of whole quantities.
     """
@@ -188,6 +191,9 @@ def compensated(
                 cure = "Extend filter_table, or check filter"
                 raise refuse(run.file, f"channel {channel.name}", f"{text}, or nothing comes through", cure, run.id)
             gains[:, k] *= np.where(unknown, 1.0, gain)  # 1 at disturbing lines that a table does not reach
+        if channel.temperature_reference is not None and not np.isnan(result.temperature):
+            warmer = result.temperature - channel.temperature_reference
+            gains[:, k] *= 1 + channel.temperature_coefficient * warmer
         if channel.name in slower:
             gains[:, k] *= slower[channel.name].at(frequencies)
     rates = ", ".join(f"{name} {_ORDERS[s.order]} from {s.rate:.4g} Hz" for name, s in slower.items())

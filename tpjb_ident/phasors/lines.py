@@ -88,12 +88,14 @@ class LineSet:
 
     def at_speed(self, speed: float, rate: float = 0.0) -> LineSet:
         """The same lines with 1X, 2X.. at another shaft speed [Hz]; all by a clock that runs faster by `rate`."""
-        groups = []
-        for lines in (self.excitation, self.nuisance, self.faint):
-            moved = [line.frequency * (1 + rate) + line.order * (speed - self.speed) for line in lines]
-            groups.append(tuple(replace(line, frequency=f) for line, f in zip(lines, moved)))
-        excitation, nuisance, faint = groups
-        return replace(self, excitation=excitation, nuisance=nuisance, faint=faint, speed=speed)
+        moved = {}
+        for name in ("excitation", "nuisance", "faint"):
+            lines = []
+            for line in getattr(self, name):
+                frequency = line.frequency * (1 + rate) + line.order * (speed - self.speed)
+                lines.append(replace(line, frequency=frequency))
+            moved[name] = tuple(lines)
+        return replace(self, speed=speed, **moved)
 
 
 @dataclass(frozen=True)

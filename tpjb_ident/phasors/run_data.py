@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -122,6 +122,8 @@ class RunPhasors(Directed):
     #: by line of the whole record, (n_bins, n_channels) complex: residual in the bins around it
     residual: tuple[ComplexArray, ...] = ()
     rounding: FloatArray = field(default_factory=lambda: np.empty(0))  #: (n_channels,), SI^2: by it on a line, at most
+    temperatures: dict[int, float] = field(default_factory=dict)  #: K: mean by pad
+    temperature: float = np.nan  #: K: at the probes, as stated, else the mean of the thermometers
 
     @cached_property
     def displacement(self) -> ComplexArray:
@@ -132,7 +134,7 @@ class RunPhasors(Directed):
         """X and Y of a quantity's mean in every window, (n_windows, 2)."""
         return self.plane(quantity, self.mean).real
 
-    def divided(self, gains: ComplexArray) -> RunPhasors:
+    def divided(self, gains: ComplexArray) -> Self:
         """The run without gains of its channels at the whole record's lines, (n_whole_lines, n_channels)."""
         residual = tuple(bins / gain for bins, gain in zip(self.residual, gains))
         record = self.record / gains[: len(self.record)]
@@ -149,9 +151,10 @@ class RunPhasors(Directed):
             force += self.housing_mass * self.plane("acceleration", values)
         return force
 
-    def oil_force(self, line: int | slice = 0) -> ComplexArray:
-        """Oil-force phasors at one line, shape (n, 2) [N], or at several, (n, n_lines, 2)."""
-        return self.film_force(self.z[:, line])
+    @cached_property
+    def force(self) -> ComplexArray:
+        """X and Y of the oil force, (n_windows, n_lines, 2) [N]."""
+        return self.film_force(self.z)
 
 
 def by_channel(values: np.ndarray, channels: Sequence[Channel], wanted: Sequence[Channel]) -> np.ndarray:
@@ -246,7 +249,7 @@ def mains_lines(run: RunPhasors) -> tuple[ComplexArray | None, ComplexArray | No
     if any(abs(f - mains.frequency) <= mains.wander for f in harmonics):
         return None, None
     typical: list[ComplexArray | None] = []
-    for z in (run.displacement[:, place], run.oil_force(place)):
+    for z in (run.displacement[:, place], run.force[:, place]):
         complete = z[np.isfinite(z).all(axis=1)]
         typical.append(complex_median(complete) if len(complete) else None)
     return typical[0], typical[1]

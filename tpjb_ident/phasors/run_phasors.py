@@ -244,7 +244,9 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
         f"{slower[c.name].rate:.4g} Hz" if c.name in slower else d for c, d in zip(result.channels, result.device)
     )
     conditions = merged(fit.conditions, result.lines.conditions)
-    return compensated(replace(result, conditions=conditions, device=device), run, slower, settings.delays)
+    temperature = beginning_of(run, SHORT).mean_temperature() or np.nan
+    described = replace(result, conditions=conditions, device=device, temperature=temperature)
+    return compensated(described, run, slower, settings.delays)
 
 
 def _beginning_fit(run: Run, housing_mass: float, settings: PhasorSettings) -> _RunFit:

@@ -65,7 +65,7 @@ def spare_slopes(run: Run, along: FloatArray) -> dict[str, FloatArray]:
             continue
         moved = run.vector(quantity).values @ along.T
         for name in names:
-            reading = np.asarray(run.record(name).values)
+            reading = run.record(name).values
             used = good_samples(np.column_stack([moved, reading]))
             if np.ptp(reading[used]) > 0.0:
                 design = np.column_stack([moved[used], np.ones(used.sum())])
@@ -83,7 +83,7 @@ def refused_runs(problems: Sequence[Problem]) -> Conditions:
 def piece_means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
     """Means of the rows of `values` (n, k) over pieces first..last-1 (m,), (m, k)."""
     total = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
-    return np.asarray((total[last] - total[first]) / (last - first)[:, None] + values[0])
+    return (total[last] - total[first]) / (last - first)[:, None] + values[0]
 
 
 def good_samples(values: FloatArray, longest: int = _LONGEST) -> BoolArray:

@@ -290,7 +290,7 @@ def _least(windows: ComplexArray, time: FloatArray, places: FloatArray) -> Float
         best = places[np.argmin(_left(windows, time, places))]
         places = np.tile(best, (9, 1))
         places[:, -1] += step * np.linspace(-1.0, 1.0, 9)
-    return np.asarray(best)
+    return best
 
 
 #: Excitations this near to one of them make the question matter [Hz].

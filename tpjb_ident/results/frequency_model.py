@@ -85,13 +85,13 @@ class FrequencyModel:
         return K - w**2 * M + 1j * w * C
 
     def columns(self) -> dict[str, Any]:
-        """What the tables say of the model, under `MODEL_COLUMNS`; zero what it does not have."""
+        """What the tables say of the model, under its name and `MODEL_COLUMNS`; zero what it does not have."""
         figures = (self.n_frequencies, *self.band, self.chi_square, self.spare, self.probability, self.misfit)
         value, half = self.parameters, self.half_width()
         numbers = np.zeros((len(_VALUES), len(_ENDINGS)))
         numbers[:, -1] = np.inf
         numbers[: len(value)] = np.stack([value, value - half, value + half, self.standard_error, self.dof], axis=1)
-        return dict(zip(MODEL_COLUMNS, (*figures, *numbers.ravel())))
+        return {"model": self.model, **dict(zip(MODEL_COLUMNS, (*figures, *numbers.ravel())))}
 
 
 def chance_of(chi_square: float, dof: int, noise_dof: Sequence[float]) -> float:

@@ -139,9 +139,8 @@ class Identification(Presented):
 
         rows = []
         for group in self.frequency_fits():
-            key = dict(zip(STATIC_KEY, group.points[0].point.static_key))
-            for name, fit in group.fits.items():
-                rows.append({**key, "model": name, "supported": group.supported, **fit.columns()})
+            common = {**dict(zip(STATIC_KEY, group.points[0].point.static_key)), "supported": group.supported}
+            rows += [common | fit.columns() for fit in group.fits.values()]
         return pd.DataFrame(rows, columns=[*STATIC_KEY, "model", "supported", *MODEL_COLUMNS])
 
     def remarks(self) -> tuple[str, ...]:
@@ -329,5 +328,5 @@ def models_frame(results: Sequence[BandResult]) -> pd.DataFrame:
     for result in results:
         common = {**result.key(), "supported": result.supported, "method": result.method}
         common["quality"] = quality_cell(result.quality)
-        rows += [{**common, "model": model.model, **model.columns()} for model in result.models.values()]
+        rows += [common | model.columns() for model in result.models.values()]
     return pd.DataFrame(rows, columns=_MODEL_COLUMNS)

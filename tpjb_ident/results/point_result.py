@@ -118,15 +118,15 @@ def quality_cell(conditions: Sequence[str]) -> str:
     return "; ".join(conditions) or "ok"
 
 
-def of_runs(recorded: RunsOfPoint, temperatures: Sequence[dict[int, float]]) -> dict[str, Any]:
-    """What a point's result has of its runs, by name; `temperatures` of every run by pad [K]."""
+def of_runs(recorded: RunsOfPoint) -> dict[str, Any]:
+    """What a point's result has of its runs, by name."""
     positions, runs = recorded.mean_positions, len(recorded.names)
     error = positions.std(axis=0, ddof=1) / np.sqrt(runs) if runs > 1 else np.full(2, np.nan)
     return {
         "static_load_measured": float(np.abs(recorded.mean_loads.mean())),
         "position": positions.mean(axis=0),
         "position_se": error,
-        "temperatures": pad_means(temperatures),
+        "temperatures": pad_means([run.temperatures for run in recorded.runs]),
         "n_records": runs,
         "runs": recorded.names,
         "inertia_corrected": not recorded.inertia,
@@ -175,14 +175,15 @@ def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> t
         run = data.runs[data.run_index[i]]
         k = int(i - np.searchsorted(data.run_index, data.run_index[i]))
         direction = float("nan") if run.direction is None else run.direction
-        lost = {name: run.lost[k, run.pick(name)].max(initial=0.0) for name in ("displacement", "force")}
-        reason = _reason(data, lost, int(i), weights, answered)
+        reason = _reason(data, run.lost[k], int(i), weights, answered)
         verdicts.append(WindowVerdict(run.run, float(run.start[k]), float(weights[i]), direction, reason))
     return tuple(verdicts)
 
 
-def _reason(data: PointData, lost: Mapping[str, float], i: int, weights: FloatArray, answered: bool) -> str:
-    for name, share in lost.items():
+def _reason(data: PointData, lost: FloatArray, i: int, weights: FloatArray, answered: bool) -> str:
+    """What shows in window `i`; `lost` (n_channels,): share of its samples left out, `weights` (n,)."""
+    for name in ("displacement", "force"):
+        share = lost[data.runs[data.run_index[i]].pick(name)].max(initial=0.0)
         if share > 0.5:
             return f"{100 * share:.0f} % of the {name} samples missing or glitched"
     if not (np.isfinite(data.D[i]).all() and np.isfinite(data.F[i]).all()):
@@ -192,14 +193,12 @@ def _reason(data: PointData, lost: Mapping[str, float], i: int, weights: FloatAr
     siblings = (data.run_index == data.run_index[i]) & (weights >= REJECTED_WEIGHT)
     if not siblings.any():
         return "whole run disagrees with the other directions"
-    moves = {"displacement": _shift(data.D[i], data.D[siblings]), "force": _shift(data.F[i], data.F[siblings])}
-    worst = max(moves, key=lambda name: moves[name])
-    return f"{worst} phasor {100 * moves[worst]:.1f} % away from its repeats"
-
-
-def _shift(z: ComplexArray, repeats: ComplexArray) -> float:
-    mean = repeats.mean(axis=0)
-    return float(np.linalg.norm(z - mean) / max(float(np.linalg.norm(mean)), np.finfo(float).tiny))
+    moves = []
+    for name, z in (("displacement", data.D), ("force", data.F)):
+        mean = z[siblings].mean(axis=0)
+        moves.append((np.linalg.norm(z[i] - mean) / max(np.linalg.norm(mean), np.finfo(float).tiny), name))
+    share, worst = max(moves)
+    return f"{worst} phasor {100 * share:.1f} % away from its repeats"
 
 
 def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> Conditions:

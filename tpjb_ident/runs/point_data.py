@@ -8,7 +8,8 @@ that loses all of its runs is told as lost.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -27,38 +28,30 @@ _LISTED = 6
 
 
 @dataclass(frozen=True, repr=False)
-class RunDigest:
-    """What a run says."""
+class RunDigest(RunPhasors):
+    """What a run says: the phasors of its excitation lines, and what is left of all others."""
 
-    phasors: RunPhasors  #: of its excitation lines alone
-    mains: ComplexArray | None  #: (2,) complex, m: displacement at the mains line, where it stands apart
-    mains_force: ComplexArray | None  #: (2,) complex, N: oil force at the mains line, where it stands apart
-    temperatures: dict[int, float]
+    mains: ComplexArray | None = None  #: (2,) complex, m: displacement at the mains line, where it stands apart
+    mains_force: ComplexArray | None = None  #: (2,) complex, N: oil force at the mains line, where it stands apart
     harmonics: tuple[FilmLines | None, ...] = ()
     sample_rate: float = 0.0
     observations: tuple[Observation, ...] = ()
 
-    @property
-    def run(self) -> str:
-        """Name."""
-        return self.phasors.run
 
-    @property
-    def point(self) -> OperatingPoint:
-        """Set point."""
-        return self.phasors.point
-
-
-def digest(
-    phasors: RunPhasors,
-    temperatures: dict[int, float],
-    sample_rate: float = 0.0,
-    observations: tuple[Observation, ...] = (),
-) -> RunDigest:
+def digest(phasors: RunPhasors, sample_rate: float = 0.0, observations: tuple[Observation, ...] = ()) -> RunDigest:
     """Sum up the phasors of all lines of a run that was recorded at `sample_rate` [Hz]."""
     lines = len(phasors.lines.excitation)
     excitation = replace(phasors, z=phasors.z[:, :lines].copy(), residual=phasors.residual[:lines])
-    return RunDigest(excitation, *mains_lines(phasors), temperatures, film_lines(phasors), sample_rate, observations)
+    phasors_left: dict[str, Any] = {f.name: getattr(excitation, f.name) for f in fields(excitation)}
+    mains, force = mains_lines(phasors)
+    return RunDigest(
+        **phasors_left,
+        mains=mains,
+        mains_force=force,
+        harmonics=film_lines(phasors),
+        sample_rate=sample_rate,
+        observations=observations,
+    )
 
 
 @dataclass(frozen=True)
@@ -140,7 +133,7 @@ class RunsOfPoint:
     """Runs at one operating point, with sines or over a band."""
 
     point: OperatingPoint
-    runs: tuple[RunPhasors, ...]
+    runs: tuple[Any, ...]  #: of `RunPhasors`, or what is made of them
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -171,13 +164,17 @@ class PointData(RunsOfPoint):
     D: ComplexArray  #: (n, 2) complex, m
     F: ComplexArray  #: (n, 2) complex, N
     run_index: IntArray  #: (n,): windows of one run are repeats of one excitation
-    digests: tuple[RunDigest, ...] = ()  #: of the runs, where they are those of a campaign
 
     @property
     def omega(self) -> float:
         """Excitation frequency as found in the runs, else as set [rad/s]."""
         frequency = float(np.median([run.lines.driven[i] for run, i in zip(self.runs, self.lines)]))
         return self.point.excitation if abs(frequency - self.point.excitation_hz) < 1e-6 else 2 * np.pi * frequency
+
+    @property
+    def film_lines(self) -> list[FilmLines | None]:
+        """What the film makes of the line in every run that says so."""
+        return [run.harmonics[line] for run, line in zip(self.runs, self.lines) if run.harmonics]
 
     @property
     def whole(self) -> BoolArray:
@@ -206,13 +203,10 @@ def finite_mean(rows: FloatArray) -> FloatArray:
     return good.mean(axis=0) if len(good) else np.full(2, np.nan)
 
 
-def gather(runs: list[RunPhasors], digests: Sequence[RunDigest] = ()) -> list[PointData]:
+def gather(runs: Sequence[RunPhasors]) -> list[PointData]:
     """Group runs by operating point; a record with several excitation lines feeds several points."""
-    points = []
-    for point, members in group([(run.point, run.lines.driven) for run in runs]):
-        data = point_data(point, [(runs[k], i) for k, i in members])
-        points.append(replace(data, digests=tuple(digests[k] for k, _ in members if digests)))
-    return points
+    groups = group([(run.point, run.lines.driven) for run in runs])
+    return [point_data(point, [(runs[k], i) for k, i in members]) for point, members in groups]
 
 
 def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:
@@ -238,7 +232,7 @@ def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> 
     runs = tuple(run for run, _ in members)
     lines = tuple(i for _, i in members)
     D = [run.displacement[:, i] for run, i in zip(runs, lines)]
-    F = [run.oil_force(i) for run, i in zip(runs, lines)]
+    F = [run.force[:, i] for run, i in zip(runs, lines)]
     index = np.repeat(np.arange(len(runs)), [len(d) for d in D])
     return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), index)
 

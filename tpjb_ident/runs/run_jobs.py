@@ -71,7 +71,7 @@ _NOT_OURS = (
 )
 #: Classes that a result is made of, field by field, and series of values.
 _RECORDS = (
-    RunDigest, RunPhasors, OperatingPoint, LineSet, Line, FilmLine,
+    RunDigest, OperatingPoint, LineSet, Line, FilmLine,
     Observation, RecordLines, Reporter, Finding, Problem,
 )  # fmt: skip
 _MADE: dict[str, Any] = {kind.__name__: kind for kind in (*_RECORDS, tuple, list, set)}
@@ -238,7 +238,7 @@ def _dead_accelerometers(digests: Sequence[RunDigest]) -> dict[str, Problem]:
     cure = "Check sensor, cable and amplifier; repeat the run"
     dead = {}
     for run in digests:
-        for condition in run.phasors.conditions:
+        for condition in run.conditions:
             if condition == _DEAD_ACCELEROMETER:
                 dead[run.run] = Problem("error", run.observations[0].run.file, "", condition.detail, cure, run.run)
     return dead if 2 * len(dead) < len(digests) else {}
@@ -279,8 +279,9 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDiges
         repairs = [f"{p.file}, {p.place}: {p.what}" for p in run.reader.problems() if p.severity == "warning"]
         repaired = holding((repairs, "record-damaged", "; ".join(repairs)))
         conditions = merged(phasors.conditions, dead, repaired)
-        result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(cached, phasors))
-        return digest(result, mean_temperatures(cached), run.sample_rate, observations)
+        phases, temperatures = shaft_phases(cached, phasors), mean_temperatures(cached)
+        result = replace(phasors, conditions=conditions, shaft_phase=phases, temperatures=temperatures)
+        return digest(result, run.sample_rate, observations)
 
 
 def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
@@ -328,17 +329,10 @@ _STATIC = ("dry_pivot", "clearance", "locus")
 _CONTRADICTED, _DOUBTFUL, _RUN_GAIN = "records-contradicted", "records-doubtful", "run-gain-off"
 
 
-def check_finished(campaign: Campaign, finished: FinishedRuns) -> tuple[FinishedRuns, Verdicts]:
-    """Judge all finished runs beside each other; those with an error of their own are left out."""
-    observed = [observation for digest in finished.digests for observation in digest.observations]
-    if not observed:  # runs that are no files
-        return finished, Verdicts()
-    result = campaign_verdicts(campaign, observed)
-    return finished.without(result.unusable), result
-
-
 def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -> Verdicts:
     """What the checks say of dynamic runs, by run; static runs say what they show of the channels."""
+    if not observations:  # runs that are no files
+        return Verdicts()
     static = [observe(run) for run in campaign.runs if run.kind in _STATIC]
     reports = [observation.report for observation in judged(campaign, [*observations, *static])[0]]
     reach(reports)
