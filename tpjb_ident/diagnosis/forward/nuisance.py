@@ -126,7 +126,8 @@ def at_baseline(
 ) -> FloatArray:
     """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
     listed, step = nuisances(forward.elements, setup, known, by_pad=False), np.array([_STEP])
-    return np.column_stack([(predict(forward, effects, (nuisance,), step) - base) / _STEP for nuisance in listed])
+    moved = [predict(forward.fresh(near=True), effects, (nuisance,), step) for nuisance in listed]
+    return (np.column_stack(moved) - base[:, None]) / _STEP
 
 
 def predict(forward: Forward, effects: Sequence[Effect], known: Sequence[Nuisance], size: FloatArray) -> FloatArray:
