@@ -171,7 +171,7 @@ class _Search:
         if len(best.faults) == 1 and best.labels not in self.moved:
             self.moved.add(best.labels)
             # tolerances have derivatives there
-            sizes = [0.0 if path.fault.own >= 0 else float(path.fault.width[0]) / 3.0 for path in self.paths]
+            sizes = [0.0 if path.fault.own >= 0 else float(path.fault.width[0]) for path in self.paths]
             place = best.faults, best.linear.theta
             self._propose_neighbours(best, lengthened(self.run, place, self.paths, sizes))
         if not self.whole:
@@ -232,9 +232,11 @@ class _Search:
             self.begun[proposal.labels] = proposal.estimate
         if fit is None:
             return
+        # of slow effects a coarse start takes half a minute
+        again = bool(fit.faults) and proposal.labels not in self.begun and fit.names.isdisjoint(SLOW)
         wrong = fit.posterior.refused > Deciding.better or fit.needs_more
         promised = max(fit.posterior.promised, proposal.estimate - self._log_prior(fit.faults))
-        if wrong and fit.faults and proposal.labels not in self.begun and self._near(fit, promised, 0.0):
+        if again and wrong and self._near(fit, promised, 0.0):
             self.begun[proposal.labels] = -math.inf
             coarse = self._reached(Start(fit.faults, (fit.linear.theta,), fit.linear.jacobian, coarse=True))
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
