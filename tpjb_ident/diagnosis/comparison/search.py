@@ -225,18 +225,17 @@ class _Search:
         return self._renewed(fit) if tenable_first or self._near(fit, fit.posterior.promised, nats) else fit
 
     def _fit(self, proposal: Start) -> None:
-        """Fit a proposal; one that should lead and is wrong, or stopped at a jump, once more with a coarse start."""
+        """Fit a proposal; one that should lead and stopped far from its promise once more with a coarse start."""
         fit = self._reached(proposal)
         self.tried += 1
         if proposal.coarse:
             self.begun[proposal.labels] = proposal.estimate
         if fit is None:
             return
-        # of slow effects a coarse start takes half a minute
-        again = bool(fit.faults) and proposal.labels not in self.begun and fit.names.isdisjoint(SLOW)
-        wrong = fit.posterior.refused > Deciding.better or fit.needs_more
         promised = max(fit.posterior.promised, proposal.estimate - self._log_prior(fit.faults))
-        if again and wrong and self._near(fit, promised, 0.0):
+        stopped = promised > fit.posterior.total + Deciding.mistaken and self._near(fit, promised, 0.0)
+        # of slow effects a coarse start takes half a minute
+        if stopped and fit.faults and proposal.labels not in self.begun and fit.names.isdisjoint(SLOW):
             self.begun[proposal.labels] = -math.inf
             coarse = self._reached(Start(fit.faults, (fit.linear.theta,), fit.linear.jacobian, coarse=True))
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
