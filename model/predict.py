@@ -105,10 +105,11 @@ def predict(
             f"speed must be positive [rad/s], got {speed_si!r}; `rotation` says which way the shaft turns"
         )
     omega = speed_si if excitation is None else _in_si(excitation, "speed", "excitation")
+    force = _number(load, "force", "load")
     direction = _number(load_direction, "angle", "load_direction")
     spin = -speed_si if rotation == ROTATIONS[1] else speed_si
     neighbour = start.equilibrium if start is not None else None
-    return predict_setup(setup, _number(load, "force", "load"), direction, spin, omega, neighbour)
+    return predict_setup(setup, force, direction, spin, omega, neighbour)
 
 
 def _mesh(mesh: Any) -> Mesh:
@@ -184,12 +185,17 @@ def predict_setup(
 
 
 def solve_as_it_runs(
-    setup: Setup, force: FloatArray, speed: float, start: Equilibrium | None = None, **how: bool
+    setup: Setup,
+    force: FloatArray,
+    speed: float,
+    start: Equilibrium | None = None,
+    patient: bool = True,
+    near: bool = False,
 ) -> tuple[Setup, Equilibrium]:
     """Find the equilibrium with the clearances that belong to its own temperatures: `force` (2,) [N].
 
     `speed` [rad/s] is about +z. Both results are in the frame where the shaft turns counter-clockwise, see
-    `model.mirror`; so is `start`. `how`: as of `solve_equilibrium`.
+    `model.mirror`; so is `start`. `patient` and `near` as of `solve_equilibrium`.
     """
     setup = seen_by_shaft(setup, speed)
     force = in_rig(setup, force)
@@ -197,7 +203,7 @@ def solve_as_it_runs(
     if growth is not None and growth.journal is not None:
         grown_bearing = grown(setup.bearing, growth, setup.inlet_temperature, growth.journal)
         setup = setup.change(bearing=grown_bearing, grown=True)
-    equilibrium = solve_equilibrium(setup, force, abs(speed), start, **how)
+    equilibrium = solve_equilibrium(setup, force, abs(speed), start, patient, near)
     if setup.growth is not None:
         running = setup.bearing.with_pads(tuple(f.pad for f in equilibrium.films))
         setup = setup.change(bearing=running, grown=True)

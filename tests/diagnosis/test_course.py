@@ -9,7 +9,7 @@ from model.effects import Effect, known_effects
 from model.setup import Mesh
 from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
-from tpjb_ident.diagnosis.comparison.fit import Start, begun, fitted
+from tpjb_ident.diagnosis.comparison.fit import Start, fitted, solved_places
 from tpjb_ident.diagnosis.comparison.paths import lengthened, path_through
 from tpjb_ident.diagnosis.comparison.search import _Search, compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
@@ -134,7 +134,7 @@ def test_a_start_without_an_equilibrium_is_taken_nearer_to_what_is_stated():
     with workers(forward, problem, 1) as run:
         assert next(iter(run(prediction, [((fault,), theta)]))) is None
         start = Start((fault,), (theta,), jacobian)
-        ((_, linear),) = begun(run, problem, start)
+        ((_, linear),) = solved_places(run, problem, start)
         fit = fitted(run, problem, start, linear)
     assert abs(fit.linear.theta[0]) <= np.radians(1.0)
 
@@ -153,7 +153,7 @@ def test_a_fit_goes_on_while_its_steps_pay():
     problem = SimpleNamespace(measured=shown(truth), errors=errors, nuisances=nuisances)
     start = Start((), (np.zeros(6),), straight)
     run = predicts(shown)
-    ((_, linear),) = begun(run, problem, start)
+    ((_, linear),) = solved_places(run, problem, start)
     fit = fitted(run, problem, start, linear)
     assert fit.linear.theta == pytest.approx(truth, abs=0.05)
     assert fit.posterior.refused < 1.0

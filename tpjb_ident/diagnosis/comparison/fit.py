@@ -182,10 +182,10 @@ class Start:
         return frozenset(fault.label for fault in self.faults)
 
 
-def begun(run: Map, problem: Problem, start: Start) -> list[tuple[float, Linear]]:
+def solved_places(run: Map, problem: Problem, start: Start) -> list[tuple[float, Linear]]:
     """A start's places with what they promise, the most first; none: no equilibrium."""
     unknowns = Unknowns(problem, start.faults)
-    solved = [_begun(run, unknowns, place, start.jacobian) for place in start.places]
+    solved = [_solved_place(run, unknowns, place, start.jacobian) for place in start.places]
     places = [(posterior(problem.errors, at).promised, at) for at in solved if at is not None]
     return sorted(places, key=lambda row: -row[0])
 
@@ -206,7 +206,7 @@ def _past_jumps(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
     return _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
 
 
-def _begun(run: Map, unknowns: Unknowns, place: FloatArray, jacobian: FloatArray) -> Linear | None:
+def _solved_place(run: Map, unknowns: Unknowns, place: FloatArray, jacobian: FloatArray) -> Linear | None:
     """The model at a place, or nearer to what is stated, where there is no equilibrium; None where there is none."""
     for share in _SHARES:
         theta = share * np.clip(place, unknowns.low, unknowns.high)

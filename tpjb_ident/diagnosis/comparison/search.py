@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
-from tpjb_ident.diagnosis.comparison.fit import Fit, Start, begun, fitted, refined
+from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined, solved_places
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores, separations
@@ -204,7 +204,7 @@ class _Search:
     def _reached(self, start: Start) -> Fit | None:
         """Where a start leads, from each of its places that promises clearly more than was reached."""
         best: Fit | None = None
-        for promise, linear in begun(self.run, self.problem, start):
+        for promise, linear in solved_places(self.run, self.problem, start):
             if best is None or promise > best.posterior.total + Deciding.better:
                 fit = self._led(start, linear)
                 best = fit if best is None else max(best, fit, key=lambda end: end.posterior.total)

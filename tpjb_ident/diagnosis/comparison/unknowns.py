@@ -105,7 +105,7 @@ def _difference(
 
 
 def path_changes(
-    forward: Forward, problem: Problem, place: Place, asked: Sequence[tuple[Fault, Sequence[float]]], most: int = 9
+    forward: Forward, problem: Problem, place: Place, asked: Sequence[tuple[Fault, Sequence[float]]], most: int
 ) -> list[list[tuple[float, FloatArray]]]:
     """Job: changes of the prediction from a place along every fault's first amplitude, at `most` of its nodes."""
     faults, theta = place
