@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 from scipy.optimize import nnls
-from scipy.signal import fftconvolve
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.bands.run_spectra import RunSpectra
@@ -130,6 +129,8 @@ def _curvature(sums: FloatArray, power: FloatArray, noise: FloatArray) -> tuple[
 
 def _sums(number: IntArray, power: FloatArray) -> FloatArray:
     """Sums (n, 2) over two and three lines of either sign that meet at a line, of their powers; `number` (n,)."""
+    from scipy.signal import fftconvolve  # takes longer to import than a run to read
+
     top = int(number.max())
     lines = np.zeros(2 * top + 1)
     lines[top + number], lines[top - number] = power, power

@@ -19,7 +19,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import map_coordinates, spline_filter1d, uniform_filter1d
-from scipy.signal import find_peaks
 from scipy.special import betainc, fdtri, gammaincc
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
@@ -38,6 +37,7 @@ from tpjb_ident.bands.samples import (
 from tpjb_ident.phasors.compensation import compensated, filled_channels
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import SHORT, PhasorSettings, RunPhasors, beginning_of
+from tpjb_ident.phasors.whole_record import local_maxima
 from tpjb_ident.runs.point_data import mean_temperatures
 
 #: Periods that a record must hold.
@@ -87,7 +87,8 @@ def find_period(clean: Samples, band: tuple[float, float], lines: tuple[Line, ..
     pairs = (rows * window, rows * window), (rows**2, window[None] ** 2)
     alike, power = (_correlation(*pair, finer) for pair in pairs)
     part = alike[::finer][first : n // _MIN_PERIODS + 1]
-    lags = find_peaks(part, height=0.0)[0] + first
+    tops = local_maxima(part)
+    lags = tops[part[tops] >= 0.0] + first
     if not len(lags):
         return None
     periods, remainder = _combed((alike, power), lags, clean.rate / band[1], finer)

@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import zoom_fft
 
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
@@ -245,6 +244,8 @@ def find_disturbances(samples: Samples, speed: float, mains: float, top: float) 
 
 def _shown(samples: Samples, nominal: float, wander: float) -> float:
     """Frequency of the highest peak near `nominal` [Hz], where one stands clear of what is around it."""
+    from scipy.signal import zoom_fft  # takes longer to import than a run to read
+
     n, window = samples.length, np.hanning(samples.length)
     step = 0.25 * samples.rate / n
     reach = int(wander / step) + 1

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import refuse
@@ -21,7 +20,7 @@ from rigdata.run import Run
 from tpjb_ident.conditions import holding, merged
 from tpjb_ident.phasors.lines import SPEED_DRIFT
 from tpjb_ident.phasors.run_data import RunPhasors, device_readers
-from tpjb_ident.phasors.whole_record import vertex
+from tpjb_ident.phasors.whole_record import local_maxima, vertex
 
 #: Seconds from the start that are looked at, and powers of two of samples, at least and at most.
 _LOOK, _LEAST_POWER, _MOST_POWER = 2.0, 13, 15
@@ -112,7 +111,7 @@ def slower_channel(values: FloatArray, export_rate: float, speed: float = 0.0) -
         return None
     spectrum = np.fft.rfft((clean - clean.mean()) * np.hanning(n))
     size, agreement, chance = np.abs(spectrum), *_pair_agreement(spectrum)
-    peaks = find_peaks(agreement)[0]
+    peaks = local_maxima(agreement)
     # the shaft's own motion makes such sums of any other
     step, orders = export_rate / n, np.array([1.0, 2.0])
     near_shaft = np.abs(peaks[:, None] * step - orders * speed) < orders * (SPEED_DRIFT + 2 * step)

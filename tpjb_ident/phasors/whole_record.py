@@ -22,9 +22,8 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import median_filter
 from scipy.optimize import minimize
-from scipy.signal import find_peaks
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from rigdata.campaign import Campaign
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError
@@ -211,13 +210,19 @@ def _peaks(record: WholeRecord, columns: list[int], lines: FloatArray, smallest:
     amplitude = np.linalg.norm(hann_amplitude(record.spectrum[:, columns]), axis=1)
     step = 1 / record.duration
     least = np.maximum(_PROMINENCE * noise_floor(amplitude), smallest)
-    tops = find_peaks(amplitude, height=least)[0]
+    tops = local_maxima(amplitude)
+    tops = tops[amplitude[tops] >= least[tops]]
     tops = tops[np.abs(tops[:, None] * step - [0.0, *lines]).min(axis=1) >= _LOBE * step]
     peaks = [float(i * step + step * vertex(amplitude[i - 1 : i + 2])) for i in tops]
     faint = record.lines.faint
     sizes = np.linalg.norm(record.z[len(record.z) - len(faint) :, columns], axis=1)
     at = np.minimum(np.round([line.frequency * record.duration for line in faint]).astype(int), len(least) - 1)
     return peaks + [line.frequency for line, size, limit in zip(faint, sizes, least[at]) if size > limit]
+
+
+def local_maxima(values: FloatArray) -> IntArray:
+    """Where values are larger than both neighbours, (m,): `scipy.signal` takes longer to import than a run to read."""
+    return 1 + np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] > values[2:]))
 
 
 def vertex(three: FloatArray) -> float:
