@@ -8,12 +8,12 @@ import pytest
 from model.effects import Effect, known_effects
 from model.setup import Mesh
 from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
-from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
-from tpjb_ident.diagnosis.comparison.fit import Start, fitted, solved_places
+from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, posterior
+from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined, solved_places
 from tpjb_ident.diagnosis.comparison.paths import lengthened, path_through
 from tpjb_ident.diagnosis.comparison.search import _Search, compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.comparison.unknowns import prediction
+from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, prediction
 from tpjb_ident.diagnosis.diagnose import pose
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.workers import workers
@@ -157,6 +157,22 @@ def test_a_fit_goes_on_while_its_steps_pay():
     fit = fitted(run, problem, start, linear)
     assert fit.linear.theta == pytest.approx(truth, abs=0.05)
     assert fit.posterior.refused < 1.0
+
+
+@pytest.mark.parametrize("wrong", [0.0, 2.0])
+def test_derivatives_stay_where_they_foretell_a_step_there_and_back_however_it_bends(wrong):
+    rng = np.random.default_rng(4)
+    straight, bent, other = rng.normal(size=(3, 40, 6))
+    errors = ErrorModel(0.1**2 * np.eye(40), 1e-4 * np.eye(40), np.array([0.1]))
+    problem = SimpleNamespace(
+        measured=np.zeros(40), errors=errors, nuisances=tuple(SimpleNamespace(column=None) for _ in range(6))
+    )
+    theta = np.full(6, 0.01)
+    slopes, unknowns = straight + 2.0 * bent * theta, Unknowns(problem, ())
+    linear = Linear(-straight @ theta - bent @ theta**2, theta, slopes + wrong * other, unknowns.width)
+    fit = Fit(unknowns, linear, posterior(errors, linear))
+    again = refined(predicts(lambda theta: straight @ theta + bent @ theta**2, slopes), fit)
+    assert (again is fit) == (wrong == 0.0)
 
 
 def predicts(shown, slopes=None):

@@ -93,6 +93,16 @@ def test_how_a_tolerance_bends_is_no_gap_of_an_effect(contradicted):
     assert (touched.remaining > Deciding.halved**2) == contradicted
 
 
+def test_a_fault_without_which_there_is_no_equilibrium_acts_as_where_all_is_stated():
+    fit, solved = bent_case(False)
+
+    def run(task, jobs):
+        return [None if theta[1] and not theta[0] else answer for (_, theta), answer in zip(jobs, solved(task, jobs))]
+
+    (expected,), (touched,) = held_out_gap(solved, fit).touched, held_out_gap(run, fit).touched
+    assert (touched.before, touched.after) == pytest.approx((expected.before, expected.after))
+
+
 def test_a_group_of_look_alikes_begins_with_the_effect_that_is_listed():
     # the most probable model need not hold the likeliest name: others stand beside that
     held = held_out(2.0)

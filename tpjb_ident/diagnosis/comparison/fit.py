@@ -217,11 +217,27 @@ def _solved_place(run: Map, unknowns: Unknowns, place: FloatArray, jacobian: Flo
 
 
 def refined(run: Map, fit: Fit) -> Fit:
-    """The same with derivatives of its own, moved on by them."""
-    unknowns = fit.unknowns
+    """The same with derivatives of its own, moved on by them; as it is, where they would say the same."""
+    unknowns, exact = fit.unknowns, fit.posterior.scale <= Deciding.right
+    if exact and _foretells(run, fit):
+        return fit
     asked = [i for i, reading in enumerate(unknowns.is_reading) if not reading]
-    exact = fit.posterior.scale <= Deciding.right
     return _settled(run, unknowns, _renewed(run, unknowns, fit.linear, asked, exact))
+
+
+def _foretells(run: Map, fit: Fit) -> bool:
+    """Whether derivatives foretell a step along a draw of the posterior, there and back: so curvature cancels."""
+    unknowns, linear = fit.unknowns, fit.linear
+    draw = np.random.default_rng(0).standard_normal(len(linear.theta))
+    room = np.minimum(linear.theta - unknowns.low, unknowns.high - linear.theta)
+    step = np.clip(np.linalg.cholesky(fit.posterior.covariance) @ draw, -room, room)
+    step[unknowns.is_reading] = 0.0  # these are linear
+    ends = [(unknowns.faults, linear.theta + step), (unknowns.faults, linear.theta - step)]
+    ahead, back = run(prediction, ends)
+    if ahead is None or back is None:
+        return False
+    surprise = unknowns.problem.errors.white(0.5 * (ahead - back) - linear.jacobian @ step, fit.posterior.leading)
+    return float(surprise @ surprise) < Deciding.surprise
 
 
 def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:

@@ -249,9 +249,12 @@ class _Search:
             self._propose_neighbours(fit)
 
     def _near(self, fit: Fit, total: float, nats: float) -> bool:
-        """Whether a fit with some evidence comes near the leader, or near the best of all where none is tenable."""
+        """Whether a fit with some evidence comes near the leader, or near the best of all where none is tenable.
+
+        The first of all, a baseline that is wrong, is far from what is to come.
+        """
         leader = self._leader() or max(self.fits.values(), key=self._log_probability, default=None)
-        return leader is None or total + self._log_prior(fit.faults) > self._log_probability(leader) - nats
+        return leader is not None and total + self._log_prior(fit.faults) > self._log_probability(leader) - nats
 
     def _leader(self) -> Fit | None:
         """The most probable tenable fit so far."""

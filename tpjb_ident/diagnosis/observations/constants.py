@@ -74,6 +74,8 @@ class Deciding:
     better = 1.0
     #: Nats behind the leader within which a fit gets derivatives of its own, at the most and per nat off its score.
     worth_derivatives, foretold = 15.0, 5.0
+    #: Chi-square by which derivatives may miss a step along the posterior: differences of one side miss as much.
+    surprise = 1.0
     #: Scale of the likeliest single fault above which it is taken for wrong, and faults that begin with a coarse start.
     suspect, coarse = 0.4, 5
     #: Stated deviations of a tolerance while a coarse start passes the jumps of pads that empty.

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -86,11 +87,27 @@ def held_out_gap(run: Map, fit: Fit) -> HeldOut:
     if stated is None:
         return HeldOut(fit, None)
     there, known = _without_terms(fit, theta)
+    whole, changes = _acting(run, fit, there, known)
+    if (
+        whole is not None and not changes
+    ):  # without a fault there is no equilibrium there: as all acts where it is stated
+        _, changes = _acting(run, fit, _neutral(there, fit.unknowns.tolerances), known)
+    touched = []
+    if whole is not None and changes:
+        touched = [
+            _touched(fit, there, fault, (whole, change)) for (fault, _), change in zip(known, changes, strict=True)
+        ]
+    return HeldOut(fit, stated, tuple(sorted(touched, key=lambda one: -one.remaining)))
+
+
+def _acting(
+    run: Map, fit: Fit, there: FloatArray, known: Sequence[tuple[Fault, slice]]
+) -> tuple[FloatArray | None, list[FloatArray]]:
+    """The prediction somewhere, (n,), and what each fault does to it beside all else; none: one has no equilibrium."""
     places = [there, *(_neutral(there, at) for _, at in known)]
     whole, *partial = run(prediction, [(fit.faults, place) for place in places])
-    moved = [] if any(one is None for one in (whole, *partial)) else zip(known, partial, strict=True)
-    touched = [_touched(fit, there, fault, (part, whole)) for (fault, _), part in moved]
-    return HeldOut(fit, stated, tuple(sorted(touched, key=lambda one: -one.remaining)))
+    changes = [whole - part for part in partial if whole is not None and part is not None]
+    return whole, changes if len(changes) == len(known) else []
 
 
 def as_stated(run: Map, fit: Fit, theta: FloatArray) -> FloatArray | None:
@@ -116,17 +133,17 @@ def _neutral(theta: FloatArray, *parts: slice | IntArray) -> FloatArray:
     return out
 
 
-def _touched(fit: Fit, theta: FloatArray, fault: Fault, ends: tuple[FloatArray, FloatArray]) -> Touched:
+def _touched(fit: Fit, theta: FloatArray, fault: Fault, acting: tuple[FloatArray, FloatArray]) -> Touched:
     """Project the gap on what a fault moves, seen through noise, model error and all tolerances that are stated.
 
-    `ends`: predictions without it and with it, where the other points put the tolerances, which derivatives count back
-    to what is stated: no covariance has how they bend.
+    `acting`: the prediction with it and what it does, where the other points put the tolerances, which derivatives
+    count back to what is stated: no covariance has how they bend.
     """
-    (without, whole), free, held = ends, fit.unknowns.tolerances, fit.problem.held
+    (whole, change), free, held = acting, fit.unknowns.tolerances, fit.problem.held
     stated = fit.linear.jacobian[:, free]
     rest = fit.problem.measured - whole + stated @ theta[free]
     for rows in (held, np.ones_like(held)):
-        moved = (whole - without)[rows]
+        moved = change[rows]
         weights = np.linalg.solve(_covariance(fit, rows, stated[rows]), moved)
         size = math.sqrt(max(float(weights @ moved), 1e-300))
         if size >= Deciding.visible:
