@@ -246,21 +246,20 @@ def stub_fit(total, labels=frozenset("b")):
 
 
 @pytest.mark.parametrize(
-    ("total", "estimate", "renewed"),
+    ("total", "renewed"),
     [
-        (-5.0, -5.1, False),  # a rival that keeps its score: so it would with derivatives of its own
-        (-5.0, -3.0, True),  # the same fit, off its score by more than that can be trusted
-        (-12.0, -10.0, False),  # too far behind for what it is off by
-        (0.1, 0.0, True),  # it leads: intervals rest on them
+        (-14.0, True),  # a rival
+        (-16.0, False),  # too far behind
+        (0.1, True),  # it leads: intervals rest on them
     ],
 )
-def test_a_fit_gets_derivatives_of_its_own_where_it_leads_or_is_off_its_score(monkeypatch, total, estimate, renewed):
+def test_a_fit_gets_derivatives_of_its_own_near_the_leader(monkeypatch, total, renewed):
     asked = []
     tried = stub_search(total=0.0, estimate=0.0)
     monkeypatch.setattr(search, "fitted", lambda *_: stub_fit(total))
     monkeypatch.setattr(search, "refined", lambda run, fit: asked.append(fit) or fit)
     tried.run = tried.problem = None
-    tried._led(SimpleNamespace(estimate=estimate, coarse=False), None)
+    tried._led(SimpleNamespace(coarse=False), None)
     assert bool(asked) == renewed
 
 
@@ -297,3 +296,16 @@ def test_what_a_leader_rose_by_is_allowed_to_rivals_of_as_many_faults(labels, es
     rival = stub_fit(0.0, frozenset(labels))
     proposal = SimpleNamespace(labels=rival.labels, faults=rival.faults, estimate=estimate, coarse=False)
     assert tried._promising(proposal, tried._leader()) == fitted
+
+
+@pytest.mark.parametrize(("estimate", "kept"), [(1.0, "plain"), (-1.0, "coarse")])
+def test_a_start_that_would_lead_takes_the_place_of_a_coarse_one_though_nothing_is_tenable(estimate, kept):
+    tried = stub_search(total=0.0, estimate=0.0)
+    tried._leader = lambda: None
+    tried.fits = {frozenset("ab"): stub_fit(0.0, frozenset("ab"))}
+    labels = frozenset("a")
+    coarse = SimpleNamespace(labels=labels, coarse=True, estimate=50.0)
+    plain = SimpleNamespace(labels=labels, coarse=False, estimate=estimate)
+    tried.proposals, tried.begun = {labels: coarse}, {}
+    tried._offer(plain)
+    assert tried.proposals[labels] is {"plain": plain, "coarse": coarse}[kept]

@@ -23,9 +23,9 @@ from tpjb_ident.diagnosis.observations.constants import Deciding
 
 #: Constants that weigh, search and judge; the others act where observations are made, a plan is drawn, or words chosen.
 CONSTANTS = (
-    "prior", "term", "untenable", "included", "nothing", "family", "right", "quiet", "halved", "rest", "drifting",
+    "prior", "term", "untenable", "included", "nothing", "family", "right", "halved", "rest", "drifting",
     "near", "most_fits", "width", "turn", "reach", "usual", "silent", "followed", "mistaken", "better",
-    "worth_derivatives", "foretold", "suspect", "coarse", "held", "visible", "same",
+    "worth_derivatives", "surprise", "suspect", "coarse", "held", "visible", "same",
 )  # fmt: skip
 FACTORS = (0.5, 2.0)
 

@@ -167,8 +167,8 @@ class _Search:
 
         From the baseline they say little of what a second fault does beside a large one.
         """
-        best = max(self.fits.values(), key=self._log_probability)
-        if len(best.faults) == 1 and best.labels not in self.moved:
+        best = self._best_of_all
+        if best is not None and len(best.faults) == 1 and best.labels not in self.moved:
             self.moved.add(best.labels)
             # tolerances have derivatives there
             sizes = [0.0 if path.fault.own >= 0 else float(path.fault.width[0]) for path in self.paths]
@@ -218,9 +218,7 @@ class _Search:
             if fit is before:  # refused once, they would be refused again
                 return fit
         right = min(f.posterior.scale for f in (leader or fit, fit)) <= Deciding.right
-        # where a fit keeps what its start foretold, derivatives of its own would say the same
-        worth = min(Deciding.worth_derivatives, Deciding.foretold * abs(self._log_probability(fit) - start.estimate))
-        nats = Deciding.mistaken if start.coarse else worth if right else 0.0
+        nats = Deciding.mistaken if start.coarse else Deciding.worth_derivatives if right else 0.0
         tenable_first = right and leader is None  # whether it is tenable tells none that has not arrived
         return self._renewed(fit) if tenable_first or self._near(fit, fit.posterior.promised, nats) else fit
 
@@ -253,8 +251,13 @@ class _Search:
 
         The first of all, a baseline that is wrong, is far from what is to come.
         """
-        leader = self._leader() or max(self.fits.values(), key=self._log_probability, default=None)
-        return leader is not None and total + self._log_prior(fit.faults) > self._log_probability(leader) - nats
+        best = self._leader() or self._best_of_all
+        return best is not None and total + self._log_prior(fit.faults) > self._log_probability(best) - nats
+
+    @property
+    def _best_of_all(self) -> Fit | None:
+        """The most probable fit so far, tenable or not."""
+        return max(self.fits.values(), key=self._log_probability, default=None)
 
     def _leader(self) -> Fit | None:
         """The most probable tenable fit so far."""
@@ -390,8 +393,8 @@ class _Search:
         else:
             better = fit is None or proposal.estimate > self._log_probability(fit) + Deciding.better
         if known is not None and known.coarse and not proposal.coarse:  # a start that would lead is past the jumps
-            leader = self._leader()
-            better &= leader is not None and proposal.estimate > self._log_probability(leader)
+            best = self._leader() or self._best_of_all
+            better &= best is not None and proposal.estimate > self._log_probability(best)
         elif known is not None:
             better &= (known.coarse, known.estimate) < (proposal.coarse, proposal.estimate)
         if better:

@@ -31,8 +31,6 @@ class Deciding:
     #: their probability there (some 500 campaigns), data that tell nothing 0.9, and wrong models 0.97 and more, but
     #: for those that fit as well as right ones.
     right = 0.2
-    #: Held-out gap of the baseline below which nothing is compared: nothing off gives 0.07 to 0.13.
-    quiet = 0.2
     #: Gap above noise along what an effect moves, after over before, that its name takes; right ones reach 0 to 0.45.
     halved = 0.5
     #: Squared held-out gap above noise with tolerances free, after over before: effects explain the larger part.
@@ -72,8 +70,8 @@ class Deciding:
     mistaken = 25.0
     #: Nats by which a fit is better than another of the same explanation.
     better = 1.0
-    #: Nats behind the leader within which a fit gets derivatives of its own, at the most and per nat off its score.
-    worth_derivatives, foretold = 15.0, 5.0
+    #: Nats behind the leader within which a fit gets derivatives of its own.
+    worth_derivatives = 15.0
     #: Chi-square by which derivatives may miss a step along the posterior: differences of one side miss as much.
     surprise = 1.0
     #: Scale of the likeliest single fault above which it is taken for wrong, and faults that begin with a coarse start.

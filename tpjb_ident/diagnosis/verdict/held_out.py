@@ -146,7 +146,7 @@ def _touched(fit: Fit, theta: FloatArray, fault: Fault, acting: tuple[FloatArray
         moved = change[rows]
         weights = np.linalg.solve(_covariance(fit, rows, stated[rows]), moved)
         size = math.sqrt(max(float(weights @ moved), 1e-300))
-        if size >= Deciding.visible:
+        if size >= Deciding.enough:
             break
     after = float(weights @ rest[rows]) / size
     return Touched(fault.label, abs(after + size), abs(after), rows is held and not held.all())

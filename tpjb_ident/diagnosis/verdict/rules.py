@@ -33,7 +33,7 @@ def judge(run: Map, comparison: Comparison) -> Judgement:
     nothing = comparison.nothing
     held = held_out_gap(run, nothing)
     likely = nothing in comparison.tenable and comparison.probabilities[nothing] >= Deciding.nothing
-    if held.before <= Deciding.quiet or likely:
+    if likely:
         return _without_effects(held)
     sure = frozenset(name for name, share in comparison.shares.items() if share >= Deciding.included)
     model = _exactly(comparison, sure) or comparison.best
@@ -62,7 +62,7 @@ def _of_model(comparison: Comparison, sure: frozenset[str], held: HeldOut, drift
 
 def _without_effects(held: HeldOut) -> Judgement:
     nothing = held.fit
-    if held.before <= Deciding.quiet or not nothing.needs_more:
+    if not nothing.needs_more:
         reason = f"no disagreement beyond noise and stated tolerances (p = {nothing.p:.2g})"
         return Judgement("consistent", held, (reason,))
     reason = (
