@@ -137,7 +137,7 @@ def _pivot_section(comparison: Comparison) -> Section:
         "feel; the formula as printed is a secant, about 10 % below its own tangent for line contact, a third below it "
         "for a sphere."
     )
-    table = pivot_stiffness_table(comparison.curves, formula, _PIVOT_LOADS)
+    table = pivot_stiffness_table(comparison.curves, formula)
     return Section(heading, [note], pivot_panels(comparison.curves, formula), [table])
 
 
@@ -147,10 +147,6 @@ def _position_section(comparison: Comparison) -> Section:
     panels = position_panels(comparison.clearance, drawn, comparison.locus, predicted_loci(comparison.loci))
     tables = [] if comparison.clearance is None else [clearance_table(comparison.clearance, drawn[1])]
     return Section("Clearance and shaft centre locus", panels=panels, tables=tables)
-
-
-#: Loads at which pivot stiffness is tabled [N].
-_PIVOT_LOADS = (2000.0, 4000.0)
 
 
 def measured_table(result: Identification) -> Table:
@@ -202,11 +198,12 @@ def _flagged(comparison: Comparison) -> list[tuple[str, Condition]]:
     return [(place, condition) for place, conditions in parts for condition in conditions]
 
 
-def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None, loads: Sequence[float]) -> Table:
-    """Tangent stiffness of every pad at some loads [N], beside the printed formula's where there is one."""
+def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:
+    """Tangent stiffness at the load that all pads were tested at, and half of it, beside the printed formula's."""
     columns = ["pad", "law"]
     rows = [[f"#{curve.pad}", curve.law.name] for curve in curves]
-    for load in loads:
+    full = min((curve.valid_to for curve in curves), default=0.0)
+    for load in (0.5 * full, full):
         columns.append(f"at {amount(load, 'load', '.4g')}, {symbol('stiffness')}")
         columns += [] if formula is None else ["of Kirk's tangent"]
         for curve, row in zip(curves, rows, strict=True):

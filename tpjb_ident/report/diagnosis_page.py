@@ -28,6 +28,8 @@ from tpjb_ident.rounding import MINUS, fixed, percent, signed, significant
 
 #: Parameters that number what there are several of.
 _PLACES = ("pad", "probe", "cell")
+#: Share of the squared gap from which something is left of it.
+_LEFT = 5e-4
 #: Observables of a diagnosis in words.
 _OBSERVABLES = {
     "locus_x": "the shaft's horizontal position",
@@ -298,10 +300,11 @@ def _evidence_sections(verdict: Verdict) -> list[Section]:
     columns = ["tolerance", "stated", "source", "fitted", "deviations"]
     table = Table("Stated tolerances", columns, [_row(a) for a in verdict.assumptions])
     remainder = verdict.remainder
+    share = f"{100 * remainder.share:.1f} % of the squared gap above noise, most in {in_words(remainder.where)}"
     left = (
-        "On points that no fit has seen, with all that has a tolerance free within it, "
-        f"{remainder.sigma:.2f} sigma are left: {100 * remainder.share:.1f} % of the squared gap above noise, most in "
-        f"{in_words(remainder.where)}; against noise and stated tolerances p = {remainder.p:.2g}."
+        f"On points that no fit has seen, with all that has a tolerance free within it, {remainder.sigma:.2f} sigma "
+        f"are left: {share if remainder.share >= _LEFT else 'no more than noise'}; against noise and stated "
+        f"tolerances p = {remainder.p:.2g}."
     )
     return [Section("What is left", [left]), Section("What may be off", [note], tables=[table])]
 

@@ -70,10 +70,8 @@ def _sections(snapshot: Snapshot, bearing: Any) -> list[Section]:
     measured, runs = snapshot.measured, [status.run for status in snapshot.states]
     so_far = ["From the good runs so far. They change while runs come in; tpjb identify has the last word."]
     points = points_table(measured.points)
-    pivots, clearances = [], []
-    if measured.curves:
-        full = min(curve.valid_to for curve in measured.curves)  # that all pads were tested at
-        pivots.append(pivot_stiffness_table(measured.curves, None, [full]))
+    pivots = [pivot_stiffness_table(measured.curves, None)] if measured.curves else []
+    clearances = []
     if measured.polygon is not None:
         clearances.append(clearance_table(measured.polygon, np.array([p.assembled_clearance for p in bearing.pads])))
     waiting = []

@@ -29,8 +29,7 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
         c.draw(pivot_panels(curves, formula))
     tested = {run.pad or 0 for run in source.of_kind("dry_pivot")}
     c.print(f"{source.id}: {len(curves)} of {len(tested)} pads with dry tests have a pivot curve.")
-    full = min((curve.valid_to for curve in curves), default=0.0)  # that all pads were tested at
-    c.show_table(pivot_stiffness_table(curves, formula, (0.5 * full, full)), source.id)
+    c.show_table(pivot_stiffness_table(curves, formula), source.id)
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
     for problem in bearing_problems(source, drawing):  # what is wrong with the probes is wrong with the curves
         c.warn(str(problem))
