@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigdata import load_campaign
-from tests.bands.test_broadband import spectra
+from tests.bands.test_broadband import is_inside, spectra
 from tests.rigs import closed_form as cf
 from tests.rigs.acquisition import EXACT, Acquisition, write_campaign
 from tests.studies.field import marched
@@ -78,11 +78,9 @@ def band_of(tmp_path, rig, without="none"):
     path = write_campaign(tmp_path, campaign, Acquisition(uncertainty=EXACT, noise=noise), [1, 1])
     (band,) = identify(load_campaign(path)).bands
     truth = campaign.truth(5000.0, band.frequencies)
-    off = (band.h - truth).reshape(-1, 4)
-    inside = np.abs(np.hstack([off.real, off.imag])) < band.half_width()
     direct = [0, 3]
     half = np.median(band.half_width()[:, direct] / np.abs(truth.reshape(-1, 4)[:, direct]))
-    return band, inside.mean(), half
+    return band, is_inside(band, truth).mean(), half
 
 
 @pytest.mark.slow

@@ -138,12 +138,6 @@ def test_points_tell_their_values_and_text_is_text(tab):
     assert "static load, kN" in words
 
 
-def test_it_prints_on_a_few_pages(tab, report, tmp_path):
-    tab.pdf(tmp_path / "report.pdf")
-    pages = len(re.findall(rb"/Type\s*/Page\b", (tmp_path / "report.pdf").read_bytes()))
-    assert 3 <= pages <= 10
-
-
 @pytest.mark.parametrize(("width", "height"), [(1280, 900), (390, 844)])
 def test_the_first_screen_says_what_how_good_and_how_sure(tab, width, height):
     """What was tested, the verdict with its largest deviation, and K and C with intervals: without a scroll."""
@@ -156,11 +150,7 @@ def test_the_first_screen_says_what_how_good_and_how_sure(tab, width, height):
                   "largest single deviation", "inside their interval", "tpjb init", "66.00\u00a0±",
                   "26 of 28"):  # fmt: skip
         assert words in shown, words
-
-
-@pytest.mark.parametrize("width", [390, 1280])
-def test_no_column_of_the_first_screen_is_cut(tab, width):
-    tab.size(width, 844)
+    # and no column of it is cut
     wide = "[...document.querySelectorAll('.answer .scroll')].filter((e) => e.scrollWidth > e.clientWidth + 1).length"
     assert tab.js(wide) == 0
 
@@ -180,6 +170,7 @@ def test_a_printed_page_is_signed_numbered_and_legible(tab, tmp_path):
     pdf = shutil.which("pdftotext")
     for name, size in (("a4", (8.27, 11.69)), ("letter", (8.5, 11.0))):
         tab.pdf(tmp_path / f"{name}.pdf", *size)
+    assert 3 <= len(re.findall(rb"/Type\s*/Page\b", (tmp_path / "a4.pdf").read_bytes())) <= 10
     if pdf is None:
         pytest.skip("no pdftotext")
     for name in ("a4", "letter"):

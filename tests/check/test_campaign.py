@@ -15,23 +15,14 @@ from hypothesis import strategies as st
 from rigdata import load_campaign
 from rigdata.calibration import Channel
 from rigdata.channel_statistics import ChannelStatistics
-from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
-from rigdata.run import Run
 from rigdata.virtual_rig import Fault, Noise, Sensor
-from tests.good_campaigns import PLAN, directions, stiff_rig, written
-from tests.rigs.held_run import HeldReader, channels, run_of
+from tests.good_campaigns import PLAN, directions, stiff_rig
+from tests.rigs import held_run
+from tests.rigs.held_run import HeldReader, channels
 from tests.seeds import first_quick
 from tpjb_ident.check.campaign import _check_lengths, check_campaign
-from tpjb_ident.check.findings import (
-    Finding,
-    Reporter,
-    explanation,
-    indefiniteness,
-    merge,
-    reach,
-    repairs,
-)
+from tpjb_ident.check.findings import Finding, Reporter, explanation, indefiniteness, merge, reach, repairs
 from tpjb_ident.check.observation import Observation, _at_rest, excitation_line, steady_level
 from tpjb_ident.check.signals import check_signal, is_spare
 from tpjb_ident.identification.identify import identify
@@ -46,6 +37,18 @@ PROBES = (
     Channel("A", "displacement", axis=math.radians(45)),
     Channel("B", "displacement", axis=math.radians(135)),
 )
+
+
+def run_of(name="a", kind="dynamic"):
+    """A run of two probes without samples."""
+    return replace(held_run.run_of(HeldReader({}), {c.name: c for c in PROBES}, name=name), kind=kind)
+
+
+def restated(campaign, names, change):
+    """The campaign whose manifest says something else of some channels."""
+    stated = {name: change(campaign.channels[name]) for name in names}
+    runs = tuple(replace(run, channels=dict(run.channels) | stated) for run in campaign.runs)
+    return replace(campaign, channels=dict(campaign.channels) | stated, runs=runs)
 
 
 def seen(*blocks) -> ChannelStatistics:
@@ -77,7 +80,7 @@ def test_a_load_that_is_held_on_one_step_of_the_converter_is_not_clipped(kind, n
     steps[-150::30] -= 1.0
     statistics, probe = seen(8.0 + 0.01 * steps), PROBES[0]
     assert statistics.clipped_share() > 0.05
-    report = Reporter(replace(run_of(HeldReader({}, 1000.0), {c.name: c for c in PROBES}), kind=kind))
+    report = Reporter(run_of(kind=kind))
     check_signal(report, probe, statistics, False, PROBES)
     assert any("clipped" in f.key for f in report.findings) is named
     # a slow wave that meets a limit stands nowhere else
@@ -105,7 +108,7 @@ def test_the_excitation_is_seen_through_bad_samples_and_gaps_channel_by_channel(
     data["DX"][300:340] += 5.0
     data["DX"][900:1000] = np.nan
     data["DY"] = np.full(2000, np.nan)
-    phasors = run_phasors(run_of(HeldReader(data, 1000.0), described), 0.0)
+    phasors = run_phasors(held_run.run_of(HeldReader(data, 1000.0), described), 0.0)
     lines = excitation_line(phasors, 0, [described[name] for name in ("FX", "DX", "DY")])
     assert lines.mean[:2] == pytest.approx(3.0, abs=2e-3)
     assert lines.phasor[:2] == pytest.approx(0.5 * np.exp(0.3j), abs=2e-3)
@@ -136,16 +139,8 @@ def test_wiring_faults_are_named(index):
     assert hint == f"; as if {words}"
 
 
-def make_run(name: str, kind: str = "dynamic") -> Run:
-    class Reader:
-        file = f"runs/{name}.csv"
-
-    stated = {"excitation_direction": None, "pad": None, "branch": "up", "stated": frozenset()}
-    return Run(id=name, kind=kind, point=OperatingPoint(5000.0), channels={}, reader=Reader(), **stated)
-
-
 def test_what_many_runs_share_is_told_once():
-    runs = [make_run(f"d-{i}") for i in range(9)] + [make_run("c-1", "clearance")]
+    runs = [run_of(f"d-{i}") for i in range(9)] + [run_of("c-1", "clearance")]
     findings = []
     for run in runs[:4]:
         report = Reporter(run)
@@ -191,8 +186,8 @@ def test_every_problem_is_reported_not_just_the_first(campaign_of):
 
 
 @pytest.mark.slow
-def test_shared_records_and_leftovers(tmp_path):
-    path = written(tmp_path / "c.h5", stiff_rig(7, plan=TINY))
+def test_shared_records_and_leftovers(campaign_of, tmp_path):
+    path = Path(shutil.copyfile(campaign_of(stiff_rig(7, plan=TINY)), tmp_path / "c.h5"))
     with h5py.File(path, "r+") as file:
         file["runs"].copy("d-05000-25-02", "forgotten")
         file["runs/c-1/extra"] = np.zeros(5)
@@ -217,7 +212,7 @@ def test_a_record_that_ends_early_at_a_lines_end_is_told_where_the_others_are_of
     [((9, 10, 10), 0), ((6, 10, 10), 1), ((6, 10), 0), ((10, 10, 10, 30), 0), ((20, 35, 45, 60, 80), 0)],
 )
 def test_lengths_of_records_that_scatter_say_nothing(seconds, short):
-    observations = [Observation(run, Reporter(run), seconds=s) for s in seconds for run in [make_run(str(s))]]
+    observations = [Observation(run, Reporter(run), seconds=s) for s in seconds for run in [run_of(str(s))]]
     _check_lengths(observations)
     assert sum(o.report.keys == ["short record"] for o in observations) == short
     assert sum(len(o.report.keys) for o in observations) == short
@@ -249,12 +244,9 @@ def test_a_channel_is_spare_where_the_others_tell_the_plane():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("turned", "says"), [(0.0, None), (-10.0, "warning"), (30.0, "error"), (-45.0, "error")])
-def test_probes_that_stand_elsewhere_than_stated_are_told_by_the_sweep_at_every_point(tmp_path, turned, says):
-    plan = replace(PLAN, dry=(), locus=())
-    campaign = load_campaign(written(tmp_path / "c.h5", stiff_rig(3, plan=plan)))
-    stated = {n: replace(c, axis=c.axis + math.radians(turned)) for n, c in campaign.channels.items() if n in PAIR}
-    runs = tuple(replace(run, channels=dict(run.channels) | stated) for run in campaign.runs)
-    campaign = replace(campaign, channels=dict(campaign.channels) | stated, runs=runs)
+def test_probes_that_stand_elsewhere_than_stated_are_told_by_the_sweep_at_every_point(campaign_of, turned, says):
+    campaign = load_campaign(campaign_of(stiff_rig(3, plan=replace(PLAN, dry=(), locus=()))))
+    campaign = restated(campaign, PAIR, lambda c: replace(c, axis=c.axis + math.radians(turned)))
     found = [p for p in check_campaign(campaign) if "from where the load pushes it" in p.what]
     assert [(p.severity, p.run) for p in found] == ([] if says is None else [(says, "c-1")])
     (point,) = identify(campaign, IdentifySettings(methods=())).points
@@ -288,12 +280,9 @@ def test_spare_probes_that_contradict_the_others_are_told_of_dry_runs_and_sweep(
 
 def test_what_one_of_many_static_runs_shows_stays_its_own():
     def reports(kinds, concerned):
-        made = []
-        for i, kind in enumerate(kinds):
-            run = replace(run_of(HeldReader({}, 1000.0), {c.name: c for c in PROBES}), id=f"r{i}", kind=kind)
-            made.append(Reporter(run))
-            if i in concerned:
-                made[-1].note("signs A B", "error", "channels A and B", "go elsewhere", "Look", ["A", "B"])
+        made = [Reporter(run_of(f"r{i}", kind)) for i, kind in enumerate(kinds)]
+        for i in concerned:
+            made[i].note("signs A B", "error", "channels A and B", "go elsewhere", "Look", ["A", "B"])
         reach(made)
         return [len(report.findings) for report in made]
 

@@ -1,17 +1,15 @@
 """Bounds of physics on the sizes of a run: rigs of every size pass, descriptions that are far off do not."""
 
 import math
-import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
 from rigdata.operating_point import OperatingPoint
+from tests.check.test_campaign import restated
 from tests.good_campaigns import SMALL_PLAN, rocker_rig
 from tests.phasors.phasor_cases import vector_channels
 from tpjb_ident.check.campaign import check_campaign
@@ -22,6 +20,12 @@ from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 
 DEMO = Path(__file__).resolve().parents[2] / "rigdata" / "samples" / "demo.h5"
+
+
+@pytest.fixture(scope="module")
+def demo():
+    """A dynamic run of the demo."""
+    return load_campaign(DEMO).of_kind("dynamic")[0]
 
 
 def random_rig(rng: np.random.Generator, demo) -> Sizes:
@@ -51,8 +55,7 @@ def judged(check, sizes, *more):
     return [(finding.key, finding.problem.severity) for finding in sizes.report.findings]
 
 
-def test_rigs_of_every_size_pass():
-    demo = load_campaign(DEMO).of_kind("dynamic")[0]
+def test_rigs_of_every_size_pass(demo):
     rng = np.random.default_rng(1)
     for _ in range(3000):
         sizes = random_rig(rng, demo)
@@ -61,9 +64,8 @@ def test_rigs_of_every_size_pass():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("mass", "acceleration", "severity"), [(3000, 0.05, "warning"), (3000, 0.5, "error")])
-def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(mass, acceleration, severity):
-    run = load_campaign(DEMO).of_kind("dynamic")[0]
-    rig = Sizes(Reporter(run), 1e-6, 2000.0, 2000.0, acceleration, run.point.static_load)
+def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(demo, mass, acceleration, severity):
+    rig = Sizes(Reporter(demo), 1e-6, 2000.0, 2000.0, acceleration, demo.point.static_load)
     assert judged(check_weight, rig, mass, 5000.0) == [("weight", severity)]
     assert judged(check_weight, rig, 30.0, 5000.0) == []
     assert judged(check_weight, replace(rig, static=0.0), mass, 5000.0) == [("weight", "warning")]
@@ -85,8 +87,7 @@ def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(
         ({"acceleration": 2e-4}, "stiff cells", "warning"),
     ],
 )
-def test_each_bound_at_its_place(changes, key, severity):
-    demo = load_campaign(DEMO).of_kind("dynamic")[0]
+def test_each_bound_at_its_place(demo, changes, key, severity):
     run = replace(demo, point=OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 157.0796))
     good = Sizes(Reporter(run), 5e-6, 1e3, 1e3, 0.02, 5000.0)
     sizes = replace(good, **changes)
@@ -103,32 +104,15 @@ def test_each_bound_at_its_place(changes, key, severity):
         (1.1e-3, [], [("travel B", "warning")]),
     ],
 )
-def test_a_probe_moves_as_a_turning_shaft_lets_it(travel, notes, told):
+def test_a_probe_moves_as_a_turning_shaft_lets_it(demo, travel, notes, told):
     spread = np.array([[0.0, 0.0], [1e-6, travel / 2], [5e-6, travel]])
     described = vector_channels(("displacement",))
     names = [replace(channel, name=name) for channel, name in zip(described, "AB")]
-    run = load_campaign(DEMO).of_kind("dynamic")[0]
-    observation = Observation(run, Reporter(run), tuple(names), spread=spread)
+    observation = Observation(demo, Reporter(demo), tuple(names), spread=spread)
     for note in notes:
         observation.report.ask(note)
     check_travel(observation, is_sine=True)
     assert [(f.key, f.problem.severity) for f in observation.report.findings[len(notes) :]] == told
-
-
-def scaled_demo(path: Path, names: tuple[str, ...], factor: float) -> Path:
-    """The demo's runs at two operating points, the stated sensitivities of some channels times a factor."""
-    shutil.copy(DEMO, path)
-    with h5py.File(path, "r+") as file:
-        text, *runs = file.attrs["manifest"].split("[[runs]]\n")
-        for name in names:
-            head, channel, tail = text.partition(f"[channels.{name}]")
-            tail = re.sub(
-                r'sensitivity = "([0-9.]+)', lambda m: f'sensitivity = "{float(m[1]) * factor:.10g}', tail, count=1
-            )
-            text = head + channel + tail
-        chosen = [run for run in runs if 'id = "d-02500-25' in run or 'id = "d-05000-25' in run]
-        file.attrs["manifest"] = "[[runs]]\n".join([text, *chosen])
-    return path
 
 
 @pytest.mark.slow
@@ -141,10 +125,10 @@ def scaled_demo(path: Path, names: tuple[str, ...], factor: float) -> Path:
         (("A1H", "A1V"), 0.01, "error"),
     ],
 )
-def test_check_and_identify_both_name_a_description_that_is_far_off(tmp_path, names, factor, severity):
-    path = scaled_demo(tmp_path / "c.h5", names, factor)
-    assert severity in {p.severity for p in check_campaign(path)}
-    points = identify(load_campaign(path), IdentifySettings(methods=(), method="ols")).points
+def test_check_and_identify_both_name_a_description_that_is_far_off(small_campaign, names, factor, severity):
+    campaign = restated(load_campaign(small_campaign), names, lambda c: replace(c, gain=c.gain / factor))
+    assert severity in {p.severity for p in check_campaign(campaign)}
+    points = identify(campaign, IdentifySettings(methods=(), method="ols")).points
     assert all("records-contradicted" in p.quality for p in points)
 
 

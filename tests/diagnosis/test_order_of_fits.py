@@ -33,6 +33,13 @@ def linear_case(scales):
     return errors, Linear(residual, theta, jacobian, width), columns
 
 
+def search_with(**known):
+    """A search that knows only what its step under test asks for."""
+    made = object.__new__(search._Search)
+    made.__dict__.update(known)
+    return made
+
+
 def straight(column, name="x"):
     prior = np.array([[0.0], [3.0], [-1e6], [1e6]])
     fault = SimpleNamespace(width=prior[1], prior=prior, label=name)
@@ -143,16 +150,12 @@ def test_what_a_refused_step_promised_counts_for_no_explanation_beside(monkeypat
     totals = []
     monkeypatch.setattr(search._Search, "_propose", lambda self, score, *_: totals.append(score.total))
     for refused in (0.0, 7.0):
-        tried = object.__new__(search._Search)
-        tried.paths, tried.problem = (
-            (straight(columns[:, 1]),),
-            SimpleNamespace(errors=errors, said_by=lambda fault: {}),
-        )
+        problem = SimpleNamespace(errors=errors, said_by=lambda fault: {})
         fit = SimpleNamespace(
             labels=frozenset(), faults=(), linear=linear, strain=Strain(np.zeros((0, 5)), np.zeros(0)),
             posterior=SimpleNamespace(refused=refused),
         )  # fmt: skip
-        tried._propose_neighbours(fit)
+        search_with(paths=(straight(columns[:, 1]),), problem=problem)._propose_neighbours(fit)
     assert totals[0] - totals[1] == pytest.approx(7.0)
 
 
@@ -160,9 +163,9 @@ def test_no_fault_at_all_is_proposed_from_where_a_single_one_leads(monkeypatch):
     errors, linear, _ = linear_case([1.0])
     monkeypatch.setattr(search, "Unknowns", lambda problem, faults: SimpleNamespace(width=linear.width))
     fault, proposals = SimpleNamespace(label="own", own=2), []
-    tried = object.__new__(search._Search)
-    tried.paths, tried.problem, tried._offer = (), SimpleNamespace(errors=errors), proposals.append
-    tried._log_prior = lambda faults: 0.0
+    tried = search_with(
+        paths=(), problem=SimpleNamespace(errors=errors), _offer=proposals.append, _log_prior=lambda faults: 0.0
+    )
     tried._propose_neighbours(
         SimpleNamespace(
             labels=frozenset({"own"}), faults=(fault,), linear=linear, strain=None,
@@ -185,7 +188,7 @@ def test_without_an_effect_in_the_library_none_is_below_the_floor_or_named(campa
 
 def test_a_fault_that_no_derivative_sizes_is_needed_where_it_alone_makes_the_difference():
     """A pad that idles without it and carries with any of it: the size says nothing, and the evidence does."""
-    tried = object.__new__(search._Search)
+    tried = search_with()
     whole = SimpleNamespace(
         labels=frozenset({"a", "b"}), unsized=("b",), p=0.5, on_bound=False, posterior=SimpleNamespace(total=-20.0)
     )
@@ -212,8 +215,7 @@ def test_only_what_a_campaign_could_not_tell_from_a_fault_of_the_leader_is_fitte
         labels=frozenset({"own"}), faults=(paths[0].fault,), linear=linear,
         unknowns=SimpleNamespace(slices=[slice(2, 3)]), posterior=SimpleNamespace(leading=0),
     )  # fmt: skip
-    tried = object.__new__(search._Search)
-    tried.paths, tried.problem = tuple(paths), SimpleNamespace(errors=errors)
+    tried = search_with(paths=tuple(paths), problem=SimpleNamespace(errors=errors))
     assert [path.fault.label for path in tried._alike(leader, paths[0].fault)] == ["alike"]
 
 
@@ -231,12 +233,9 @@ def test_what_tolerances_say_together_is_their_derivatives_beside_a_fit(campaign
 
 def stub_search(total, estimate, labels=frozenset("a")):
     """A search led by a right fit, some nats above its score."""
-    tried = object.__new__(search._Search)
-    tried.estimates, tried.fits = {labels: estimate}, {}
     leader = stub_fit(total, labels)
-    tried._leader = lambda: leader
-    tried._log_prior = lambda faults: 0.0
-    return tried
+    known = {"estimates": {labels: estimate}, "fits": {}, "run": None, "problem": None}
+    return search_with(_leader=lambda: leader, _log_prior=lambda faults: 0.0, **known)
 
 
 def stub_fit(total, labels=frozenset("b")):
@@ -258,7 +257,6 @@ def test_a_fit_gets_derivatives_of_its_own_near_the_leader(monkeypatch, total, r
     tried = stub_search(total=0.0, estimate=0.0)
     monkeypatch.setattr(search, "fitted", lambda *_: stub_fit(total))
     monkeypatch.setattr(search, "refined", lambda run, fit: asked.append(fit) or fit)
-    tried.run = tried.problem = None
     tried._led(SimpleNamespace(coarse=False), None)
     assert bool(asked) == renewed
 
@@ -282,7 +280,6 @@ def test_after_a_coarse_start_derivatives_are_asked_again_unless_they_were_refus
     tried = stub_search(total=0.0, estimate=0.0)
     monkeypatch.setattr(search, "fitted", lambda *_: stub_fit(total))
     monkeypatch.setattr(search, "refined", refined)
-    tried.run = tried.problem = None
     tried._led(SimpleNamespace(estimate=-100.0, coarse=True), None)
     assert len(asked) == times
 

@@ -161,11 +161,11 @@ def make_bench(folder: Path, commands: tuple[str, ...]) -> Bench:
     from tpjb_ident.cli.commands.app import app
 
     campaign = write_small_campaign(folder / "campaign.h5", commands)
-    bench = Bench(campaign, "", 0, folder)
+    digest = hashlib.sha256(campaign.read_bytes()).hexdigest()
+    bench = Bench(campaign, digest, campaign.stat().st_mode, folder)
     for command in commands:  # once in this process, so that what they import late is there for all forks
         CliRunner().invoke(app, bench.words(command, folder / f"warm-{command}"))
-    digest = hashlib.sha256(campaign.read_bytes()).hexdigest()
-    return Bench(campaign, digest, campaign.stat().st_mode, folder)
+    return bench
 
 
 def prepare(bench: Bench, out: Path, command: str, former: bool) -> dict[str, str]:

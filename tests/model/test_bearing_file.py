@@ -163,11 +163,8 @@ def test_other_schema_not_toml_too_large_and_no_file(text, tmp_path):
 
 
 @pytest.mark.parametrize("value", ["0x" + "f" * 5000, "[[0x" + "f" * 5000 + "]]", "9" * 5000])
-@pytest.mark.parametrize("key", ["kind", "pivot_angles", "diameter", "nobody_knows"])
-def test_whole_numbers_of_thousands_of_digits_are_named(text, key, value):
-    sections = {"kind": "pivot", "pivot_angles": "pads", "diameter": "journal"}
-    changed = edit(text, sections[key], key, f"{key} = {value}") if key in sections else f"{key} = {value}\n{text}"
-    refused(changed, "not valid TOML", "a whole number")
+def test_whole_numbers_of_thousands_of_digits_are_named(text, value):
+    refused(edit(text, "pads", "pivot_angles", f"pivot_angles = {value}"), "not valid TOML", "a whole number")
 
 
 def test_byte_order_mark_is_taken(text, tmp_path):

@@ -83,15 +83,16 @@ def test_one_mesh_per_different_pad(different):
     assert all(a is b for a, b in zip(bodies, again, strict=True))
 
 
-def test_a_ring_of_different_pads_turned_by_a_pitch_turns_its_answer(different):
-    pitch = 2 * math.pi / 5
+@pytest.mark.parametrize("angle", [2 * math.pi / 5, 1.0, math.pi])
+def test_a_ring_of_different_pads_and_its_load_turned_as_a_whole_turn_the_answer(different, angle):
     pads = different.pads
-    turned = different.with_pads(tuple(replace(p, pivot_angle=p.pivot_angle + pitch) for p in pads))
+    turned = different.with_pads(tuple(replace(p, pivot_angle=p.pivot_angle + angle) for p in pads))
     hot = [Effect("hot_oil_carryover", fraction=0.8)]
     first = predict(different, load_direction=-1.3, effects=hot, **POINT)
-    second = predict(turned, load_direction=-1.3 + pitch, effects=hot, **POINT)
-    turn = np.array([[math.cos(pitch), -math.sin(pitch)], [math.sin(pitch), math.cos(pitch)]])
+    second = predict(turned, load_direction=-1.3 + angle, effects=hot, **POINT)
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     close(turn.T @ second.h @ turn, first.h, 1e-6)
+    np.testing.assert_allclose(second.position, turn @ first.position, atol=1e-10)
     np.testing.assert_allclose(second.pad_load, first.pad_load, rtol=0, atol=0.01)
     assert len({round(flow.inflow, 12) for flow in first.pad_flow}) == 5
 

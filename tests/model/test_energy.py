@@ -133,8 +133,8 @@ def test_the_pad_s_face_is_hotter_than_the_film_by_the_parabola(rocker):
         mean = film.work.temperature
         profile = journal + (face - journal)[..., None] * (1.0 - (1.0 - y) ** 2)
         np.testing.assert_allclose(profile.mean(axis=-1), mean, rtol=1e-6)
-    assert run(rocker).face_temperature[0] is not None
-    np.testing.assert_allclose(run(rocker).face_temperature[0], run(rocker).temperature[0], rtol=1e-12)
+    alone = run(rocker)
+    np.testing.assert_allclose(alone.face_temperature[0], alone.temperature[0], rtol=1e-12)
 
 
 @pytest.mark.slow

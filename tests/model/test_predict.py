@@ -143,14 +143,6 @@ def test_sweeps_up_and_down_meet_cold_starts_over_a_change_of_regime_too(rocker,
             np.testing.assert_allclose(warm.position, cold.position, atol=1e-10)
 
 
-def test_a_neighbour_saves_iterations_where_pads_bend(rocker):
-    # adiabatic films begin as near from the curves of their pads
-    one = setup(rocker).change(thermal="tehd")
-    near = [(load, DOWN, SPEED, LINE) for load in 2500.0 + 50.0 * np.arange(5)]
-    carried, alone = sweep(one, near), [predict_setup(one, *point) for point in near]
-    assert sum(p.equilibrium.iterations for p in carried) < sum(p.equilibrium.iterations for p in alone)
-
-
 def test_the_locus_lies_inside_the_clearance_polygon_that_its_load_would_push(rocker):
     pushed, angle = polygon_sides(setup(rocker), LOAD)
     for p in sweep(setup(rocker), [(LOAD, direction, SPEED, LINE) for direction in np.linspace(-3.0, 3.0, 8).tolist()]):

@@ -63,18 +63,6 @@ def test_channels_stand_in_order_and_make_the_vectors():
     assert (variance / expected).max() < 2.0
 
 
-def test_isolated_bad_samples_take_nothing_with_them():
-    data = record()
-    rng = np.random.default_rng(5)
-    for name in ("DX", "FY"):
-        at = rng.choice(len(TIME), len(TIME) // 20, replace=False)
-        data[name][at] += rng.choice((-1, 1), len(at)) * 40 * NOISE[name[0]] * rng.uniform(0.5, 5.0, len(at))
-    result = phasors_of(data)
-    assert error(result) < 1e-3
-    np.testing.assert_allclose(result.lost[:, [0, 3]].mean(axis=0), 0.05, atol=0.01)
-    assert result.lost[:, [1, 2, 4, 5]].max() == 0.0
-
-
 # a strong one's beat looks like a drive off its set point, and like a shaft that changes its speed
 @pytest.mark.parametrize(("distance", "share"), [(0.4, 0.12), (-0.3, 0.12), (0.8, 0.12), (-0.35, 0.8), (0.6, 0.9)])
 def test_a_line_beside_the_drive_is_found_and_fitted_along(distance, share):

@@ -16,7 +16,7 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import write_campaign
 from tests.command_line import ended
-from tests.good_campaigns import directions, written
+from tests.good_campaigns import directions
 from tests.identification.test_identify import rig
 from tpjb_ident.cli.commands.identify import KEPT
 from tpjb_ident.phasors.run_data import PhasorSettings
@@ -32,10 +32,9 @@ POINTS = [(2500.0, 25.0), (5000.0, 25.0)]
 
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory):
+def path(campaign_of):
     """Six runs as short as they may be: what is kept of them is the same in kind."""
-    plan = {"directions": directions(3), "dynamic_seconds": 1.0}
-    return written(tmp_path_factory.mktemp("rig") / "c.h5", rig(POINTS, seed=8, **plan))
+    return campaign_of(rig(POINTS, seed=8, directions=directions(3), dynamic_seconds=1.0))
 
 
 @pytest.fixture(scope="module")
@@ -119,8 +118,7 @@ def test_a_run_that_another_command_has_cleared_is_done_again(path, whole, tmp_p
 
 @pytest.mark.slow
 def test_what_has_changed_is_done_again(path, tmp_path, counted):
-    copy = tmp_path / "copy.h5"
-    shutil.copy(path, copy)
+    copy = Path(shutil.copyfile(path, tmp_path / "copy.h5"))
     store, settings = RunStore(tmp_path / "kept"), PhasorSettings()
     all_runs(load_campaign(copy), settings, silent, store=store)
     counted.clear()
@@ -174,8 +172,8 @@ def tables(out: Path) -> list[bytes]:
 
 
 @pytest.mark.slow
-def test_a_killed_command_goes_on_and_ends_with_the_same_tables(tmp_path):
-    path = written(tmp_path / "c.h5", rig(POINTS, seed=8))  # long enough to be killed half-way
+def test_a_killed_command_goes_on_and_ends_with_the_same_tables(campaign_of, tmp_path):
+    path = campaign_of(rig(POINTS, seed=8))  # long enough to be killed half-way
     ended(0, "identify", path, "--out", tmp_path / "whole")
     assert sorted(p.name for p in (tmp_path / "whole").iterdir() if p.name.startswith(".")) == []
     out = tmp_path / "killed"
@@ -194,8 +192,7 @@ def test_a_killed_command_goes_on_and_ends_with_the_same_tables(tmp_path):
 
 
 def test_an_error_leaves_nothing_behind(path, tmp_path):
-    copy = tmp_path / "copy.h5"
-    shutil.copy(path, copy)
+    copy = Path(shutil.copyfile(path, tmp_path / "copy.h5"))
     with h5py.File(copy, "r+") as file:
         for run in file["runs"]:
             del file[f"runs/{run}/X1A"]

@@ -9,7 +9,6 @@ import pytest
 
 from tests.phasors.phasor_cases import FILM_H as H
 from tests.phasors.phasor_cases import complex_normal
-from tpjb_ident.estimate.arrowhead import complex_matrix
 from tpjb_ident.phasors.lines import LineSettings, known_lines
 from tpjb_ident.phasors.run_data import mains_lines
 from tpjb_ident.terms import mains
@@ -233,10 +232,6 @@ def test_a_lost_run_gives_no_answer():
     D, F = shaken()
     D[4] = np.nan
     assert fit_mains(D, F, Pickup(SINGLE, np.ones(2), 9), 1e-3) is None
-
-
-def test_eight_numbers_are_a_matrix():
-    np.testing.assert_array_equal(complex_matrix(np.arange(8.0)), [[4j, 1 + 5j], [2 + 6j, 3 + 7j]])
 
 
 def test_mains_in_the_cells_is_what_least_squares_makes_of_a_line_of_random_phase():

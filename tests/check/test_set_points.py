@@ -1,15 +1,23 @@
-"""Runs beside one another: what drives them, along force or displacement, and what turns with the shaft."""
+"""Runs beside one another: what drives them, what turns with the shaft, and which way it turns."""
 
+import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from rigdata.operating_point import OperatingPoint
+from rigdata.operating_point import ROTATIONS, OperatingPoint
 from rigdata.vector import directions
+from rigdata.virtual_rig import RigPlan, operating_points
+from tests.good_campaigns import directions as evenly
+from tests.good_campaigns import rocker_rig
+from tpjb_ident import load_campaign
+from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Reporter
+from tpjb_ident.check.observation import observe
 from tpjb_ident.check.run_gain import check_shaft_lines
-from tpjb_ident.check.set_points import check_excitation
+from tpjb_ident.check.set_points import check_excitation, check_rotation
 
 
 def observation(load, size, stated=0.0, force=0.0, displacement=45.0, frequency=25.0):
@@ -64,3 +72,57 @@ def test_a_probe_whose_range_changed_is_told_by_what_turns_with_the_shaft(freque
     reports = [finding for run in runs for finding in run.report.findings]
     assert len(reports) == named
     assert {finding.key for finding in reports} <= {"shaft line X1A"}
+
+
+PLAN = RigPlan(dynamic=operating_points([(5000.0, 25.0)]), directions=evenly(4))
+
+
+@pytest.fixture(scope="module", params=ROTATIONS)
+def observations(request, campaign_of):
+    path = campaign_of(rocker_rig(5, plan=PLAN.turning(rotation=request.param)), name=f"turns-{request.param}")
+    return [observe(run) for run in load_campaign(path).runs]
+
+
+def told(observations):
+    check_rotation(observations)
+    return [f.problem for o in observations for f in o.report.findings if f.key == "rotation"]
+
+
+def described_as(observation, rotation):
+    run = replace(observation.run, point=replace(observation.run.point, rotation=rotation))
+    return replace(observation, run=run, report=observation.report.copy())
+
+
+@pytest.mark.slow
+def test_the_force_at_running_speed_tells_the_sense(observations):
+    stated = observations[0].run.rotation
+    other = ROTATIONS[stated == ROTATIONS[0]]
+    sign = 1.0 if stated == ROTATIONS[0] else -1.0
+    assert all(sign * o.shaft_force > math.log(3.0) for o in observations)
+    assert told(observations) == []
+    problems = told([described_as(o, other) for o in observations])
+    assert len(problems) == len(observations)
+    assert problems[0].severity == "warning"
+    for candidate in ("rotation in [shaft]", "sign of a cell or probe", "two exchanged cells or probes"):
+        assert candidate in problems[0].cure
+
+
+@pytest.mark.slow
+def test_few_clear_runs_or_runs_that_disagree_tell_nothing(observations):
+    other = ROTATIONS[observations[0].run.rotation == ROTATIONS[0]]
+    wrong = [described_as(o, other) for o in observations]
+    assert told(wrong[:2]) == []
+    blind = [replace(o, shaft_force=math.nan) for o in wrong[:2]]
+    assert told([*blind, *wrong[2:]]) == []
+    mixed = [replace(o, shaft_force=-o.shaft_force) for o in wrong[:2]]
+    assert told([*mixed, *wrong[2:]]) == []
+    assert np.isfinite([o.shaft_force for o in wrong]).all()
+
+
+@pytest.mark.slow
+def test_check_says_it_once(campaign_of):
+    path = campaign_of(rocker_rig(5, plan=PLAN.turning(rotation="clockwise")), name="turns-clockwise")
+    campaign = load_campaign(path)
+    runs = tuple(replace(r, point=replace(r.point, rotation="counter-clockwise")) for r in campaign.runs)
+    (problem,) = [p for p in check_campaign(replace(campaign, runs=runs)) if "goes round" in p.what]
+    assert "so in 4 runs" in problem.what
