@@ -16,8 +16,7 @@ from tpjb_ident.phasors import run_phasors
 from tpjb_ident.phasors.compensation import compensated
 from tpjb_ident.phasors.frequency import ShaftCourse
 from tpjb_ident.phasors.line_fit import LineFitter
-from tpjb_ident.phasors.lines import WindowSettings, known_lines
-from tpjb_ident.phasors.run_data import PhasorSettings
+from tpjb_ident.phasors.lines import known_lines
 from tpjb_ident.phasors.run_phasors import MAX_JITTER, extract
 
 RATE = 1000.0
@@ -84,11 +83,11 @@ def held(seconds=4.0, stamps=None, turns=None, late=0.0, quantities=("displaceme
     return replace(held_run.run_of(reader, channels(quantities), POINT, "r"), excitation_direction=0.3)
 
 
-FIXED = PhasorSettings(windows=WindowSettings(length=0.4))
+FIXED = 0.4
 
 
 def taken(run, follow=None):
-    return extract(run, 30.0, FIXED, LINES, follow)
+    return extract(run, 30.0, LINES, follow, window=FIXED)
 
 
 def exact(result, quantity="displacement", but=(), tolerance=1e-9):

@@ -86,7 +86,7 @@ def _check_accelerometers(observations: Sequence[Observation], solution: Solutio
     """Name the runs whose acceleration is not what springs, or the floating housing, make of it in the others."""
     rig, blocks = solution.rig, solution.blocks
     housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
-    rows = rig.of("acceleration")
+    rows = rig.pick("acceleration")
     if len(rows) != 2 or housing is None or housing.is_on_foundation(solution.fitted[housing.name]):
         return
     moved = housing.acceleration(blocks, solution.fitted[housing.name])

@@ -61,7 +61,7 @@ def housing_noise(rig: Rig, blocks: Blocks, motion: ComplexArray, misfit: Comple
     size = np.linalg.norm(motion[:, 2:], axis=1)
     if rig.mount == "unknown" or not np.any(size > 0) or not rig.has_acceleration:
         return usual
-    rows = rig.of("acceleration")
+    rows = rig.pick("acceleration")
     moving = size > 0
     share = np.sum(np.abs(misfit) ** 2, axis=1) / 2
     records = blocks.noise_power(rows) / len(rows)

@@ -152,7 +152,7 @@ def _run_rows(point: BandPoint, runs: Sequence[RunSpectra], places: IntArray) ->
 
 def _strengths(rig: Rig, blocks: Blocks) -> FloatArray:
     """F ratios of every line's weaker and stronger direction of motion over its noise, (L, 2)."""
-    probes = rig.of("displacement")
+    probes = rig.pick("displacement")
     plane = np.linalg.pinv(blocks.along[:, probes] * blocks.present[:, probes, None])
     noise = plane @ blocks.noise[:, probes][:, :, probes] @ plane.transpose(0, 2, 1)
     size = np.sqrt(np.maximum(np.einsum("nii->n", noise).real / 2, 1e-300))

@@ -22,6 +22,7 @@ from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.arrowhead import complex_matrix
 from tpjb_ident.estimate.equation import (
     Blocks,
+    Rig,
     RigStiffness,
     Sensor,
     axes_of,
@@ -33,7 +34,7 @@ from tpjb_ident.estimate.equation import (
 )
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.solve import Solution
-from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means
+from tpjb_ident.identification.point_means import PointMeans, point_means
 from tpjb_ident.results.linearity import FilmChange, film_change
 from tpjb_ident.runs.point_data import PointData, RunDigest
 from tpjb_ident.runs.static_load import StaticLoads, missed_load, static_loads
@@ -244,12 +245,10 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
 class CampaignSolution:
     """H of every point of a campaign, and what was put right on the way."""
 
-    task: MeansTask
     means: tuple[PointMeans, ...]
     loads: StaticLoads
     film: tuple[FilmChange, ...]
     solution: Solution
-    mains_shift: ComplexArray  #: (n, m), SI: pick-up taken off the blocks' readings
     mains: dict[int, MainsFit] = field(default_factory=dict)  #: by point
     in_cells: dict[int, FloatArray] = field(default_factory=dict)  #: by point, (8, 8): mains in the cells
 
@@ -280,8 +279,8 @@ def solve_campaign(
     loads = static_loads(campaign, points)
 
     def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> CampaignSolution:
-        task = MeansTask(sensors, rates)
-        means = tuple(workers.map(point_means, [(data,) for data in points], task))
+        jobs = [(data,) for data in points]
+        means = tuple(workers.map(point_means, jobs, Rig(sensors, campaign.housing_mass, rates=rates)))
         film = tuple(film_change(data.film_lines, point.start) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])
         blocks = campaign_blocks(points, means, loads.misses, bent)
@@ -290,7 +289,7 @@ def solve_campaign(
         )
         start = np.array([point.start for point in means]) - bare.at(np.array([data.omega for data in points]))
         solution = solved_as_learnt(rig, lambda rig: solve(rig, blocks, start))
-        return CampaignSolution(task, means, loads, film, solution, np.zeros_like(blocks.z))
+        return CampaignSolution(means, loads, film, solution)
 
     rate = min((digest.sample_rate for digest in digests if digest.sample_rate > 0), default=np.inf)
     last = solved_with_clocks(sensors, rate, solved)
@@ -299,12 +298,12 @@ def solve_campaign(
     on_line = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE) and p in blocks.point]
     fits = _mains(on_line, digests, solution, force) if correct and on_line else {}
     if fits:
-        shift, probes = np.zeros_like(blocks.z), solution.rig.of("displacement")
+        shift, probes = np.zeros_like(blocks.z), solution.rig.pick("displacement")
         for p, fit in fits.items():
-            rows = np.ix_(np.flatnonzero(blocks.point == p), probes)
+            rows = np.flatnonzero(blocks.point == p)[:, None], probes
             shift[rows] = np.einsum("nja,na->nj", blocks.along[rows], fit.pickup)
         again = solve(solution.rig, replace(blocks, z=blocks.z - shift), solution.h)
-        last = replace(last, solution=again, mains_shift=shift, mains=fits)
+        last = replace(last, solution=replace(again, blocks=blocks, shift=again.shift + shift), mains=fits)
     D = vector(solution.rig, blocks, "displacement")
     in_cells = {p: force_pickup_spread(D[blocks.point == p], force) for p in on_line if force.any()}
     return replace(last, in_cells=in_cells)
@@ -315,7 +314,7 @@ def _mains(
 ) -> dict[int, MainsFit]:
     """Angles of the mains at the points on whose line it is; `force` (2,): mains in the cells [N]."""
     rig, blocks = solution.rig, solution.blocks
-    across = blocks.along[0, rig.of("displacement")]
+    across = blocks.along[0, rig.pick("displacement")]
     pickup = mains_pickup([digest.mains for digest in digests], np.arctan2(across[:, 1], across[:, 0]))
     if pickup is None:
         return {}

@@ -99,8 +99,8 @@ def identify(
     if not runs:
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     report = progress or (lambda text, done, total: None)
-    lines = replace(chosen.phasors.lines, mains=mains_frequency(campaign, chosen.phasors.lines.mains))
-    settings = replace(chosen, method=method or chosen.method, phasors=replace(chosen.phasors, lines=lines))
+    phasors = replace(chosen.phasors, mains=mains_frequency(campaign, chosen.phasors.mains))
+    settings = replace(chosen, method=method or chosen.method, phasors=phasors)
     solver, _ = method_of(settings.method)
     dry = dry_test(campaign, settings.phasors, SOLVED if solver == "iv" else solver)  # it has no command
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))

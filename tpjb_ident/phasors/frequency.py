@@ -201,7 +201,7 @@ def tuned(
     if follow is not None:
         low, high = follow.speed.min(), follow.speed.max()
         conditions += (Condition(DRIFT, f"shaft speed between {low:.4g} and {high:.4g} Hz; followed by window"),)
-    lines = known_lines(exact, speed + turning, rate, settings.lines, result.lines.found, run.length / rate)
+    lines = known_lines(exact, speed + turning, rate, settings.mains, result.lines.found, run.length / rate)
     return Tuning(lines, follow, conditions, settled)
 
 

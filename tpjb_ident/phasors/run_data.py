@@ -23,7 +23,7 @@ from rigdata.run import Run
 from rigdata.vector import directions, plane_vector
 from tpjb_ident.conditions import Conditions
 from tpjb_ident.phasors.line_fit import usual_scale
-from tpjb_ident.phasors.lines import LineSet, LineSettings, WindowSettings
+from tpjb_ident.phasors.lines import LineSet
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,7 @@ def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
 class PhasorSettings:
     """How phasors are extracted."""
 
-    lines: LineSettings = field(default_factory=LineSettings)
-    windows: WindowSettings = field(default_factory=WindowSettings)
+    mains: float = 50.0
     delays: dict[str, float] = field(default_factory=dict)
     excitation_lines: tuple[float, ...] = ()
 

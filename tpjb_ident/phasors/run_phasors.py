@@ -128,16 +128,19 @@ MAX_JITTER = 0.02
 def extract(
     run: Run,
     housing_mass: float,
-    settings: PhasorSettings,
     lines: LineSet,
     follow: ShaftCourse | None = None,
     clocks: Mapping[str, float] | None = None,
+    window: float | None = None,
 ) -> RunPhasors:
-    """Fit all windows of a run; `clocks`: by how much lines turn faster by a device's clock, relative."""
+    """Fit all windows of a run, of a stated length [s] or of one that tells the lines apart.
+
+    `clocks`: by how much lines turn faster by a device's clock, relative.
+    """
     readers = device_readers(run)
     channels = [(c, reader.device.name) for reader in readers for c in reader.channels]
     channels.sort(key=lambda described: VECTOR_QUANTITIES.index(described[0].quantity))
-    length, count = plan_windows(run.length, run.sample_rate, lines, settings.windows)
+    length, count = plan_windows(run.length, run.sample_rate, lines, window)
     seconds = length / run.sample_rate
     middles = np.asarray((np.arange(count) + 0.5) * length / run.sample_rate, dtype=float)
     speeds = np.full(count, np.nan) if follow is None else follow.at(middles)
@@ -313,7 +316,7 @@ class _RunFit:
             fault = f"{rate:g} samples per second cannot show an excitation of {beyond[0]:g} Hz"
             cure = "Check sample_rate, the unit of the time column (ms called s?) and excitation_frequency"
             raise refuse(run.file, "time", fault, cure, run.id)
-        return known_lines(excitation, self.speed, rate, self.settings.lines, extra, run.length / rate)
+        return known_lines(excitation, self.speed, rate, self.settings.mains, extra, run.length / rate)
 
     def _fit(self, lines: LineSet, follow: ShaftCourse | None = None) -> None:
         self._fit_windows(lines, follow)
@@ -322,7 +325,7 @@ class _RunFit:
     def _fit_windows(self, lines: LineSet, follow: ShaftCourse | None = None) -> None:
         """Windows of the run's longest stretch of one excitation."""
         self.follow = follow
-        windows = extract(self.run, self.mass, self.settings, lines, follow, self.clocks)
+        windows = extract(self.run, self.mass, lines, follow, self.clocks)
         self.result = longest_stretch(windows, self.run.sample_rate)
 
     def _add_unexpected(self) -> None:

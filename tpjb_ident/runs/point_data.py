@@ -8,7 +8,7 @@ that loses all of its runs is told as lost.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from rigdata.run import Run
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.columns import amount, place_of
 from tpjb_ident.conditions import Conditions, holding
-from tpjb_ident.phasors.run_data import FilmLines, RunPhasors, film_lines, mains_lines
+from tpjb_ident.phasors.run_data import SHORT, FilmLines, RunPhasors, film_lines, mains_lines
 from tpjb_ident.rounding import listed
 
 #: Runs named one by one; more are counted.
@@ -42,10 +42,9 @@ def digest(phasors: RunPhasors, sample_rate: float = 0.0, observations: tuple[Ob
     """Sum up the phasors of all lines of a run that was recorded at `sample_rate` [Hz]."""
     lines = len(phasors.lines.excitation)
     excitation = replace(phasors, z=phasors.z[:, :lines].copy(), residual=phasors.residual[:lines])
-    phasors_left: dict[str, Any] = {f.name: getattr(excitation, f.name) for f in fields(excitation)}
     mains, force = mains_lines(phasors)
     return RunDigest(
-        **phasors_left,
+        **vars(excitation),
         mains=mains,
         mains_force=force,
         harmonics=film_lines(phasors),
@@ -122,10 +121,6 @@ class FinishedRuns:
         if outcomes and not remaining.digests:
             raise remaining.excluded[0].error
         return remaining
-
-
-#: Samples from which a run's temperatures are taken.
-_TEMPERATURE_SAMPLES = 2**17
 
 
 @dataclass(frozen=True)
@@ -241,7 +236,7 @@ def mean_temperatures(run: Run) -> dict[int, float]:
     """Mean temperature per pad over a run [K]; pads with several sensors give their mean."""
     means = []
     for sensor in run.temperatures():
-        values = run.record(sensor.name, 0, _TEMPERATURE_SAMPLES).values
+        values = run.record(sensor.name, 0, SHORT).values
         values = values[np.isfinite(values)]
         if sensor.pad is not None and len(values):
             means.append({sensor.pad: float(values.mean())})
