@@ -87,7 +87,7 @@ FIXED = 0.4
 
 
 def taken(run, follow=None):
-    return extract(run, 30.0, LINES, follow, window=FIXED)
+    return extract(run, LINES, follow, window=FIXED)
 
 
 def exact(result, quantity="displacement", but=(), tolerance=1e-9):

@@ -251,7 +251,6 @@ class RunSpectra(RunPhasors):
 
 def run_spectra(
     run: Run,
-    housing_mass: float,
     band: tuple[float, float],
     seconds: float,
     settings: PhasorSettings,
@@ -285,7 +284,7 @@ def run_spectra(
             np.tile(mean, (len(z), 1)),
             none,
             none,
-            housing_mass,
+            run.housing_mass,
             record.conditions,
             temperatures=temperatures,
             temperature=temperature,

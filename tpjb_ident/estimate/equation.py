@@ -364,16 +364,17 @@ def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
     return np.array(rows)
 
 
-def campaign_rig(campaign: Campaign, sensors: tuple[Sensor, ...], blocks: Blocks, ratio: complex, **known: Any) -> Rig:
-    """The rig of a campaign's dynamic runs; `ratio`: cells over set points of all runs, zero where they show none.
-
-    `known`: what else is of the rig, by name.
-    """
-    mount = found_mount(sensors, blocks, getattr(campaign, "mount", None), ratio)
-    return Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, static=ratio != 0, **known)
+def campaign_rig(campaign: Campaign, **known: Any) -> Rig:
+    """The rig of a campaign's dynamic runs as stated; `known`: what else is of it, by name."""
+    return Rig(sensors_of(campaign), campaign.housing_mass, campaign.mass_uncertainty, **known)
 
 
-def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated_mount: str | None, ratio: complex) -> str:
+def mounted(rig: Rig, blocks: Blocks, stated: str | None, ratio: complex) -> Rig:
+    """The rig on what it stands on; `ratio`: cells over set points of all runs, zero where they show none."""
+    return replace(rig, mount=found_mount(rig, blocks, stated, ratio), static=ratio != 0)
+
+
+def found_mount(rig: Rig, blocks: Blocks, stated_mount: str | None, ratio: complex) -> str:
     """Whether the housing stands on its cells or floats: as stated, else by a over w^2 d.
 
     That is -c h of a housing on springs, 1 + g h of one that floats, c and g the compliance of what gives way. Without
@@ -382,7 +383,6 @@ def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated_mount: str | N
     """
     if stated_mount:
         return stated_mount
-    rig = Rig(tuple(sensors), 1.0)
     carried = "cells" if _CARRIED[0] < abs(ratio) < _CARRIED[1] else "unknown"
     if not rig.has_acceleration:
         return carried

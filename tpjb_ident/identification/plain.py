@@ -56,7 +56,7 @@ def plain_points(campaign: Campaign, settings: PlainSettings) -> list[PlainPoint
     runs = []
     for run in (run for run in campaign.of_kind("dynamic") if not is_broadband(run)):
         lines = LineSet((Line("excitation", run.point.excitation_hz),), (), (), run.point.shaft_speed_hz)
-        runs.append(extract(run, campaign.housing_mass, lines, window=settings.window))
+        runs.append(extract(run, lines, window=settings.window))
     return [_solved(data, settings) for data in gather(runs)]
 
 

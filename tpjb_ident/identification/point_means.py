@@ -12,7 +12,7 @@ from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation,
 from tpjb_ident.estimators.least_trimmed import mm_fit, within_directions
 from tpjb_ident.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
 from tpjb_ident.phasors.frequency import shaft_order
-from tpjb_ident.phasors.run_data import by_channel
+from tpjb_ident.phasors.run_data import by_channel, places_of
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 
@@ -114,9 +114,8 @@ def channel_windows(data: PointData, rig: Rig) -> tuple[ComplexArray, tuple[tupl
     z[:, ~alive(rig.channels, np.abs(np.nan_to_num(z)).max(axis=0, initial=0.0))] = np.nan
     living = []
     for g, run in enumerate(data.runs):
-        named = {(channel.name, channel.quantity): channel for channel in run.channels}
-        shown = zip(rig.channels, np.isfinite(z[data.run_index == g]).any(axis=0))
-        living.append(tuple(named[sensor.name, sensor.quantity] if is_shown else None for sensor, is_shown in shown))
+        shown = zip(places_of(rig.channels, run.channels), np.isfinite(z[data.run_index == g]).any(axis=0))
+        living.append(tuple(run.channels[k] if is_shown else None for k, is_shown in shown))
     # how far the devices' clocks have run ahead
     rates = [rig.rates.get(sensor.clock, 0.0) for sensor in rig.channels]
     omega = 2 * np.pi * np.array([r.lines.driven[i] for r, i in zip(data.runs, data.lines)])

@@ -156,11 +156,16 @@ class RunPhasors(Directed):
         return self.film_force(self.z)
 
 
+def places_of(wanted: Sequence[Channel], channels: Sequence[Channel]) -> list[int]:
+    """Place of every channel that is wanted among some, -1 of one that is missing."""
+    places = {(channel.name, channel.quantity): k for k, channel in enumerate(channels)}
+    return [places.get((channel.name, channel.quantity), -1) for channel in wanted]
+
+
 def by_channel(values: np.ndarray, channels: Sequence[Channel], wanted: Sequence[Channel]) -> np.ndarray:
     """Values (.., n) of some channels in the order of those that are wanted, (.., m); NaN of those that are missing."""
-    places = {(channel.name, channel.quantity): k for k, channel in enumerate(channels)}
-    order = np.array([places.get((channel.name, channel.quantity), -1) for channel in wanted], dtype=int)
-    return np.concatenate([values, np.full((*values.shape[:-1], 1), np.nan)], axis=-1)[..., order]
+    padded = np.concatenate([values, np.full((*values.shape[:-1], 1), np.nan)], axis=-1)
+    return padded[..., places_of(wanted, channels)]
 
 
 def complex_median(z: ComplexArray) -> ComplexArray:

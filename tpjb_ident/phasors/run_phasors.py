@@ -127,7 +127,6 @@ MAX_JITTER = 0.02
 
 def extract(
     run: Run,
-    housing_mass: float,
     lines: LineSet,
     follow: ShaftCourse | None = None,
     clocks: Mapping[str, float] | None = None,
@@ -170,7 +169,7 @@ def extract(
         seconds,
         tuple(channel for channel, _ in channels),
         *fit,
-        housing_mass,
+        run.housing_mass,
         device=tuple(name for _, name in channels),
     )
 
@@ -231,7 +230,7 @@ def _device_windows(
 _TUNINGS = 3
 
 
-def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None = None) -> RunPhasors:
+def run_phasors(run: Run, settings: PhasorSettings | None = None) -> RunPhasors:
     """Extract the phasors of one run."""
     settings = settings or PhasorSettings()
     if run.excitation_kind != "sine":
@@ -239,7 +238,7 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
         cure = "Excite with sines, or leave the run out"
         raise refuse(run.file, "excitation", text, cure, run.id)
     run = with_kept_beginning(run)
-    fit = _beginning_fit(run, housing_mass, settings)
+    fit = _beginning_fit(run, settings)
     if fit.run.length < run.length:
         fit.extend(run)
     result, slower = fit.result, fit.slower
@@ -252,14 +251,14 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
     return compensated(described, run, slower, settings.delays)
 
 
-def _beginning_fit(run: Run, housing_mass: float, settings: PhasorSettings) -> _RunFit:
+def _beginning_fit(run: Run, settings: PhasorSettings) -> _RunFit:
     """Fit of a run, of the beginning of a long one."""
     if run.length > SHORT:
         try:
-            return _RunFit(beginning_of(run, SHORT), housing_mass, settings)
+            return _RunFit(beginning_of(run, SHORT), settings)
         except RecordTooShortError:  # the beginning is not enough; all of it may be
             pass
-    return _RunFit(run, housing_mass, settings)
+    return _RunFit(run, settings)
 
 
 class _RunFit:
@@ -270,8 +269,8 @@ class _RunFit:
     follow: ShaftCourse | None
     clocks: Mapping[str, float] | None = None
 
-    def __init__(self, run: Run, housing_mass: float, settings: PhasorSettings) -> None:
-        self.run, self.mass, self.settings = run, housing_mass, settings
+    def __init__(self, run: Run, settings: PhasorSettings) -> None:
+        self.run, self.settings = run, settings
         self.driven = settings.excitation_lines or (run.point.excitation_hz,)
         self.speed, self.conditions = shaft_speed(run)
         self._fit(self._lines(self.driven, ()))
@@ -325,7 +324,7 @@ class _RunFit:
     def _fit_windows(self, lines: LineSet, follow: ShaftCourse | None = None) -> None:
         """Windows of the run's longest stretch of one excitation."""
         self.follow = follow
-        windows = extract(self.run, self.mass, lines, follow, self.clocks)
+        windows = extract(self.run, lines, follow, self.clocks)
         self.result = longest_stretch(windows, self.run.sample_rate)
 
     def _add_unexpected(self) -> None:
