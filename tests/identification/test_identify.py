@@ -195,7 +195,7 @@ def drifting_run(drift, tach_noise):
 def test_a_drifting_shaft_is_followed_by_its_runout(tach_noise):
     run = drifting_run(-0.01, tach_noise)
     first = extract(run, known_lines((25.0,), 22.0, run.sample_rate))
-    speeds, doubt = speeds_from_runout(first, run.sample_rate)
+    speeds, doubt = speeds_from_runout(first)
     expected = 22.0 - 0.01 * (first.start + first.length / 2)
     np.testing.assert_allclose(speeds, expected, atol=0.006)
     assert doubt < 1e-3

@@ -205,6 +205,11 @@ def film_force(rig: Rig, blocks: Blocks) -> ComplexArray:
     return force + rig.mass * np.nan_to_num(vector(rig, blocks, "acceleration"))
 
 
+def adjoint(matrices: Any) -> Any:
+    """Conjugate transposes of matrices (n, k, m), (n, m, k)."""
+    return matrices.conj().transpose(0, 2, 1)
+
+
 def totals(place: IntArray, values: FloatArray | BoolArray, number: int) -> FloatArray:
     """Sums of values (n, ..) by place (n,), (number, ..)."""
     sums = np.zeros((number, *values.shape[1:]))

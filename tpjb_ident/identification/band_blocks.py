@@ -18,7 +18,7 @@ from tpjb_ident.bands.film_products import film_products
 from tpjb_ident.bands.responses import BandPoint, ClassicLine, line_response, one_phase_set, pooled_noise
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.arrowhead import MODELS, Shape, complex_matrix, least_squares, power_columns, real_numbers
-from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, alive, film_force, stacked, vector
+from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, adjoint, alive, film_force, stacked, vector
 from tpjb_ident.estimate.noise import GAIN_OR_LOAD, UNKNOWN_EXPONENT, slopes_over_load
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.solve import Solution
@@ -154,7 +154,7 @@ def _strengths(rig: Rig, blocks: Blocks) -> FloatArray:
     """F ratios of every line's weaker and stronger direction of motion over its noise, (L, 2)."""
     probes = rig.pick("displacement")
     plane = np.linalg.pinv(blocks.along[:, probes] * blocks.present[:, probes, None])
-    noise = plane @ blocks.noise[:, probes][:, :, probes] @ plane.transpose(0, 2, 1)
+    noise = plane @ blocks.noise[:, probes][:, :, probes] @ adjoint(plane)
     size = np.sqrt(np.maximum(np.einsum("nii->n", noise).real / 2, 1e-300))
     white = np.nan_to_num(vector(rig, blocks, "displacement")) / size[:, None]
     return np.linalg.eigvalsh(line_products(blocks, white, white)) / 2

@@ -123,6 +123,13 @@ class RunPhasors(Directed):
     rounding: FloatArray = field(default_factory=lambda: np.empty(0))  #: (n_channels,), SI^2: by it on a line, at most
     temperatures: dict[int, float] = field(default_factory=dict)  #: K: mean by pad
     temperature: float = np.nan  #: K: at the probes, as stated, else the mean of the thermometers
+    sample_rate: float = 0.0
+
+    @property
+    def noise(self) -> FloatArray:
+        """Standard deviation of a window's phasor by what its lines leave, channel by channel (n_channels,)."""
+        samples = self.length * self.sample_rate
+        return np.maximum(2 * usual_scale(self.scale) / np.sqrt(samples), np.finfo(float).tiny)
 
     @cached_property
     def displacement(self) -> ComplexArray:
@@ -171,11 +178,6 @@ def by_channel(values: np.ndarray, channels: Sequence[Channel], wanted: Sequence
 def complex_median(z: ComplexArray) -> ComplexArray:
     """Median of real and imaginary parts over the first axis; `z` (n, ...)."""
     return np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0)
-
-
-def phasor_noise(run: RunPhasors, rate: float) -> FloatArray:
-    """Standard deviation of a window's phasor by what its lines leave, channel by channel (n_channels,)."""
-    return np.maximum(2 * usual_scale(run.scale) / np.sqrt(run.length * rate), np.finfo(float).tiny)
 
 
 #: Lines nearer than this are one [Hz].

@@ -31,7 +31,6 @@ from tpjb_ident.phasors.run_data import (
     beginning_of,
     complex_median,
     device_readers,
-    phasor_noise,
     with_kept_beginning,
 )
 from tpjb_ident.phasors.whole_record import (
@@ -55,10 +54,10 @@ _DEVIATIONS, _QUIET = 3.0, 0.1
 _ACROSS = 0.05
 
 
-def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
+def longest_stretch(result: RunPhasors) -> RunPhasors:
     """The run with the windows of its longest stretch alone; those of others give no phasor."""
     driven = len(result.lines.excitation)
-    noise = phasor_noise(result, rate)
+    noise = result.noise
     quantity = np.array([c.quantity for c in result.channels])
     live = np.isfinite(noise) & (quantity != "acceleration")
     z, quantity = result.z[:, :driven, live] / noise[live], quantity[live]
@@ -171,6 +170,7 @@ def extract(
         *fit,
         run.housing_mass,
         device=tuple(name for _, name in channels),
+        sample_rate=run.sample_rate,
     )
 
 
@@ -285,7 +285,7 @@ class _RunFit:
             self._fit(better.lines, better.follow)
             if better.settled:
                 break
-        self.clocks = device_rates(self.result, run.sample_rate)
+        self.clocks = device_rates(self.result)
         if self.clocks:
             self._fit(self.result.lines, self.follow)
         self.result = with_record(self.result, self.records)
@@ -325,7 +325,7 @@ class _RunFit:
         """Windows of the run's longest stretch of one excitation."""
         self.follow = follow
         windows = extract(self.run, lines, follow, self.clocks)
-        self.result = longest_stretch(windows, self.run.sample_rate)
+        self.result = longest_stretch(windows)
 
     def _add_unexpected(self) -> None:
         """Fit lines along that stand out of the residual, but for the images of what was filled up."""
@@ -339,7 +339,7 @@ class _RunFit:
         """Fit lines along that no window tells from the excitation: their beat looks like a drive off its set point."""
         lines, exact, neighbours = self.result.lines, list(self.result.lines.driven), []
         for i in range(len(exact)):
-            pair = near_line(self.result, i, self.records[0].duration, self.run.sample_rate)
+            pair = near_line(self.result, i, self.records[0].duration)
             if pair is not None:
                 exact[i] = pair[0]
                 neighbours.append(pair[1])

@@ -34,12 +34,11 @@ class RunDigest(RunPhasors):
     mains: ComplexArray | None = None  #: (2,) complex, m: displacement at the mains line, where it stands apart
     mains_force: ComplexArray | None = None  #: (2,) complex, N: oil force at the mains line, where it stands apart
     harmonics: tuple[FilmLines | None, ...] = ()
-    sample_rate: float = 0.0
     observations: tuple[Observation, ...] = ()
 
 
-def digest(phasors: RunPhasors, sample_rate: float = 0.0, observations: tuple[Observation, ...] = ()) -> RunDigest:
-    """Sum up the phasors of all lines of a run that was recorded at `sample_rate` [Hz]."""
+def digest(phasors: RunPhasors, observations: tuple[Observation, ...] = ()) -> RunDigest:
+    """Sum up the phasors of all lines of a run."""
     lines = len(phasors.lines.excitation)
     excitation = replace(phasors, z=phasors.z[:, :lines].copy(), residual=phasors.residual[:lines])
     mains, force = mains_lines(phasors)
@@ -48,7 +47,6 @@ def digest(phasors: RunPhasors, sample_rate: float = 0.0, observations: tuple[Ob
         mains=mains,
         mains_force=force,
         harmonics=film_lines(phasors),
-        sample_rate=sample_rate,
         observations=observations,
     )
 
@@ -200,18 +198,12 @@ def finite_mean(rows: FloatArray) -> FloatArray:
 
 def gather(runs: Sequence[RunPhasors]) -> list[PointData]:
     """Group runs by operating point; a record with several excitation lines feeds several points."""
-    groups = group([(run.point, run.lines.driven) for run in runs])
-    return [point_data(point, [(runs[k], i) for k, i in members]) for point, members in groups]
-
-
-def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:
-    """Operating points in order, each with the places of its runs and which line of the run is meant."""
-    groups: dict[tuple[object, ...], tuple[OperatingPoint, list[tuple[int, int]]]] = {}
-    for k, (set_points, frequencies) in enumerate(runs):
-        for i, frequency in enumerate(frequencies):
-            point = point_of(set_points, frequency)
-            groups.setdefault(point.key, (point, []))[1].append((k, i))
-    return [groups[key] for key in sorted(groups)]
+    groups: dict[tuple[object, ...], tuple[OperatingPoint, list[tuple[RunPhasors, int]]]] = {}
+    for run in runs:
+        for i, frequency in enumerate(run.lines.driven):
+            point = point_of(run.point, frequency)
+            groups.setdefault(point.key, (point, []))[1].append((run, i))
+    return [point_data(*groups[key]) for key in sorted(groups)]
 
 
 def point_of(point: OperatingPoint, frequency: float) -> OperatingPoint:
@@ -224,10 +216,8 @@ def point_of(point: OperatingPoint, frequency: float) -> OperatingPoint:
 
 def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> PointData:
     """Windows of a point's runs, each with the line that is meant."""
-    runs = tuple(run for run, _ in members)
-    lines = tuple(i for _, i in members)
-    D = [run.displacement[:, i] for run, i in zip(runs, lines)]
-    F = [run.force[:, i] for run, i in zip(runs, lines)]
+    runs, lines = zip(*members)
+    D, F = [run.displacement[:, i] for run, i in members], [run.force[:, i] for run, i in members]
     index = np.repeat(np.arange(len(runs)), [len(d) for d in D])
     return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), index)
 

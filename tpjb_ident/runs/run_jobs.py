@@ -278,7 +278,7 @@ def one_run(run: Run, settings: PhasorSettings) -> RunDigest:
         conditions = merged(phasors.conditions, dead, repaired)
         phases, temperatures = shaft_phases(cached, phasors), mean_temperatures(cached)
         result = replace(phasors, conditions=conditions, shaft_phase=phases, temperatures=temperatures)
-        return digest(result, run.sample_rate, observations)
+        return digest(result, observations)
 
 
 def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
