@@ -99,7 +99,7 @@ def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
             group = file.create_group(f"point-{number:03d}")
             point = p.data.point
             group.attrs.update(zip(POINT_KEY, point.key))
-            group.attrs["runs"] = [run.run for run in p.data.runs]
+            group.attrs["runs"] = p.data.names
             whole = p.data.whole
             rows = (*r_matrix(p.data.D[whole], p.data.F[whole]), p.data.run_index[whole])
             for name, values in zip(("R", "f", "run_index"), rows):

@@ -56,8 +56,8 @@ def point_share(solved: CampaignSolution, data: PointData, p: int, dry: DryTest,
     runs, m = len(data.runs), len(solution.rig)
     shift, factor = np.zeros((runs, m), complex), np.ones((runs, m), complex)
     change, weight = np.zeros((runs, 2, 2), complex), np.zeros(runs)
-    names, mine = [run.run for run in data.runs], np.flatnonzero(blocks.point == p)
-    g = [names.index(blocks.runs[run]) for run in blocks.run[mine]]
+    mine = np.flatnonzero(blocks.point == p)
+    g = [data.names.index(blocks.runs[run]) for run in blocks.run[mine]]
     shift[g], factor[g] = solution.shift[mine], solution.factor[mine]
     change[g], weight[g] = solution.run_change[mine], solution.scatter.weights[mine]
     estimate, budget = _estimate(solved, p, weight, data)
