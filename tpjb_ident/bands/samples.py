@@ -20,12 +20,12 @@ from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
-from rigdata.vector import directions
+from rigdata.vector import Directed, directions
 from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.line_fit import BAD_LIMIT, even_design, robust_deviation
 from tpjb_ident.phasors.lines import HIGHEST, MAINS_DRIFT, SPEED_DRIFT, Line, strong_lines
-from tpjb_ident.phasors.run_data import Directed, device_readers
+from tpjb_ident.phasors.run_data import device_readers
 from tpjb_ident.phasors.whole_record import vertex
 
 #: Share of a channel's samples that may be missing in stretches, bridged by straight lines,

@@ -18,14 +18,14 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
-from rigdata.vector import directions
+from rigdata.vector import Directed, directions
 from tpjb_ident.check.findings import Reporter, plane_of
 from tpjb_ident.check.signals import ALWAYS_NEEDED, check_clock, check_signal, needed
 from tpjb_ident.conditions import Conditions
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.phasors.line_fit import LineFitter, white_noise, window_median
 from tpjb_ident.phasors.lines import RecordTooShortError
-from tpjb_ident.phasors.run_data import Directed, RunPhasors, by_channel, with_kept_beginning
+from tpjb_ident.phasors.run_data import RunPhasors, by_channel, with_kept_beginning
 from tpjb_ident.phasors.run_phasors import run_phasors
 
 #: Lines of a band that are looked at, the strongest of as many parts of it.

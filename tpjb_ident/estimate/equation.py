@@ -30,9 +30,8 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
-from rigdata.vector import directions, plane_vector
+from rigdata.vector import Directed, directions, plane_vector
 from tpjb_ident.conditions import Conditions
-from tpjb_ident.phasors.run_data import Directed
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from rigdata.device import Device
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
 from rigdata.run import Run
-from rigdata.vector import directions, plane_vector
+from rigdata.vector import Directed
 from tpjb_ident.conditions import Conditions
 from tpjb_ident.phasors.line_fit import usual_scale
 from tpjb_ident.phasors.lines import LineSet
@@ -78,22 +78,6 @@ class PhasorSettings:
     mains: float = 50.0
     delays: dict[str, float] = field(default_factory=dict)
     excitation_lines: tuple[float, ...] = ()
-
-
-class Directed:
-    """What several channels show, side by side; `channels` have a quantity and an axis each."""
-
-    channels: Any
-
-    def pick(self, quantity: str) -> list[int]:
-        """Places of the channels of a quantity."""
-        return [k for k, channel in enumerate(self.channels) if channel.quantity == quantity]
-
-    def plane(self, quantity: str, values: ComplexArray | FloatArray) -> ComplexArray:
-        """X and Y (.., 2) of a quantity from values (.., n_channels) of all channels, NaN where there is none."""
-        places = self.pick(quantity)
-        along = directions([self.channels[k].axis or 0.0 for k in places])
-        return plane_vector(along, np.asarray(values[..., places], complex))
 
 
 @dataclass(frozen=True)
