@@ -339,7 +339,8 @@ def _assembled(
             problems.extend(error.problems)
             continue
         stated = {name: getattr(entry, name) for name in RunDescription.__dataclass_fields__}
-        runs.append(Run(**stated, channels=channels if own is None else _used(own), reader=reader))
+        used = channels if own is None else _used(own)
+        runs.append(Run(**stated, channels=used, reader=reader, housing_mass=manifest.housing_mass))
     if any(p.severity == "error" for p in problems):
         raise RigDataError([*manifest.notes, *problems])
     described = {name: getattr(manifest, name) for name in Description.__dataclass_fields__}

@@ -42,6 +42,8 @@ class Run(RunDescription):
         Lowest and highest frequency excited [Hz].
     temperature : float or None
         At the probes, as stated [K]; `mean_temperature` also asks the thermometers.
+    housing_mass : float
+        Of the campaign's rig [kg].
 
     Examples
     --------
@@ -54,6 +56,7 @@ class Run(RunDescription):
 
     channels: Channels
     reader: RunReader = field(compare=False)
+    housing_mass: float = 0.0
 
     def __repr__(self) -> str:
         towards = "" if self.pad is None else f", pad #{self.pad}"

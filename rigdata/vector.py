@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -64,6 +65,22 @@ def plane_vector(along: FloatArray, values: ComplexArray) -> ComplexArray:
     vectors = np.full((*values.shape[:-1], 2), np.nan + 0j)
     vectors[spanned] = np.linalg.solve(gram[spanned], moment[spanned])[..., 0]
     return vectors
+
+
+class Directed:
+    """What several channels show, side by side; `channels` have a quantity and an axis each."""
+
+    channels: Any
+
+    def pick(self, quantity: str) -> list[int]:
+        """Places of the channels of a quantity."""
+        return [k for k, channel in enumerate(self.channels) if channel.quantity == quantity]
+
+    def plane(self, quantity: str, values: ComplexArray | FloatArray) -> ComplexArray:
+        """X and Y (.., 2) of a quantity from values (.., n_channels) of all channels, NaN where there is none."""
+        places = self.pick(quantity)
+        along = directions([self.channels[k].axis or 0.0 for k in places])
+        return plane_vector(along, np.asarray(values[..., places], complex))
 
 
 def zero_uncertainty(channels: Iterable[Channel], quantity: str) -> FloatArray:

@@ -108,7 +108,7 @@ def test_the_excitation_is_seen_through_bad_samples_and_gaps_channel_by_channel(
     data["DX"][300:340] += 5.0
     data["DX"][900:1000] = np.nan
     data["DY"] = np.full(2000, np.nan)
-    phasors = run_phasors(held_run.run_of(HeldReader(data, 1000.0), described), 0.0)
+    phasors = run_phasors(held_run.run_of(HeldReader(data, 1000.0), described))
     lines = excitation_line(phasors, 0, [described[name] for name in ("FX", "DX", "DY")])
     assert lines.mean[:2] == pytest.approx(3.0, abs=2e-3)
     assert lines.phasor[:2] == pytest.approx(0.5 * np.exp(0.3j), abs=2e-3)
@@ -299,7 +299,7 @@ def test_an_accelerometer_across_the_drive_may_read_nothing():
     def resting(force, acceleration):
         z = np.array([[[1e-6, 1e-6, *force, *acceleration]]] * 5, dtype=complex)
         places = {"force": [2, 3], "acceleration": [4, 5]}
-        return _at_rest(SimpleNamespace(z=z, channels=channels, pick=places.get), 30.0)
+        return _at_rest(SimpleNamespace(z=z, channels=channels, pick=places.get, housing_mass=30.0))
 
     assert resting((900.0, 2.0), (0.1, 0.0)) == {"acceleration 90"}
     assert resting((900.0, 900.0), (1.0, 0.0)) == set()

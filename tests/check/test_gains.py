@@ -168,7 +168,7 @@ def test_a_speed_that_misses_its_set_point_leaks_nothing_into_the_line_wanted():
     described = channels(("displacement", "force"))
     noise = 1e-5 * np.random.default_rng(1).standard_normal((4, 2000))
     run = run_of(HeldReader(dict(zip(described, wave + noise)), 1000.0), described)
-    phasor = excitation_line(run_phasors(run, 0.0), 0, list(described.values())).phasor
+    phasor = excitation_line(run_phasors(run), 0, list(described.values())).phasor
     assert np.abs(phasor - 1).max() < 2e-3
 
 

@@ -27,13 +27,13 @@ def observation(load, size, stated=0.0, force=0.0, displacement=45.0, frequency=
     lines = {"displacement": 1e-6 * directions(np.radians(displacement)), "force": size * directions(np.radians(force))}
     return SimpleNamespace(
         run=run, report=Reporter(run), conditions=(), shows=lambda quantity: True,
-        film_force=lambda mass: lines["force"], line=lines.get, names=lambda quantity: ["L1H", "L1V"],
+        film_force=lines["force"], line=lines.get, names=lambda quantity: ["L1H", "L1V"],
         of=lambda quantity: [],
     )  # fmt: skip
 
 
 def findings(runs):
-    check_excitation(runs, 30.0)
+    check_excitation(runs)
     return [[finding.key for finding in run.report.findings] for run in runs]
 
 

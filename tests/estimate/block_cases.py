@@ -223,7 +223,7 @@ def solved(rig: Rig, blocks: Blocks, truth: np.ndarray, *more, without=(), seed:
 def terms_of(rig: Rig, blocks: Blocks, without=()) -> list:
     """All terms that apply; a clock where sensors name devices."""
     used = [term for term in TERMS if term not in without]
-    if len({sensor.clock for sensor in rig.sensors}) == 1:
+    if len({sensor.clock for sensor in rig.channels}) == 1:
         used = [term for term in used if term is not Clock]
     return [term(rig, blocks) for term in used]
 

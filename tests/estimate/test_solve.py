@@ -147,7 +147,7 @@ def struck(case, runs, size, seed=0):
     rig, blocks, truth = made(case, seed)
     z = blocks.z.copy()
     rng = np.random.default_rng([3, seed])
-    cells = rig.of("force")
+    cells = rig.pick("force")
     for run in runs:
         force = np.linalg.norm(z[run, cells])
         z[run, cells] += size * force * complex_normal(rng, len(cells))

@@ -16,11 +16,11 @@ from tpjb_ident.estimate.equation import RigStiffness
 from tpjb_ident.phasors.lines import (
     Line,
     LineSet,
-    LineSettings,
-    WindowSettings,
+    RecordTooShortError,
     known_lines,
     line_design,
     plan_windows,
+    strong_lines,
     variance_inflation,
 )
 from tpjb_ident.results.frequency_model import REFUSED, fit_over_frequency, fits_over_frequency
@@ -178,40 +178,40 @@ def lines_of(found):
 
 
 def test_every_kind_of_line_has_its_place_and_order():
-    settings = LineSettings(mains=60.0, shaft_harmonics=3, mains_harmonics=2)
-    found = known_lines((33.0, 25.0), 10.0, 1000.0, settings, extra=(71.3,))
+    found = known_lines((33.0, 25.0), 10.0, 1000.0, 60.0, extra=(71.3,))
     assert [e.frequency for e in found.excitation] == [25.0, 33.0]
     assert lines_of(found) == [
-        ("1X", 10.0), ("2X", 20.0), ("3X", 30.0), ("mains", 60.0), ("mains 2", 120.0),
-        ("harmonic 2", 50.0), ("harmonic 2", 66.0), ("found", 71.3),
+        ("1X", 10.0), ("2X", 20.0), ("mains", 60.0), ("harmonic 2", 50.0), ("harmonic 2", 66.0), ("found", 71.3)
     ]  # fmt: skip
     np.testing.assert_array_equal(found.frequencies[:3], [25.0, 33.0, 10.0])
+    more = [(line.name, line.frequency) for line in strong_lines(found.excitation, 10.0, 60.0, 3, 2)]
+    assert more[:5] == [("1X", 10.0), ("2X", 20.0), ("3X", 30.0), ("mains", 60.0), ("mains 2", 120.0)]
+    assert more[5:] == [("harmonic 2", 50.0), ("harmonic 2", 66.0)]
     moved = found.at_speed(11.0)
-    assert lines_of(moved)[:3] == [("1X", 11.0), ("2X", 22.0), ("3X", 33.0)]
-    assert lines_of(moved)[3:] == lines_of(found)[3:]
+    assert lines_of(moved)[:2] == [("1X", 11.0), ("2X", 22.0)]
+    assert lines_of(moved)[2:] == lines_of(found)[2:]
     assert (found.speed, moved.speed) == (10.0, 11.0)
-    assert known_lines((25.0, 25.0), 0.0, 1000.0, LineSettings(mains=0.0)).frequencies.tolist() == [25.0, 50.0]
+    assert known_lines((25.0, 25.0), 0.0, 1000.0, 0.0).frequencies.tolist() == [25.0, 50.0]
 
 
-QUIET, SIXTY = LineSettings(mains=0.0), LineSettings(mains=60.0)
 LINES = [
     # within its wander the shaft strikes the excitation; its second harmonic wanders twice as far
     (25.0, 24.93, {}, "2X", "1X"),
     (25.0, 24.91, {}, "1X 2X mains", ""),
     (25.0, 25.08, {}, "2X", "1X"),
     (25.0, 25.09, {}, "1X 2X mains", ""),
-    (25.0, 12.45, {"settings": QUIET}, "1X harmonic 2", "2X"),
-    (25.0, 12.41, {"settings": QUIET}, "1X 2X harmonic 2", ""),
-    (25.0, 12.57, {"settings": QUIET}, "1X harmonic 2", "2X"),
-    (25.0, 12.6, {"settings": QUIET}, "1X 2X harmonic 2", ""),
+    (25.0, 12.45, {"mains": 0.0}, "1X harmonic 2", "2X"),
+    (25.0, 12.41, {"mains": 0.0}, "1X 2X harmonic 2", ""),
+    (25.0, 12.57, {"mains": 0.0}, "1X harmonic 2", "2X"),
+    (25.0, 12.6, {"mains": 0.0}, "1X 2X harmonic 2", ""),
     (65.0, 22.0, {}, "1X 2X mains harmonic 2", ""),
     (66.0, 22.0, {}, "1X 2X mains harmonic 2", "3X"),
     # lines closer than either wanders are one
     (30.0, 49.9, {}, "1X 2X harmonic 2", ""),
     (30.0, 49.8, {}, "1X 2X mains harmonic 2", ""),
     # and what a record is too short to tell apart, the shaft's before the film's
-    (25.0, 50.2, {"settings": SIXTY, "duration": 2.0}, "1X 2X mains", ""),
-    (25.0, 50.2, {"settings": SIXTY, "duration": 4.0}, "1X 2X mains harmonic 2", ""),
+    (25.0, 50.2, {"mains": 60.0, "duration": 2.0}, "1X 2X mains", ""),
+    (25.0, 50.2, {"mains": 60.0, "duration": 4.0}, "1X 2X mains harmonic 2", ""),
     # a harmonic above the band is none
     (230.0, 22.0, {}, "1X 2X mains", ""),
 ]
@@ -231,7 +231,7 @@ def test_what_film_and_shaft_make_at_next_to_no_frequency_is_the_mean(speed, the
 
 
 def test_faint_lines_are_those_of_the_whole_record_unless_they_stand_out():
-    found = known_lines((25.0,), 22.0, 1000.0, None, (66.0, 71.0), 4.0)
+    found = known_lines((25.0,), 22.0, 1000.0, 50.0, (66.0, 71.0), 4.0)
     assert [(line.name, line.frequency) for line in found.faint] == [
         ("4X", 88.0), ("harmonic 3", 75.0), ("2X-f", 19.0), ("2f-X", 28.0)
     ]  # fmt: skip
@@ -260,16 +260,16 @@ def test_inflation_is_the_variance_of_a_phasor_over_that_of_the_line_alone():
 def test_windows_are_as_long_as_asked_or_as_many_as_wished():
     usual, alone = known_lines((25.0,), 22.0, 1000.0), LineSet((Line("excitation", 25.0),), ())
 
-    def planned(samples, lines=usual, **settings):
-        return plan_windows(samples, 1000.0, lines, WindowSettings(**settings))
+    def planned(samples, lines=usual, length=None):
+        return plan_windows(samples, 1000.0, lines, length)
 
     assert planned(5000, length=0.8) == planned(4800, length=0.8) == (800, 6)
-    assert planned(40_000, target_count=8) == (5000, 8)
-    (length, count), (other, more) = (planned(3000, max_inflation=most) for most in (1.05, 2.0))
-    assert length > other
-    assert count < more
-    assert planned(3000, alone, min_cycles=10.0, target_count=100)[0] >= 400
-    assert planned(3000, alone, min_cycles=4.0, target_count=100)[0] < 250
+    assert planned(40_000) == (2000, 20)
+    # few windows of a short record: four cycles of a line alone, more of one with neighbours
+    assert planned(1600, alone) == (160, 10)
+    assert planned(1600)[0] > 160
+    with pytest.raises(RecordTooShortError, match=r"a window of 0\.03 s"):
+        planned(3000, length=0.03)
 
 
 H = K + 1j * OMEGAS[1] * C

@@ -22,7 +22,7 @@ from tpjb_ident.estimators.estimate import (
 )
 from tpjb_ident.estimators.r_matrix import phasor_table, real_rows
 from tpjb_ident.phasors.frequency import FIRST_LOOK, MAX_DEPARTURE, shaft_speed
-from tpjb_ident.runs.point_data import finite_mean, group, point_data
+from tpjb_ident.runs.point_data import finite_mean, gather, point_data, point_of
 
 OMEGA = 160.0
 
@@ -262,15 +262,26 @@ def test_a_shaft_turns_as_its_tachometer_says_unless_that_cannot_be():
 
 
 def test_runs_are_grouped_by_their_set_points_in_order():
-    runs = [(at(6e3), (25.0,)), (at(), (25.3,)), (at(), (24.6, 40.0004)), (at(6e3), (25.1,)), (at(speed=20.0), (25.0,))]
-    found = group(runs)
-    assert [(p.static_load, p.shaft_speed_hz, p.excitation_hz) for p, _ in found] == [
+    lines = [
+        (at(6e3), (25.0,)),
+        (at(), (25.3,)),
+        (at(), (24.6, 40.0004)),
+        (at(6e3), (25.1,)),
+        (at(speed=20.0), (25.0,)),
+    ]
+    still, runs = np.zeros((1, 2, 2)), []
+    for k, (point, driven) in enumerate(lines):
+        found = SimpleNamespace(driven=driven)
+        runs.append(SimpleNamespace(run=k, point=point, lines=found, displacement=still, force=still))
+    points = gather(runs)
+    assert [(p.point.static_load, p.point.shaft_speed_hz, p.point.excitation_hz) for p in points] == [
         (5e3, 20.0, 25.0), (5e3, 22.0, 25.0), (5e3, 22.0, 40.0), (6e3, 22.0, 25.0),
     ]  # fmt: skip
-    assert [members for _, members in found] == [[(4, 0)], [(1, 0), (2, 0)], [(2, 1)], [(0, 0), (3, 0)]]
+    assert [p.names for p in points] == [(4,), (1, 2), (2,), (0, 3)]
+    assert [p.lines for p in points] == [(0,), (0, 0), (1,), (0, 0)]
     # within a fiftieth a line is that of the set point; beyond, one of its own, to the millihertz
     for frequency, own in ((25.49, 25.0), (25.51, 25.51), (24.51, 25.0), (24.48915, 24.489)):
-        assert group([(at(), (frequency,))])[0][0].excitation_hz == pytest.approx(own, abs=1e-9)
+        assert point_of(at(), frequency).excitation_hz == pytest.approx(own, abs=1e-9)
 
 
 def test_windows_of_a_point_follow_their_runs():

@@ -143,10 +143,10 @@ def test_excitation_off_its_set_point_is_found(campaign_of):
     calm = replace(Noise.like_samples(), glitches=Noise.none().glitches)
     run = load_campaign(campaign_of(rig([(5000.0, 25.0)], seed=2, noise=calm))).of_kind("dynamic")[0]
     wrong = replace(run, point=replace(run.point, excitation=2 * np.pi * 25.06))
-    phasors = run_phasors(wrong, 30.0)
+    phasors = run_phasors(wrong)
     assert "excitation off set point" in phasors.conditions
     assert phasors.lines.excitation[0].frequency == pytest.approx(25.0, abs=0.01)
-    assert run_phasors(run, 30.0).conditions == ()
+    assert run_phasors(run).conditions == ()
 
 
 @pytest.mark.slow
@@ -177,19 +177,19 @@ def drifting_run(drift, tach_noise):
 @pytest.mark.parametrize("tach_noise", [0.05, None])
 def test_a_drifting_shaft_is_followed_by_its_runout(tach_noise):
     run = drifting_run(-0.01, tach_noise)
-    first = extract(run, 30.0, PhasorSettings(), known_lines((25.0,), 22.0, run.sample_rate))
-    speeds, doubt = speeds_from_runout(first, run.sample_rate)
+    first = extract(run, known_lines((25.0,), 22.0, run.sample_rate))
+    speeds, doubt = speeds_from_runout(first)
     expected = 22.0 - 0.01 * (first.start + first.length / 2)
     np.testing.assert_allclose(speeds, expected, atol=0.006)
     assert doubt < 1e-3
-    phasors = run_phasors(run, 30.0)
+    phasors = run_phasors(run)
     assert "speed drifts" in phasors.conditions
     scatter = [p.displacement[:, 0].std(axis=0).max() for p in (first, phasors)]
     assert scatter[1] < 0.5 * scatter[0]
 
 
 def test_a_noisy_tachometer_is_no_drift():
-    assert "speed drifts" not in run_phasors(drifting_run(0.0, 0.05), 30.0).conditions
+    assert "speed drifts" not in run_phasors(drifting_run(0.0, 0.05)).conditions
 
 
 @pytest.mark.slow
@@ -246,7 +246,7 @@ def test_memory_does_not_grow_with_the_record():
     stream = run_of(Stream(columns(block), 10_000.0), channels(list(block)))
     whole = 3 * 2 * 8 * stream.length
     tracemalloc.start()
-    phasors = run_phasors(stream, 30.0, PhasorSettings())
+    phasors = run_phasors(stream, PhasorSettings())
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert len(phasors.start) > 50

@@ -20,9 +20,8 @@ from tpjb_ident.phasors.compensation import compensated
 from tpjb_ident.phasors.frequency import ShaftCourse
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import (
-    LineSettings,
+    MAX_INFLATION,
     RecordTooShortError,
-    WindowSettings,
     known_lines,
     plan_windows,
     shortest_window,
@@ -95,11 +94,11 @@ def held(seconds=4.0, stamps=None, turns=None, late=0.0, quantities=("displaceme
     return replace(held_run.run_of(reader, channels(quantities), POINT, "r"), excitation_direction=0.3)
 
 
-FIXED = PhasorSettings(windows=WindowSettings(length=0.4))
+FIXED = 0.4
 
 
 def taken(run, follow=None):
-    return extract(run, 30.0, FIXED, LINES, follow)
+    return extract(run, LINES, follow, window=FIXED)
 
 
 def exact(result, quantity="displacement", but=(), tolerance=1e-9):
@@ -320,32 +319,31 @@ def test_lines_that_coincide_are_merged_or_reported():
     coincident = known_lines((50.0,), 22.0, RATE)
     assert coincident.conditions == ("mains on excitation line",)
     assert "move the excitation" in coincident.conditions[0].detail
-    assert known_lines((50.0,), 22.0, RATE, LineSettings(mains=60.0)).conditions == ()
+    assert known_lines((50.0,), 22.0, RATE, 60.0).conditions == ()
 
 
 def test_window_length_follows_from_the_variance_that_is_accepted():
     lines = known_lines((25.0,), 22.0, RATE)
-    settings = WindowSettings()
-    shortest = shortest_window(lines, RATE, settings)
+    shortest = shortest_window(lines, RATE)
     assert 0.1 < shortest < 0.5
-    assert variance_inflation(lines.frequencies, 1, shortest, RATE) <= settings.max_inflation
-    length, count = plan_windows(2000, RATE, lines, settings)
+    assert variance_inflation(lines.frequencies, 1, shortest, RATE) <= MAX_INFLATION
+    length, count = plan_windows(2000, RATE, lines)
     assert count == int(2.0 / shortest)
     assert length * count <= 2000
     # a long record is cut into the wished number, not into the shortest possible windows
-    assert plan_windows(60_000, RATE, lines, settings) == (3000, 20)
+    assert plan_windows(60_000, RATE, lines) == (3000, 20)
 
 
 def test_a_record_too_short_is_refused_with_the_length_it_takes():
     close = known_lines((22.4,), 22.0, RATE)
     with pytest.raises(RecordTooShortError, match="takes at least") as caught:
-        plan_windows(1000, RATE, close, WindowSettings())
+        plan_windows(1000, RATE, close)
     needed = float(re.search(r"at least (\S+) s", str(caught.value))[1])
     assert needed > 1.0
-    length, _ = plan_windows(int(needed * RATE * 1.05), RATE, close, WindowSettings())
+    length, _ = plan_windows(int(needed * RATE * 1.05), RATE, close)
     assert length / RATE >= needed * 0.99
     with pytest.raises(RecordTooShortError, match="cannot tell the lines apart"):
-        plan_windows(60_000, RATE, close, WindowSettings(length=0.3))
+        plan_windows(60_000, RATE, close, 0.03)
 
 
 def test_gaps_at_other_places_in_every_channel_need_no_robust_fit(monkeypatch):

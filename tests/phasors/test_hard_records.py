@@ -34,7 +34,7 @@ def record(seed=1, time=TIME, **drive):
 
 
 def phasors_of(data, point=POINT):
-    return run_phasors(run_of(HeldReader(data, RATE), channels(QUANTITIES), point), 30.0)
+    return run_phasors(run_of(HeldReader(data, RATE), channels(QUANTITIES), point))
 
 
 def error(result, expected=Z, windows=None):
@@ -96,7 +96,7 @@ def test_a_shaft_at_twice_the_excitation_is_the_shafts():
     point = replace(POINT, shaft_speed=2 * np.pi * 50.1)
     data = record(shaft=50.1)
     run = run_of(HeldReader(data, RATE), channels(QUANTITIES), point)
-    result = run_phasors(run, 30.0)
+    result = run_phasors(run)
     assert [line.name for line in result.lines.nuisance].count("harmonic 2") == 0
     assert error(result) < 1e-3
 
@@ -138,7 +138,7 @@ def test_cells_at_a_rate_of_their_own_are_fitted_at_their_own_times(rate, stampe
     times = np.arange(round(rate * SECONDS)) / rate + (0.0013 if stamped else 0.0)
     data = {n: reading(n, times if n[0] == "F" else TIME, rng) for n in ALL}
     run = run_of(ApartReader(data, times if stamped else None, rate), channels(QUANTITIES))
-    result = run_phasors(run, 30.0)
+    result = run_phasors(run)
     assert result.device == ("", "", "B", "B", "", "")
     assert error(result) < 2e-3
     # 25 Hz again and again, error of a probes' phasor: 1e-4, of the cells at 150 Hz 1e-3
@@ -155,11 +155,11 @@ def test_a_third_device_of_the_firsts_rate_is_cut_as_the_first(monkeypatch):
     data = {n: reading(n, times if n[0] == "F" else TIME, rng) for n in ALL}
     reader = ApartReader(data, None, 300.0)
     run = run_of(reader, channels(QUANTITIES))
-    two = run_phasors(run, 30.0)
+    two = run_phasors(run)
     first, second = reader.devices()
     three = replace(first, channels=("DX", "DY")), second, replace(first, name="C", channels=("AX", "AY"))
     monkeypatch.setattr(reader, "devices", lambda: three)
-    apart = run_phasors(run, 30.0)
+    apart = run_phasors(run)
     assert apart.device == ("", "", "B", "B", "C", "C")
     np.testing.assert_allclose(apart.z[:, 0], two.z[:, 0], rtol=1e-9)
 
@@ -168,7 +168,7 @@ def test_a_device_that_ends_early_leaves_its_last_windows_empty():
     rng = np.random.default_rng(2)
     times = np.arange(round(300.0 * 3.0)) / 300.0
     data = {n: reading(n, times if n[0] == "F" else TIME, rng) for n in ALL}
-    result = run_phasors(run_of(ApartReader(data, times, 300.0), channels(QUANTITIES)), 30.0)
+    result = run_phasors(run_of(ApartReader(data, times, 300.0), channels(QUANTITIES)))
     late = result.start + result.length > 3.0
     assert np.isnan(result.z[late][:, :, 2:4]).all()
     assert np.isfinite(result.z[late][:, 0, :2]).all()
@@ -287,7 +287,7 @@ def test_a_device_whose_clock_runs_off_is_fitted_at_its_own_frequencies(ppm):
     rng, off, short = np.random.default_rng(3), 1 + 1e-6 * ppm, TIME[:-10]
     data = {n: reading(n, TIME if n[0] == "D" else off * short, rng, 45.0, shaft=44.0) for n in ALL}
     point = replace(POINT, excitation=2 * np.pi * 45.0)
-    phasors = run_phasors(run_of(ApartReader(data, None, RATE), channels(QUANTITIES), point), 30.0)
+    phasors = run_phasors(run_of(ApartReader(data, None, RATE), channels(QUANTITIES), point))
     middle = phasors.start + 0.5 * phasors.length
     for k, channel in enumerate(phasors.channels):
         fast = 1.0 if channel.name[0] == "D" else off

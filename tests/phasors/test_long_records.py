@@ -15,8 +15,8 @@ from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.frequency import shaft_order
 from tpjb_ident.phasors.line_fit import BLOCK, LineFitter, even_design
-from tpjb_ident.phasors.lines import WindowSettings, known_lines, line_design
-from tpjb_ident.phasors.run_data import SHORT, PhasorSettings
+from tpjb_ident.phasors.lines import known_lines, line_design
+from tpjb_ident.phasors.run_data import SHORT
 from tpjb_ident.phasors.run_phasors import extract, run_phasors
 
 FREQUENCIES = np.array([25.0, 22.0, 44.0, 50.0])
@@ -54,12 +54,11 @@ def test_a_long_run_is_read_once_and_says_the_same():
     point = replace(POINT, shaft_speed=2 * np.pi * 22.01)
     long = held_run(5, 10_000.0, 40.0, point)
     assert long.length > 2 * SHORT
-    settings = PhasorSettings(windows=WindowSettings(length=2.0))
-    once = run_phasors(long, 30.0, settings)
+    once = run_phasors(long)
     # all six channels once, and the beginning for a look
     samples = sum(len(names) * (stop - start) for names, start, stop in long.reader.asked)
     assert samples < 6 * (long.length + SHORT + 2**15)
-    plain = extract(long, 30.0, settings, known_lines((25.0,), 22.0, long.sample_rate))
+    plain = extract(long, known_lines((25.0,), 22.0, long.sample_rate))
     size = np.abs(plain.displacement[:, 0]).max()
     np.testing.assert_allclose(once.displacement[:, 0], plain.displacement[:, 0], atol=2e-4 * size)
     assert once.lines.frequencies[1] == pytest.approx(22.0, abs=1e-4)

@@ -46,7 +46,7 @@ def run_of(force=None, displacement=None, noise=1e-3):
 def in_channels(z, scale, start, length):
     """A run of probes and cells along X and Y."""
     none, described = np.zeros(scale.shape), vector_channels(("displacement", "force"))
-    return RunPhasors("r", POINT, 0.0, LINES, start, length, described, z, none, scale, none, 30.0)
+    return RunPhasors("r", POINT, 0.0, LINES, start, length, described, z, none, scale, none, 30.0, sample_rate=RATE)
 
 
 def frequency_slip(phasors, start, noise):
@@ -150,7 +150,7 @@ def bent(rate):
 
 def test_a_shaft_that_changes_its_speed_is_followed_by_its_runout():
     rate = 0.01
-    speeds, doubt = speeds_from_runout(run_of({}, {"1X": bent(rate)}), RATE)
+    speeds, doubt = speeds_from_runout(run_of({}, {"1X": bent(rate)}))
     true = 22.0 + rate * (START - 0.5 * START[-1])
     np.testing.assert_allclose(speeds[1:-1], true[1:-1], atol=1e-9)
     np.testing.assert_allclose(speeds[[0, -1]], true[[0, -1]] + [rate * LENGTH / 2, -rate * LENGTH / 2], atol=1e-9)
@@ -158,7 +158,7 @@ def test_a_shaft_that_changes_its_speed_is_followed_by_its_runout():
     assert doubt == pytest.approx(1e-3 / math.sqrt(LENGTH * RATE) / (2 * math.pi * LENGTH))
     gap = run_of({}, {"1X": bent(rate)})
     gap.z[5] = np.nan
-    holed, _ = speeds_from_runout(gap, RATE)
+    holed, _ = speeds_from_runout(gap)
     assert np.flatnonzero(np.isnan(holed)).tolist() == [5]
     np.testing.assert_allclose(np.delete(holed, [0, 4, 5, 6, 11]), np.delete(true, [0, 4, 5, 6, 11]), atol=1e-9)
 
@@ -166,16 +166,16 @@ def test_a_shaft_that_changes_its_speed_is_followed_by_its_runout():
 @pytest.mark.parametrize(("noise", "told"), [(1.9, True), (2.1, False)])
 def test_a_runout_below_ten_times_its_noise_tells_no_speed(noise, told):
     one = run_of({}, {}, noise=noise)
-    assert (speeds_from_runout(one, RATE) is not None) is told
+    assert (speeds_from_runout(one) is not None) is told
 
 
 def test_where_there_is_no_runout_line_nothing_is_followed():
     coincident = known_lines((22.0,), 22.0, RATE)
     few = replace(run_of(), lines=coincident)
-    assert speeds_from_runout(few, RATE) is None
+    assert speeds_from_runout(few) is None
     short = run_of()
     short.z[2:] = np.nan
-    assert speeds_from_runout(short, RATE) is None
+    assert speeds_from_runout(short) is None
     assert tuned(_Rate(), few, (22.0,), 22.0, PhasorSettings()) is None
 
 

@@ -67,7 +67,7 @@ def channels(quantities: Sequence[str], speed: bool = False) -> dict[str, Channe
 
 def run_of(reader: HeldReader, described: Mapping[str, Channel], point: OperatingPoint = POINT, name: str = "a") -> Run:
     """A dynamic run of such a reader."""
-    stated = {"excitation_direction": 0.0, "pad": None, "branch": "up", "stated": frozenset()}
+    stated = {"excitation_direction": 0.0, "pad": None, "branch": "up", "stated": frozenset(), "housing_mass": 30.0}
     return Run(id=name, kind="dynamic", point=point, channels=described, reader=reader, **stated)
 
 

@@ -149,6 +149,6 @@ def test_a_drive_off_its_set_point_is_what_identification_makes_of_it(tmp_path):
     campaign = written(tmp_path, replace(QUICK, seconds=4.0, detune=0.7))
     assert check_campaign(campaign) == []
     for run in campaign.of_kind("dynamic"):
-        phasors = run_phasors(run, campaign.housing_mass)
+        phasors = run_phasors(run)
         assert phasors.conditions == ("excitation off set point",)
         assert phasors.lines.driven == (pytest.approx(25.7, abs=2e-3),)

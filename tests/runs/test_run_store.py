@@ -157,14 +157,14 @@ def test_csv_runs_have_fingerprints_of_their_own_bytes(tmp_path):
     two = rig(POINTS[:1], seed=8, directions=directions(2), dynamic_seconds=1.0)
     write_campaign(tmp_path / "folder", two, "csv-german")
     run, other = load_campaign(tmp_path / "folder").of_kind("dynamic")[:2]
-    mark = fingerprint(run, 30.0, PhasorSettings())
-    assert mark != fingerprint(other, 30.0, PhasorSettings())
-    assert mark == fingerprint(load_campaign(tmp_path / "folder").run(run.id), 30.0, PhasorSettings())
+    mark = fingerprint(run, PhasorSettings())
+    assert mark != fingerprint(other, PhasorSettings())
+    assert mark == fingerprint(load_campaign(tmp_path / "folder").run(run.id), PhasorSettings())
     file = run.reader.path
     text = file.read_bytes()
     last = max(i for i, byte in enumerate(text) if chr(byte).isdigit())
     file.write_bytes(text[:last] + (b"1" if text[last : last + 1] != b"1" else b"2") + text[last + 1 :])
-    assert mark != fingerprint(load_campaign(tmp_path / "folder").run(run.id), 30.0, PhasorSettings())
+    assert mark != fingerprint(load_campaign(tmp_path / "folder").run(run.id), PhasorSettings())
 
 
 def tables(out: Path) -> list[bytes]:

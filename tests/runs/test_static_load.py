@@ -10,7 +10,7 @@ from rigdata import load_campaign
 from rigdata.problem import RigDataError
 from tests.phasors.phasor_cases import place
 from tests.rigs import closed_form as cf
-from tpjb_ident.estimate.equation import Sensor
+from tpjb_ident.estimate.equation import Rig, Sensor
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs.run_jobs import dry_test
@@ -139,7 +139,7 @@ def test_cells_are_as_uncertain_as_all_set_points_differ_from_them(common, gain,
         Sensor("L1H", "force", uncertainty=0.003),
         Sensor("L1V", "force", uncertainty=0.2),
     )
-    probe, cell, stated = StaticLoads([], complex(common)).doubted(sensors)
+    probe, cell, stated = StaticLoads([], complex(common)).doubted(Rig(sensors, 30.0)).channels
     assert probe == sensors[0]
     assert cell.uncertainty == pytest.approx(gain)
     assert cell.axis_uncertainty == pytest.approx(turn)

@@ -86,7 +86,7 @@ class Crosstalk(Additive):
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """The second cell's reading, in the first one's row."""
-        first, second = self.rig.of("force")
+        first, second = self.rig.pick("force")
         columns = self.no_columns(blocks)
         columns[:, first, 0] = state.reading(self.rig, blocks)[:, second]
         return columns

@@ -9,7 +9,7 @@ import pytest
 
 from tests.phasors.phasor_cases import FILM_H as H
 from tests.phasors.phasor_cases import complex_normal
-from tpjb_ident.phasors.lines import LineSettings, known_lines
+from tpjb_ident.phasors.lines import known_lines
 from tpjb_ident.phasors.run_data import mains_lines
 from tpjb_ident.terms import mains
 from tpjb_ident.terms.mains import (
@@ -68,7 +68,7 @@ def test_the_mains_line_of_a_run_is_its_typical_phasor():
     # on the excitation, or under one of its harmonics, it is no mains line
     for excitation in (50.0, 25.0, 50.0 / 3):
         assert mains_lines(run_with_lines(excitation, z[:1]))[0] is None
-    lines = known_lines((30.0,), 22.0, 1000.0, LineSettings(mains=0.0))
+    lines = known_lines((30.0,), 22.0, 1000.0, 0.0)
     assert mains_lines(SimpleNamespace(lines=lines, displacement=None))[0] is None
 
 

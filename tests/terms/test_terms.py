@@ -103,7 +103,9 @@ def test_a_delay_is_told_by_the_housing_s_equations(mount, seed):
     assert told(delay, 0.3)
     assert delay.deviation[0] < 0.15
     assert held(solution, truth)
-    ignored = solved(replace(rig, sensors=tuple(replace(s, delay_uncertainty=0.0) for s in rig.sensors)), blocks, truth)
+    ignored = solved(
+        replace(rig, channels=tuple(replace(s, delay_uncertainty=0.0) for s in rig.channels)), blocks, truth
+    )
     assert np.abs(away(ignored, truth)).max() > np.abs(away(solution, truth)).max()
 
 
@@ -117,7 +119,7 @@ def test_a_low_corner_that_nobody_states_stands_in_the_interval(seed, accelerome
     assert held(solution, truth, 2.5)
     ignored = solved(replace(rig, static=True), blocks, truth)
     assert np.abs(away(ignored, truth)).max() > 8
-    said = replace(rig, sensors=tuple(replace(s, corner_uncertainty=0.0) for s in rig.sensors))
+    said = replace(rig, channels=tuple(replace(s, corner_uncertainty=0.0) for s in rig.channels))
     assert not any(term.parameters for term in terms_of(said, blocks) if term.name == "corner")
 
 
@@ -162,7 +164,7 @@ def test_wrong_accelerometers_stay_wrong_where_something_leads(seed, wrong, lead
     """It may be cells that come late, or a negative corner of theirs; an accelerometer that is inverted is neither."""
     rig, blocks, truth = made(Case(hertz=(25.0, 45.0), noise=2e-4, **leads), seed)
     z = blocks.z.copy()
-    z[:, rig.of("acceleration")] *= wrong
+    z[:, rig.pick("acceleration")] *= wrong
     blocks = replace(blocks, z=z)
     learnt = learnt_rig(rig, solved(rig, blocks, truth))
     assert learnt.out_of_step or "late" in leads
@@ -241,7 +243,7 @@ def test_the_springs_under_the_housing_are_told(seed):
 def test_accelerometers_that_no_housing_on_springs_has_are_named(turn, named):
     rig, blocks, truth = made(Case(hertz=(60.0,)))
     z = blocks.z.copy()
-    z[:, rig.of("acceleration")] = turn(z[:, rig.of("acceleration")])
+    z[:, rig.pick("acceleration")] = turn(z[:, rig.pick("acceleration")])
     solution = solved(rig, replace(blocks, z=z), truth)
     (term,) = [t for t in solution.terms if t.name == "housing"]
     assert term.conditions(of(solution, "housing")) == (named,)
@@ -336,7 +338,7 @@ def test_a_probe_s_drift_is_told_by_runs_at_several_temperatures(seed):
 def test_a_floating_stator_s_accelerometers_are_held_against_the_probes(late, share, named, seed):
     rig, blocks, truth = made(Case(mount="floating", hertz=(60.0, 80.0)), seed)
     z = blocks.z.copy()
-    z[:, rig.of("acceleration")] *= share * np.exp(-1j * blocks.omega * late)[:, None]
+    z[:, rig.pick("acceleration")] *= share * np.exp(-1j * blocks.omega * late)[:, None]
     solution = solved(rig, replace(blocks, z=z), truth)
     (term,) = [t for t in solution.terms if t.name == "housing"]
     assert term.conditions(of(solution, "housing")) == named
@@ -385,5 +387,5 @@ def test_a_shaft_that_tilts_between_two_planes_of_probes_does_no_harm(seed):
         z[:, j] += plane * np.sum(blocks.along[:, j] * tilt, axis=1)
     tilted = replace(blocks, z=z)
     assert held(solved(rig, tilted, truth), truth)
-    ignored = replace(rig, sensors=tuple(replace(sensor, plane=0.0) for sensor in rig.sensors))
+    ignored = replace(rig, channels=tuple(replace(sensor, plane=0.0) for sensor in rig.channels))
     assert np.abs(solved(ignored, tilted, truth).h / truth - 1).max() > 0.02

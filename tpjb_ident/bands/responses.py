@@ -232,7 +232,7 @@ class BandPoint(RunsOfPoint):
 
 
 def read_point(
-    runs: Sequence[Run], housing_mass: float, settings: PhasorSettings, fast: Mapping[str, float]
+    runs: Sequence[Run], settings: PhasorSettings, fast: Mapping[str, float]
 ) -> tuple[BandPoint | None, list[ExcludedRun]]:
     """Transform the runs of a point, and name those that cannot be used; None where there is no other.
 
@@ -244,7 +244,7 @@ def read_point(
     seconds = min(run.length / run.sample_rate for run in runs)
     for run in runs:
         try:
-            spectra.append(run_spectra(run, housing_mass, band, seconds, settings, fast))
+            spectra.append(run_spectra(run, band, seconds, settings, fast))
         except RigDataError as error:
             unusable.append(ExcludedRun(run.id, run.point, error))
     if not spectra:

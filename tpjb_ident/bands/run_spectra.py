@@ -252,7 +252,6 @@ class RunSpectra(RunPhasors):
 
 def run_spectra(
     run: Run,
-    housing_mass: float,
     band: tuple[float, float],
     seconds: float,
     settings: PhasorSettings,
@@ -264,7 +263,7 @@ def run_spectra(
         samples = read_samples(run, seconds, fast, band[1])
         temperatures = mean_temperatures(run)
         temperature = beginning_of(run, SHORT).mean_temperature() or np.nan
-    lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.lines.mains, band[1])
+    lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, band[1])
     cut, period = _period(run, samples, band, lines)
     length, width = (cut.length, LEFT_OUT) if period is None else (period, LEFT_OUT_OF_PERIOD)
     clean = without_disturbances(cut, lines, period)
@@ -286,7 +285,7 @@ def run_spectra(
             np.tile(mean, (len(z), 1)),
             none,
             none,
-            housing_mass,
+            run.housing_mass,
             record.conditions,
             temperatures=temperatures,
             temperature=temperature,

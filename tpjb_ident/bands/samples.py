@@ -19,12 +19,12 @@ from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
-from rigdata.vector import directions
+from rigdata.vector import Directed, directions
 from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.line_fit import BAD_LIMIT, even_design, robust_deviation
-from tpjb_ident.phasors.lines import HIGHEST, MAINS_DRIFT, SPEED_DRIFT, Line, LineSettings, strong_lines
-from tpjb_ident.phasors.run_data import Directed, device_readers
+from tpjb_ident.phasors.lines import HIGHEST, MAINS_DRIFT, SPEED_DRIFT, Line, strong_lines
+from tpjb_ident.phasors.run_data import device_readers
 from tpjb_ident.phasors.whole_record import vertex
 
 #: Share of a channel's samples that may be missing in stretches, bridged by straight lines,
@@ -233,9 +233,8 @@ def find_disturbances(samples: Samples, speed: float, mains: float, top: float) 
     reach = min(HIGHEST * samples.rate, 1.5 * top)
     shaft = _shown(samples, speed, SPEED_DRIFT) if samples.length / samples.rate * speed > 2 else 0.0
     supply = _shown(samples, mains, MAINS_DRIFT) if mains > 0 else 0.0
-    settings = LineSettings(supply, _SHAFT_HARMONICS, _MAINS_HARMONICS)
     resolved: list[Line] = []
-    for line in strong_lines((), shaft, settings):
+    for line in strong_lines((), shaft, supply, _SHAFT_HARMONICS, _MAINS_HARMONICS):
         is_resolved = all(abs(line.frequency - near.frequency) > samples.rate / samples.length for near in resolved)
         if line.frequency < reach and is_resolved:
             resolved.append(line)

@@ -55,7 +55,7 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
         return _sorted(error.problems)
     observations: list[Observation] = []
     for count, run in enumerate(campaign.runs, start=1):
-        observations.append(observe(run, mass=campaign.housing_mass))
+        observations.append(observe(run))
         if progress is not None:
             progress(count, len(campaign.runs))
     observations, conditions = judged(campaign, observations)
@@ -84,11 +84,11 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
         check_speed(observation)
     static = check_static_loads(observations)
     check_positions(dynamic)
-    check_magnitudes(observations, campaign.housing_mass)
-    check_excitation(sines, campaign.housing_mass)
+    check_magnitudes(observations)
+    check_excitation(sines)
     check_dry(of_kind("dry_pivot"))
     _spread_doubts(observations)
-    for runs in point_runs(sines, campaign.housing_mass):
+    for runs in point_runs(sines):
         check_film(runs)
         # where mains stand on the line, of another phase in every run, none differs by its own fault
         if not any(MAINS_ON_LINE in observation.conditions for observation in runs.observations):

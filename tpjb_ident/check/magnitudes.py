@@ -49,7 +49,7 @@ class Sizes:
         return self.static > 0.5 * self.report.run.point.static_load > 0
 
 
-def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:
+def check_magnitudes(observations: Sequence[Observation]) -> None:
     """Hold every run against what a rig can show; findings go to the runs' reports."""
     largest = max((observation.run.point.static_load for observation in observations), default=0.0)
     measured = []
@@ -62,11 +62,11 @@ def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:
                 float(np.linalg.norm(observation.line(q))) if observation.shows(q) else np.nan
                 for q in VECTOR_QUANTITIES
             ]
-            film, static = np.linalg.norm(observation.film_force(mass)), np.linalg.norm(observation.mean("force"))
+            film, static = np.linalg.norm(observation.film_force), np.linalg.norm(observation.mean("force"))
             measured.append(Sizes(observation.report, length[0], length[1], float(film), length[2], float(static)))
     for sizes in measured:
         check_sizes(sizes)
-    check_weight(measured, mass, largest)
+    check_weight(measured, largest)
 
 
 def check_travel(observation: Observation, is_sine: bool) -> None:
@@ -101,8 +101,9 @@ def check_sizes(sizes: Sizes) -> None:
             report.ask("soft cells", point.static_load / max(stiffness, 1e-30))
 
 
-def check_weight(measured: Sequence[Sizes], mass: float, largest: float) -> None:
+def check_weight(measured: Sequence[Sizes], largest: float) -> None:
     """A stator that stands on its cells is made for the loads, and its inertia is no large part of their force."""
+    mass = max((sizes.report.run.housing_mass for sizes in measured), default=0.0)
     decides = any(sizes.is_carried and mass * sizes.acceleration > _INERTIA * sizes.cells for sizes in measured)
     ratio = mass * _GRAVITY / largest if largest > 0 else 0.0
     for sizes in measured:

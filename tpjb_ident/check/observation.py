@@ -18,14 +18,14 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
-from rigdata.vector import directions
+from rigdata.vector import Directed, directions
 from tpjb_ident.check.findings import Reporter, plane_of
 from tpjb_ident.check.signals import ALWAYS_NEEDED, check_clock, check_signal, needed
 from tpjb_ident.conditions import Conditions
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.phasors.line_fit import LineFitter, white_noise, window_median
 from tpjb_ident.phasors.lines import RecordTooShortError
-from tpjb_ident.phasors.run_data import Directed, RunPhasors, by_channel, with_kept_beginning
+from tpjb_ident.phasors.run_data import RunPhasors, by_channel, with_kept_beginning
 from tpjb_ident.phasors.run_phasors import run_phasors
 
 #: Lines of a band that are looked at, the strongest of as many parts of it.
@@ -68,24 +68,26 @@ def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel])
     return RecordLines(mean, floor, scatter, np.array([omega]), row[None])
 
 
-def shaft_line(phasors: RunPhasors, channels: Sequence[Channel]) -> FloatArray:
-    """Size of what turns with the shaft in every channel (m,); NaN where it is not told from the excitation."""
+def shaft_line(phasors: RunPhasors, channels: Sequence[Channel]) -> tuple[FloatArray, float]:
+    """Size of what turns with the shaft in every channel (m,), and the sense of its force, see `_sense`.
+
+    NaN where it is not told from the excitation.
+    """
     place = phasors.lines.place("1X")
     if place is None:
-        return np.full(len(channels), np.nan)
-    return by_channel(window_median(np.abs(phasors.z[:, place])), phasors.channels, channels)
+        return np.full(len(channels), np.nan), math.nan
+    z = phasors.z[:, place]
+    return by_channel(window_median(np.abs(z)), phasors.channels, channels), _sense(phasors.plane("force", z))
 
 
-def shaft_force(phasors: RunPhasors) -> float:
+def _sense(force: ComplexArray) -> float:
     """Logarithm of the 1X force's counter-clockwise part over its clockwise one; NaN where neither is clear.
 
     What is out of balance turns with the shaft, and so does the force that the film passes on. The cells are asked,
     not the probes: run-out, which differs from probe to probe, can turn an orbit of a micrometre round.
+
+    `force` (n, 2): X and Y in every window.
     """
-    place = phasors.lines.place("1X")
-    if place is None:
-        return math.nan
-    force = phasors.plane("force", phasors.z[:, place])
     force = force[np.isfinite(force).all(axis=1)]
     if len(force) < 2:
         return math.nan
@@ -164,7 +166,7 @@ class Observation(Directed):
     seconds: float = math.nan  #: how long the record is
     #: (m,): size of what turns with the shaft, SI; empty where nothing tells it
     shaft_line: FloatArray = field(default_factory=lambda: np.empty(0))
-    shaft_force: float = math.nan  #: of the 1X force, see `tpjb_ident.check.observation`
+    shaft_force: float = math.nan  #: sense of the 1X force, see `_sense`
     conditions: Conditions = ()  #: of its phasors
 
     def of(self, quantity: str) -> list[Channel]:
@@ -183,9 +185,15 @@ class Observation(Directed):
         """X, Y of a quantity at the excitation line (2,); NaN where its channels do not tell it."""
         return self.plane(quantity, self.lines.phasor)
 
-    def film_force(self, mass: float) -> ComplexArray:
-        """Force phasor of the film on the housing, F_cell + m_h a_h (2,) [N]; of the cells alone where a is unknown."""
-        return self.line("force") + np.nan_to_num(mass * self.line("acceleration"))
+    @property
+    def inertia(self) -> ComplexArray:
+        """Of the housing at the excitation line, m_h a_h (2,) [N]; none where a is unknown."""
+        return np.nan_to_num(self.run.housing_mass * self.line("acceleration"))
+
+    @property
+    def film_force(self) -> ComplexArray:
+        """Force phasor of the film on the housing, F_cell + m_h a_h (2,) [N]."""
+        return self.line("force") + self.inertia
 
     def shows(self, quantity: str) -> bool:
         """Whether a channel of a quantity shows the excitation line above its noise."""
@@ -194,11 +202,10 @@ class Observation(Directed):
         return bool(np.any((size > 8 * self.lines.floor[places]) & (size > 0)))
 
 
-def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0, mass: float = 0.0) -> Observation:
+def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Observation:
     """Read every channel of `run` once, block by block, and judge each by itself.
 
-    `phasors` are those of identification, of which an excitation line is meant; without them a dynamic run is fitted,
-    and `mass` is the housing's [kg].
+    `phasors` are those of identification, of which an excitation line is meant; without them a dynamic run is fitted.
     """
     report = Reporter(run)
     try:
@@ -220,7 +227,7 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0, mass: fl
     noise_free = bool(first) and _is_noise_free(run, live, used, lines)
     if noise_free:
         report.ask(NO_NOISE)
-    at_rest = frozenset() if phasors is None else _at_rest(phasors, phasors.housing_mass or mass)
+    at_rest = frozenset() if phasors is None else _at_rest(phasors)
     for name in first:
         if not (name in at_rest and statistics[name].constant):
             check_signal(report, run.channels[name], statistics[name], noise_free, alive)
@@ -235,8 +242,8 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0, mass: fl
         return observation
     shown, stated = phasors.lines.excitation[line].frequency, run.point.excitation_hz
     report.ask("other frequency", abs(shown / stated - 1), shown=shown, stated=stated)
-    turning, force = shaft_line(phasors, live), shaft_force(phasors)
-    return replace(observation, shaft_line=turning, shaft_force=force, conditions=phasors.conditions)
+    turning, sense = shaft_line(phasors, live)
+    return replace(observation, shaft_line=turning, shaft_force=sense, conditions=phasors.conditions)
 
 
 def _is_timed(report: Reporter, run: Run, length: int) -> bool:
@@ -286,7 +293,7 @@ def _read_block(
     return blocks
 
 
-def _at_rest(phasors: RunPhasors, mass: float) -> frozenset[str]:
+def _at_rest(phasors: RunPhasors) -> frozenset[str]:
     """Accelerometers along which the cells push so little that the housing's inertia is nothing beside the force.
 
     What they would show is that of the others, as the forces along both are.
@@ -300,7 +307,7 @@ def _at_rest(phasors: RunPhasors, mass: float) -> frozenset[str]:
     along = directions([phasors.channels[k].axis or 0.0 for k in accelerometers])
     push = np.median(np.abs(force @ along.T), axis=0)
     missed = _NO_INERTIA * np.median(np.linalg.norm(force, axis=1))
-    size = mass * np.median(np.abs(line[:, accelerometers]), axis=0)
+    size = phasors.housing_mass * np.median(np.abs(line[:, accelerometers]), axis=0)
     inertia = np.max(size / np.maximum(push, max(missed, 1e-300)))
     # a housing that hangs free moves without a push
     still = (0.0 < inertia < _ON_CELLS) & (inertia * push < missed)
@@ -327,7 +334,7 @@ def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: R
 def _phasors(report: Reporter, run: Run) -> RunPhasors | None:
     """Phasors as identification extracts them; None where it refuses the run."""
     try:
-        return run_phasors(run, 0.0)
+        return run_phasors(run)
     except RecordTooShortError as error:
         report.ask("too short", error=error)
     except (RigDataError, TpjbError):  # the checks of the channels say what is wrong with them

@@ -21,7 +21,7 @@ from tpjb_ident.estimate.equation import (
     axes_of,
     campaign_rig,
     film_force,
-    sensors_of,
+    mounted,
     stacked,
     vector,
 )
@@ -50,9 +50,9 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
     observations = tuple(run for run in clear for _ in run.lines.omega)
     if len(observations) < _MIN_BLOCKS:
         return None
-    sensors = sensors_of(campaign)
-    blocks = _blocks(sensors, clear)
-    rig = campaign_rig(campaign, sensors, blocks, float(static))
+    rig = campaign_rig(campaign)
+    blocks = _blocks(rig.channels, clear)
+    rig = mounted(rig, blocks, campaign.mount, float(static))
     shape, start = free_force(vector(rig, blocks, "displacement"), film_force(rig, blocks))
     if np.isfinite(start).all(axis=(1, 2)).sum() < _MIN_BLOCKS:
         return None
@@ -86,7 +86,7 @@ def _check_accelerometers(observations: Sequence[Observation], solution: Solutio
     """Name the runs whose acceleration is not what springs, or the floating housing, make of it in the others."""
     rig, blocks = solution.rig, solution.blocks
     housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
-    rows = rig.of("acceleration")
+    rows = rig.pick("acceleration")
     if len(rows) != 2 or housing is None or housing.is_on_foundation(solution.fitted[housing.name]):
         return
     moved = housing.acceleration(blocks, solution.fitted[housing.name])

@@ -103,7 +103,7 @@ class PointRuns:
         return [i for i in range(len(self)) if i not in outliers]
 
 
-def point_runs(observations: Sequence[Observation], mass: float) -> list[PointRuns]:
+def point_runs(observations: Sequence[Observation]) -> list[PointRuns]:
     """Dynamic runs by operating point and channels: of those that show what two probes and the cells answer."""
     groups: dict[object, list[Observation]] = {}
     for observation in observations:
@@ -111,21 +111,21 @@ def point_runs(observations: Sequence[Observation], mass: float) -> list[PointRu
         # runout answers at a line of the shaft too, as no film does
         is_clear = not shaft_order(point.excitation_hz, point.shaft_speed_hz)
         is_clear &= observation.shows("force") and observation.shows("displacement")
-        measured = np.array([observation.film_force(mass), observation.line("displacement")])
+        measured = np.array([observation.film_force, observation.line("displacement")])
         if is_clear and len(probes) == 2 and not observation.report.cells_doubted and np.isfinite(measured).all():
             named = ((channel.name, channel.axis) for channel in [*probes, *observation.of("force")])
             groups.setdefault((point, *named), []).append(observation)
-    return [_readings(group, mass) for group in groups.values()]
+    return [_readings(group) for group in groups.values()]
 
 
-def _readings(runs: Sequence[Observation], mass: float) -> PointRuns:
+def _readings(runs: Sequence[Observation]) -> PointRuns:
     """Readings of all runs of a point, by channel."""
     probes, cells = runs[0].of("displacement"), runs[0].of("force")
     places = [[*run.pick("displacement"), *run.pick("force")] for run in runs]
     rows = [(run.lines.phasor[k], run.lines.mean[k], run.shaft_line[k]) for run, k in zip(runs, places)]
     phasors, loads, turning = map(np.array, zip(*rows))
     loads[:, : len(probes)] = np.nan
-    inertia = np.nan_to_num(np.array([mass * run.line("acceleration") for run in runs], complex))
+    inertia = np.array([run.inertia for run in runs])
     planes = plane_of(probes), plane_of(cells)
     return PointRuns(phasors, loads, inertia, *planes, turning, tuple(runs), (*probes, *cells))
 

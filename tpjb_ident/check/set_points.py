@@ -111,12 +111,12 @@ def check_rotation(runs: Sequence[Observation]) -> None:
                 observation.report.ask("rotation", other=other, stated=stated)
 
 
-def check_excitation(runs: Sequence[Observation], mass: float) -> None:
+def check_excitation(runs: Sequence[Observation]) -> None:
     """Excitation of dynamic runs: there at all, as strong as in the point's other runs, in the stated direction."""
     strengths: dict[OperatingPoint, list[float]] = {}
     measured = []
     for run in runs:
-        strength = float(np.linalg.norm(run.film_force(mass)))
+        strength = float(np.linalg.norm(run.film_force))
         if np.isfinite(strength):
             measured.append((run, strength))
             strengths.setdefault(run.run.point, []).extend([strength] if run.shows("force") else [])
@@ -130,7 +130,7 @@ def check_excitation(runs: Sequence[Observation], mass: float) -> None:
             run.report.cells_doubted = True
         elif not run.report.cells_doubted and run.run.excitation_direction is not None:
             directed.append(run)
-    _check_directions(directed, mass)
+    _check_directions(directed)
 
 
 def _turn(run: Observation, vector: ComplexArray) -> float:
@@ -140,10 +140,10 @@ def _turn(run: Observation, vector: ComplexArray) -> float:
     return math.remainder(shown - math.degrees(run.run.excitation_direction or 0.0), 180.0)
 
 
-def _check_directions(runs: Sequence[Observation], mass: float) -> None:
+def _check_directions(runs: Sequence[Observation]) -> None:
     # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
     moved = [abs(_turn(run, run.line("displacement"))) <= _MOVED_ALONG for run in runs]
-    turns = [_turn(run, run.film_force(mass)) for run in runs]
+    turns = [_turn(run, run.film_force) for run in runs]
     turned = [(run, turn) for run, turn, is_moved in zip(runs, turns, moved) if abs(turn) > _ALONG and not is_moved]
     hint = _miswired_cells(runs) if len(turned) >= _SEVERAL else ""
     for run in runs if hint else ():

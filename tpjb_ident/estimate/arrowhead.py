@@ -28,6 +28,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.estimate.equation import adjoint
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.term import Fitted
 
@@ -80,7 +81,7 @@ class Sums:
     def add(self, point: IntArray, weight: FloatArray, r: FloatArray, J: FloatArray, J_t: FloatArray) -> None:
         """Add rows of blocks: `point`, root of the `weight` (n,), `r` (n, k), `J` (n, k, numbers), `J_t` (n, k, q)."""
         r, J, J_t = r * weight[:, None], J * weight[:, None, None], J_t * weight[:, None, None]
-        transposed = J.transpose(0, 2, 1)
+        transposed = adjoint(J)
         np.add.at(self.A, point, transposed @ J)
         np.add.at(self.E, point, transposed @ J_t)
         np.add.at(self.g_h, point, np.einsum("nka,nk->na", J, r))
@@ -139,10 +140,10 @@ class Step:
     def point_share(self, chosen: BoolArray) -> FloatArray:
         """Covariance (P, k, k) by the priors of the points' own parameters `chosen` (P, L), of all points."""
         local, shared = (part * chosen[:, None, :] for part in (self.by_point.direct, self.by_point.shared))
-        across = local @ shared.transpose(0, 2, 1) @ self.K.transpose(0, 2, 1)
+        across = local @ adjoint(shared) @ adjoint(self.K)
         everywhere = np.einsum("pql,prl->qr", shared, shared)
-        through = self.K @ everywhere @ self.K.transpose(0, 2, 1)
-        return local @ local.transpose(0, 2, 1) + across + across.transpose(0, 2, 1) + through
+        through = self.K @ everywhere @ adjoint(self.K)
+        return local @ adjoint(local) + across + adjoint(across) + through
 
     @property
     def deviation(self) -> FloatArray:
@@ -166,7 +167,7 @@ def step(sums: Sums, shared: Prior, by_point: Prior) -> Step:
     # what is considered is held at its mean; what it would move is kept apart
     moves, moves_shared = (
         A[:, :, k:] * ~is_learnt[:, None, :],
-        (sums.E[:, k:] * ~is_learnt[:, :, None]).transpose(0, 2, 1),
+        adjoint(sums.E[:, k:] * ~is_learnt[:, :, None]),
     )
     held = _HELD * A[:, last, last] * ~is_learnt
     A[:, last, last] += held
@@ -181,13 +182,13 @@ def step(sums: Sums, shared: Prior, by_point: Prior) -> Step:
     x = np.einsum("pab,pb->pa", A_inverse, g) + K @ theta
     posterior = np.sqrt(np.maximum(_variances(A_inverse, K, S_inverse)[:, k:], 0.0))
     root = np.sqrt(by_point.precision)
-    pushes = -(moves_shared + K.transpose(0, 2, 1) @ moves)
+    pushes = -(moves_shared + adjoint(K) @ moves)
     points = Own(
         x[:, k:],
         np.where(is_learnt, posterior, 1 / root),
         is_learnt,
         _by_prior(is_learnt, A_inverse[:, :k, k:], -(A_inverse @ moves)[:, :k], root),
-        S_inverse @ _by_prior(is_learnt, K[:, k:].transpose(0, 2, 1), pushes, root),
+        S_inverse @ _by_prior(is_learnt, adjoint(K[:, k:]), pushes, root),
     )
     weight = np.concatenate([np.zeros((len(A), k)), by_point.precision * is_learnt], axis=1)
     records = _records(A_inverse, K, S, S_inverse, weight, shared.precision)[:, :k, :k]
@@ -208,9 +209,9 @@ def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray
     n = A.shape[1]
     white = np.linalg.solve(_root(A), np.concatenate([E, np.broadcast_to(np.eye(n), A.shape)], axis=2))
     E_white, back = np.split(white, [E.shape[2]], axis=2)
-    A_inverse = back.transpose(0, 2, 1) @ back
+    A_inverse = adjoint(back) @ back
     flat = E_white.reshape(len(A) * n, E.shape[2])
-    K = -back.transpose(0, 2, 1) @ E_white
+    K = -adjoint(back) @ E_white
     return A_inverse, K, G - flat.T @ flat
 
 
@@ -233,8 +234,8 @@ def _records(
     weighed = by_point[:, :, None] * K
     learnt = S_inverse @ (S - np.diag(shared) - np.einsum("pak,pal->kl", K, weighed)) @ S_inverse
     alone = A_inverse - A_inverse @ (by_point[:, :, None] * A_inverse)
-    across = A_inverse @ weighed @ S_inverse @ K.transpose(0, 2, 1)
-    return alone + K @ learnt @ K.transpose(0, 2, 1) - across - across.transpose(0, 2, 1)
+    across = A_inverse @ weighed @ S_inverse @ adjoint(K)
+    return alone + K @ learnt @ adjoint(K) - across - adjoint(across)
 
 
 def _variances(A_inverse: FloatArray, K: FloatArray, S_inverse: FloatArray) -> FloatArray:

@@ -30,7 +30,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
-from rigdata.vector import plane_vector
+from rigdata.vector import Directed, directions, plane_vector
 from tpjb_ident.conditions import Conditions
 
 
@@ -71,10 +71,10 @@ class RigStiffness:
 
 
 @dataclass(frozen=True, repr=False)
-class Rig:
+class Rig(Directed):
     """Sensors in the order of the rows, and the housing that they stand on."""
 
-    sensors: tuple[Sensor, ...]
+    channels: tuple[Sensor, ...]
     mass: float
     mass_uncertainty: float = 0.0
     mount: str = "cells"  #: "cells", "floating", or "unknown": no accelerometer tells
@@ -91,15 +91,15 @@ class Rig:
     @property
     def has_acceleration(self) -> bool:
         """Whether accelerometers may tell the housing's acceleration."""
-        return len(self.of("acceleration")) > 1
+        return len(self.pick("acceleration")) > 1
 
-    def of(self, quantity: str) -> IntArray:
-        """Rows of the sensors of a quantity."""
-        places = [j for j, sensor in enumerate(self.sensors) if sensor.quantity == quantity]
-        return np.array(places, dtype=np.intp)
+    @property
+    def along(self) -> FloatArray:
+        """Unit vectors of the sensors' axes, (m, 2)."""
+        return directions([sensor.axis or 0.0 for sensor in self.channels])
 
     def __len__(self) -> int:
-        return len(self.sensors)
+        return len(self.channels)
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class Blocks:
         """Median frequency of the blocks [rad/s]; one where there are none."""
         return float(np.median(self.omega)) if len(self) else 1.0
 
-    def noise_power(self, rows: IntArray) -> FloatArray:
+    def noise_power(self, rows: list[int]) -> FloatArray:
         """Sum of the noise's variances of some sensors, (n,)."""
         return np.einsum("njj->n", self.noise[:, rows][:, :, rows]).real
 
@@ -191,7 +191,7 @@ def stacked(
 
 def vector(rig: Rig, blocks: Blocks, quantity: str) -> ComplexArray:
     """X and Y of a quantity by least squares over its sensors, (n, 2); NaN without two directions."""
-    rows = rig.of(quantity)
+    rows = rig.pick(quantity)
     readings = np.where(blocks.present[:, rows], blocks.z[:, rows], np.nan)
     return plane_vector(blocks.along[:, rows], readings)
 
@@ -202,6 +202,11 @@ def film_force(rig: Rig, blocks: Blocks) -> ComplexArray:
     if not rig.has_acceleration:
         return force
     return force + rig.mass * np.nan_to_num(vector(rig, blocks, "acceleration"))
+
+
+def adjoint(matrices: Any) -> Any:
+    """Conjugate transposes of matrices (n, k, m), (n, m, k)."""
+    return matrices.conj().transpose(0, 2, 1)
 
 
 def totals(place: IntArray, values: FloatArray | BoolArray, number: int) -> FloatArray:
@@ -248,7 +253,7 @@ def motion_matrix(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
     n, m = blocks.z.shape
     B = np.zeros((n, m + HOUSING_ROWS, UNKNOWNS), complex)
     h, along = state.at_run(blocks), blocks.along
-    probes, cells, accelerometers = (rig.of(q) for q in ("displacement", "force", "acceleration"))
+    probes, cells, accelerometers = (rig.pick(q) for q in ("displacement", "force", "acceleration"))
     B[:, probes, :2] = along[:, probes]
     B[:, cells, :2] = along[:, cells] @ h
     B[:, cells, 2:] = -rig.mass * along[:, cells]
@@ -307,7 +312,7 @@ def film_force_rows(rig: Rig, blocks: Blocks, state: State, force: ComplexArray)
     """Forces of the film (n, 2, ..) as the cells read them and the housing answers, (n, m + 2, ..)."""
     n, m = blocks.z.shape
     rows = np.zeros((n, m + HOUSING_ROWS, *force.shape[2:]), complex)
-    cells = rig.of("force")
+    cells = rig.pick("force")
     seen = blocks.along[:, cells] * (state.factor * blocks.present)[:, cells, None]
     rows[:, cells] = np.einsum("nja,na...->nj...", seen, force)
     square = (blocks.omega**2).reshape((-1,) + (1,) * (force.ndim - 1))
@@ -363,16 +368,17 @@ def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
     return np.array(rows)
 
 
-def campaign_rig(campaign: Campaign, sensors: tuple[Sensor, ...], blocks: Blocks, ratio: complex, **known: Any) -> Rig:
-    """The rig of a campaign's dynamic runs; `ratio`: cells over set points of all runs, zero where they show none.
-
-    `known`: what else is of the rig, by name.
-    """
-    mount = found_mount(sensors, blocks, getattr(campaign, "mount", None), ratio)
-    return Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, static=ratio != 0, **known)
+def campaign_rig(campaign: Campaign, **known: Any) -> Rig:
+    """The rig of a campaign's dynamic runs as stated; `known`: what else is of it, by name."""
+    return Rig(sensors_of(campaign), campaign.housing_mass, campaign.mass_uncertainty, **known)
 
 
-def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated_mount: str | None, ratio: complex) -> str:
+def mounted(rig: Rig, blocks: Blocks, stated: str | None, ratio: complex) -> Rig:
+    """The rig on what it stands on; `ratio`: cells over set points of all runs, zero where they show none."""
+    return replace(rig, mount=found_mount(rig, blocks, stated, ratio), static=ratio != 0)
+
+
+def found_mount(rig: Rig, blocks: Blocks, stated_mount: str | None, ratio: complex) -> str:
     """Whether the housing stands on its cells or floats: as stated, else by a over w^2 d.
 
     That is -c h of a housing on springs, 1 + g h of one that floats, c and g the compliance of what gives way. Without
@@ -381,7 +387,6 @@ def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated_mount: str | N
     """
     if stated_mount:
         return stated_mount
-    rig = Rig(tuple(sensors), 1.0)
     carried = "cells" if _CARRIED[0] < abs(ratio) < _CARRIED[1] else "unknown"
     if not rig.has_acceleration:
         return carried

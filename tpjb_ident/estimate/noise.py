@@ -12,7 +12,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.vector import directions
-from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, State, film_force_rows
+from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, State, adjoint, film_force_rows
 
 #: |d ln h / d ln W| that is taken as plausible where the campaign has one load only.
 UNKNOWN_EXPONENT = 0.6
@@ -49,7 +49,7 @@ def covariance(rig: Rig, blocks: Blocks, state: State, scatter: FloatArray, hous
     variance = (housing * size) ** 2 + (_LEAST * scale) ** 2 + 1e-30
     N[:, m, m], N[:, m + 1, m + 1] = variance, variance
     patterns = film_force_rows(rig, blocks, state, _force_effects(blocks, state, scatter))
-    return N + patterns @ patterns.conj().transpose(0, 2, 1)
+    return N + patterns @ adjoint(patterns)
 
 
 def housing_noise(rig: Rig, blocks: Blocks, motion: ComplexArray, misfit: ComplexArray) -> float:
@@ -61,7 +61,7 @@ def housing_noise(rig: Rig, blocks: Blocks, motion: ComplexArray, misfit: Comple
     size = np.linalg.norm(motion[:, 2:], axis=1)
     if rig.mount == "unknown" or not np.any(size > 0) or not rig.has_acceleration:
         return usual
-    rows = rig.of("acceleration")
+    rows = rig.pick("acceleration")
     moving = size > 0
     share = np.sum(np.abs(misfit) ** 2, axis=1) / 2
     records = blocks.noise_power(rows) / len(rows)

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.special import chdtr, fdtrc, fdtri
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.estimate.equation import totals
+from tpjb_ident.estimate.equation import adjoint, totals
 
 #: In phase with the motion along the spring force and across it, ahead of it along the damping force and across it.
 COMPONENTS = 4
@@ -72,20 +72,20 @@ class ForceScatter:
         basis, triangle = np.linalg.qr(np.concatenate([columns.real, columns.imag], axis=1))
         mean = variance.mean(axis=1, keepdims=True)
         excess = np.maximum(variance * size**2, _LEAST * mean) - mean
-        covariance = np.eye(COMPONENTS) + (triangle * excess[:, None, :]) @ triangle.transpose(0, 2, 1)
+        covariance = np.eye(COMPONENTS) + (triangle * excess[:, None, :]) @ adjoint(triangle)
         root = np.linalg.inv(np.linalg.cholesky(covariance))
         return ForceScatter(basis, triangle, root, size)
 
     def white(self, rows: FloatArray) -> FloatArray:
         """Rows (n, k, ..) brought to unit variance."""
-        move = (self.root - np.eye(COMPONENTS)) @ (self.basis.transpose(0, 2, 1) @ rows)
+        move = (self.root - np.eye(COMPONENTS)) @ (adjoint(self.basis) @ rows)
         return rows + self.basis @ move
 
     def along(self, r: FloatArray, J_h: FloatArray) -> AlongForce:
         """What white rows r (n, k) and their columns J_h (n, k, numbers) have along the components."""
         white = self.root @ self.patterns
         length = np.maximum(np.linalg.norm(white, axis=1), 1e-300)
-        rows = (white / length[:, None]).transpose(0, 2, 1) @ self.basis.transpose(0, 2, 1)
+        rows = adjoint(white / length[:, None]) @ adjoint(self.basis)
         return AlongForce((rows @ r[:, :, None])[:, :, 0] ** 2, (self.size * length) ** 2, rows @ J_h)
 
 

@@ -20,6 +20,7 @@ from tpjb_ident.estimate.equation import (
     Blocks,
     Rig,
     State,
+    adjoint,
     film_columns,
     film_force_rows,
     motion_matrix,
@@ -277,11 +278,11 @@ class Solver:
         for term in self.random:
             effects = term.random_effects(blocks, state)
             if effects is not None:
-                N = N + effects @ effects.conj().transpose(0, 2, 1)
+                N = N + effects @ adjoint(effects)
         L = np.linalg.cholesky(N)
         TB = with_factor(state.factor, motion_matrix(rig, blocks, state))
         Q, R = np.linalg.qr(np.linalg.solve(L, TB), mode="complete")
-        Q1, Q2 = (part.conj().transpose(0, 2, 1) for part in (Q[:, :, :UNKNOWNS], Q[:, :, UNKNOWNS:]))
+        Q1, Q2 = (adjoint(part) for part in (Q[:, :, :UNKNOWNS], Q[:, :, UNKNOWNS:]))
         z = np.concatenate([blocks.z, np.zeros((len(blocks), HOUSING_ROWS))], axis=1) - state.shift
         z[:, : blocks.z.shape[1]] *= blocks.present
         white = np.linalg.solve(L, z[:, :, None])
@@ -313,7 +314,7 @@ class Solver:
         columns = np.concatenate([t.slope_columns(blocks, reading) for t in self.shared.terms], axis=2)
         L = np.linalg.cholesky(np.where(usable[:, None, None], blocks.slope_noise, np.eye(m)))
         Q = np.linalg.qr(np.linalg.solve(L, blocks.z[:, :, None]), mode="complete")[0]
-        Q2 = Q[:, :, 1:].conj().transpose(0, 2, 1)
+        Q2 = adjoint(Q[:, :, 1:])
         J = _real(Q2 @ np.linalg.solve(L, columns))
         r = _real(Q2 @ np.linalg.solve(L, blocks.slope[:, :, None]))[:, :, 0] - J @ self.shared.value[0]
         sums.add(group, weight * usable, r, np.zeros((*r.shape, sums.A.shape[1])), J)

@@ -18,13 +18,14 @@ from tpjb_ident.bands.film_products import film_products
 from tpjb_ident.bands.responses import BandPoint, ClassicLine, line_response, one_phase_set, pooled_noise
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.arrowhead import MODELS, Shape, complex_matrix, least_squares, power_columns, real_numbers
-from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, alive, film_force, stacked, vector
+from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, adjoint, alive, film_force, stacked, vector
 from tpjb_ident.estimate.noise import GAIN_OR_LOAD, UNKNOWN_EXPONENT, slopes_over_load
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.estimate.term import worth_stating
 from tpjb_ident.identification.campaign_solution import channel_columns
+from tpjb_ident.phasors.run_data import places_of
 from tpjb_ident.runs.static_load import StaticLoads, missed_load
 from tpjb_ident.terms.distortion import band_change, line_scatter
 from tpjb_ident.terms.registry import solve, solved_as_learnt
@@ -58,13 +59,13 @@ class BandBlocks:
 
 def band_blocks(
     points: Sequence[BandPoint],
-    sensors: tuple[Sensor, ...],
+    rig: Rig,
     loads: StaticLoads,
     clearance: float | None,
 ) -> BandBlocks:
     """Responses of all runs."""
     rows: list[dict[str, object]] = []
-    calibrations: list[list[Hashable]] = [[] for _ in sensors]
+    calibrations: list[list[Hashable]] = [[] for _ in rig.channels]
     operating: list[OperatingPoint] = []
     runs: list[str] = []
     films = [_film(point, clearance) for point in points]
@@ -75,7 +76,7 @@ def band_blocks(
         for members in point.members:
             spectra = [point.runs[r] for r in members]
             names = [s.run for s in spectra]
-            places = _places(spectra[0], sensors)
+            places = _places(spectra[0], rig.channels)
             channels = [None if k < 0 else spectra[0].channels[k] for k in places]
             row = channel_columns(channels, calibrations)
             row |= {"run": len(runs), "temperature": spectra[0].temperature, "miss": missed_load(miss, members)}
@@ -88,8 +89,8 @@ def band_blocks(
             runs.append(", ".join(names))
     bent, _, turning = zip(*films)
     band = np.repeat(np.arange(len(points)), [len(point.bins) for point in points])
-    blocks = stacked(operating, runs, len(sensors), rows, np.array(bent)[band], band)
-    weak, strong = _strengths(Rig(sensors, 1.0), blocks).T
+    blocks = stacked(operating, runs, len(rig), rows, np.array(bent)[band], band)
+    weak, strong = _strengths(rig, blocks).T
     driven = strong > STRONG
     coherent = np.array([classic.coherence.min() for point in points for classic in point.classic])
     quiet = np.array([point.method == "hv" for point in points])[band]
@@ -127,8 +128,7 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
 
 def _places(spectra: RunSpectra, sensors: Sequence[Sensor]) -> IntArray:
     """Place of every sensor's channel in a run (m,); -1 of one that it lacks, or that shows nothing beside its like."""
-    named = {(channel.name, channel.quantity): k for k, channel in enumerate(spectra.channels)}
-    places = np.array([named.get((sensor.name, sensor.quantity), -1) for sensor in sensors])
+    places = np.array(places_of(sensors, spectra.channels))
     largest = np.append(np.abs(spectra.z).max(axis=(0, 1)), 0.0)
     return np.where(alive(sensors, largest[places]), places, -1)
 
@@ -152,9 +152,9 @@ def _run_rows(point: BandPoint, runs: Sequence[RunSpectra], places: IntArray) ->
 
 def _strengths(rig: Rig, blocks: Blocks) -> FloatArray:
     """F ratios of every line's weaker and stronger direction of motion over its noise, (L, 2)."""
-    probes = rig.of("displacement")
+    probes = rig.pick("displacement")
     plane = np.linalg.pinv(blocks.along[:, probes] * blocks.present[:, probes, None])
-    noise = plane @ blocks.noise[:, probes][:, :, probes] @ plane.transpose(0, 2, 1)
+    noise = plane @ blocks.noise[:, probes][:, :, probes] @ adjoint(plane)
     size = np.sqrt(np.maximum(np.einsum("nii->n", noise).real / 2, 1e-300))
     white = np.nan_to_num(vector(rig, blocks, "displacement")) / size[:, None]
     return np.linalg.eigvalsh(line_products(blocks, white, white)) / 2

@@ -22,18 +22,19 @@ from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.arrowhead import complex_matrix
 from tpjb_ident.estimate.equation import (
     Blocks,
+    Rig,
     RigStiffness,
-    Sensor,
     axes_of,
     campaign_rig,
     film_force,
+    mounted,
     sensors_of,
     stacked,
     vector,
 )
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.solve import Solution
-from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means
+from tpjb_ident.identification.point_means import PointMeans, point_means
 from tpjb_ident.results.linearity import FilmChange, film_change
 from tpjb_ident.runs.point_data import PointData, RunDigest
 from tpjb_ident.runs.static_load import StaticLoads, missed_load, static_loads
@@ -68,40 +69,37 @@ _CLOCK_PASSES, _TURNED = 2, 1e-2
 Answer = TypeVar("Answer", "CampaignSolution", "BandSolution")
 
 
-def solved_with_clocks(
-    sensors: tuple[Sensor, ...], rate: float, solve: Callable[[tuple[Sensor, ...], Mapping[str, float]], Answer]
-) -> Answer:
+def solved_with_clocks(rig: Rig, rate: float, solve: Callable[[Rig], Answer]) -> Answer:
     """Solve, find the devices, and solve again with the rates of their clocks put right in the records.
 
-    `solve` takes sensors and the rates found by device; `rate` [Hz] of the records. Devices that the manifest states
-    are taken at their times; one that was found started within a sample of the first.
+    `rate` [Hz] of the records. Devices that the manifest states are taken at their times; one that was found started
+    within a sample of the first.
     """
-    answer = solve(sensors, {})
-    sensors, rates = with_found_devices(sensors, answer.solution.blocks, START / rate)
-    if rates:
-        answer = solve(sensors, rates)
-    for _ in range(_CLOCK_PASSES if len({sensor.clock for sensor in sensors}) > 1 else 0):
+    answer = solve(rig)
+    rig = with_found_devices(rig, answer.solution.blocks, START / rate)
+    if rig.rates:
+        answer = solve(rig)
+    for _ in range(_CLOCK_PASSES if len({sensor.clock for sensor in rig.channels}) > 1 else 0):
         solution, blocks = answer.solution, answer.solution.blocks
         more = Clock(solution.rig, blocks).rates(solution.fitted[Clock.name].value)
         turn = max(map(abs, more.values())) * (2 * blocks.time * blocks.omega).max()
         if turn < _TURNED:
             break
-        rates = {device: rates.get(device, 0.0) + change for device, change in more.items()}
-        answer = solve(sensors, rates)
+        rates = {device: rig.rates.get(device, 0.0) + change for device, change in more.items()}
+        rig = replace(rig, rates=rates)
+        answer = solve(rig)
     return answer
 
 
-def with_found_devices(
-    sensors: tuple[Sensor, ...], blocks: Blocks, start: float
-) -> tuple[tuple[Sensor, ...], dict[str, float]]:
-    """The sensors, cells and accelerometers with devices of their own where their phases show them, and their rates.
+def with_found_devices(rig: Rig, blocks: Blocks, start: float) -> Rig:
+    """The rig, cells and accelerometers with devices of their own and their rates where their phases show them.
 
     They started within `start` [s] of the first, one deviation.
     """
-    force = None if any(sensor.clock for sensor in sensors) else _rate(sensors, blocks, "force")
+    force = None if any(sensor.clock for sensor in rig.channels) else _rate(rig, blocks, "force")
     if force is None or not force.clear:
-        return sensors, {}
-    acceleration = _rate(sensors, blocks, "acceleration")
+        return rig
+    acceleration = _rate(rig, blocks, "acceleration")
     # too weak to tell: as a rule accelerometers are recorded with the cells
     devices, rates = {"force": "cells", "acceleration": "cells"}, {"cells": force.rate}
     if acceleration is not None and abs(acceleration.rate - force.rate) > _CLEAR * np.hypot(
@@ -109,8 +107,9 @@ def with_found_devices(
     ):
         devices["acceleration"] = "accelerometers" if acceleration.clear else ""
         rates |= {"accelerometers": acceleration.rate} if acceleration.clear else {}
-    separate = [replace(s, clock=devices.get(s.quantity, "")) for s in sensors]
-    return tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.clock else s for s in separate), rates
+    separate = [replace(s, clock=devices.get(s.quantity, "")) for s in rig.channels]
+    sensors = tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.clock else s for s in separate)
+    return replace(rig, channels=sensors, rates=rates)
 
 
 class _Rate(NamedTuple):
@@ -119,10 +118,9 @@ class _Rate(NamedTuple):
     clear: bool  #: whether it is a rate of its own
 
 
-def _rate(sensors: Sequence[Sensor], blocks: Blocks, quantity: str) -> _Rate | None:
+def _rate(rig: Rig, blocks: Blocks, quantity: str) -> _Rate | None:
     """Rate of a quantity's clock against the probes'; None where no one rate explains the runs."""
-    rows = [j for j, sensor in enumerate(sensors) if sensor.quantity == quantity]
-    probes = [j for j, sensor in enumerate(sensors) if sensor.quantity == "displacement"]
+    rows, probes = rig.pick(quantity), rig.pick("displacement")
     usable = (blocks.windows > 3) & blocks.present[:, rows + probes].all(axis=1)
     if not rows or usable.sum() < 2:
         return None
@@ -244,12 +242,10 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
 class CampaignSolution:
     """H of every point of a campaign, and what was put right on the way."""
 
-    task: MeansTask
     means: tuple[PointMeans, ...]
     loads: StaticLoads
     film: tuple[FilmChange, ...]
     solution: Solution
-    mains_shift: ComplexArray  #: (n, m), SI: pick-up taken off the blocks' readings
     mains: dict[int, MainsFit] = field(default_factory=dict)  #: by point
     in_cells: dict[int, FloatArray] = field(default_factory=dict)  #: by point, (8, 8): mains in the cells
 
@@ -276,35 +272,31 @@ def solve_campaign(
     bare: RigStiffness,
 ) -> CampaignSolution:
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
-    sensors = sensors_of(campaign)
     loads = static_loads(campaign, points)
 
-    def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> CampaignSolution:
-        task = MeansTask(sensors, rates)
-        means = tuple(workers.map(point_means, [(data,) for data in points], task))
+    def solved(rig: Rig) -> CampaignSolution:
+        means = tuple(workers.map(point_means, [(data,) for data in points], rig))
         film = tuple(film_change(data.film_lines, point.start) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])
         blocks = campaign_blocks(points, means, loads.misses, bent)
-        rig = campaign_rig(
-            campaign, loads.doubted(sensors), blocks, loads.common, bare=bare, rates=rates, to_set_point=correct
-        )
+        rig = mounted(loads.doubted(rig), blocks, campaign.mount, loads.common)
         start = np.array([point.start for point in means]) - bare.at(np.array([data.omega for data in points]))
         solution = solved_as_learnt(rig, lambda rig: solve(rig, blocks, start))
-        return CampaignSolution(task, means, loads, film, solution, np.zeros_like(blocks.z))
+        return CampaignSolution(means, loads, film, solution)
 
     rate = min((digest.sample_rate for digest in digests if digest.sample_rate > 0), default=np.inf)
-    last = solved_with_clocks(sensors, rate, solved)
+    last = solved_with_clocks(campaign_rig(campaign, bare=bare, to_set_point=correct), rate, solved)
     solution, blocks = last.solution, last.solution.blocks
     force = force_pickup([digest.mains_force for digest in digests])
     on_line = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE) and p in blocks.point]
     fits = _mains(on_line, digests, solution, force) if correct and on_line else {}
     if fits:
-        shift, probes = np.zeros_like(blocks.z), solution.rig.of("displacement")
+        shift, probes = np.zeros_like(blocks.z), solution.rig.pick("displacement")
         for p, fit in fits.items():
-            rows = np.ix_(np.flatnonzero(blocks.point == p), probes)
+            rows = np.flatnonzero(blocks.point == p)[:, None], probes
             shift[rows] = np.einsum("nja,na->nj", blocks.along[rows], fit.pickup)
         again = solve(solution.rig, replace(blocks, z=blocks.z - shift), solution.h)
-        last = replace(last, solution=again, mains_shift=shift, mains=fits)
+        last = replace(last, solution=replace(again, blocks=blocks, shift=again.shift + shift), mains=fits)
     D = vector(solution.rig, blocks, "displacement")
     in_cells = {p: force_pickup_spread(D[blocks.point == p], force) for p in on_line if force.any()}
     return replace(last, in_cells=in_cells)
@@ -315,7 +307,7 @@ def _mains(
 ) -> dict[int, MainsFit]:
     """Angles of the mains at the points on whose line it is; `force` (2,): mains in the cells [N]."""
     rig, blocks = solution.rig, solution.blocks
-    across = blocks.along[0, rig.of("displacement")]
+    across = blocks.along[0, rig.pick("displacement")]
     pickup = mains_pickup([digest.mains for digest in digests], np.arctan2(across[:, 1], across[:, 0]))
     if pickup is None:
         return {}

@@ -1,6 +1,6 @@
 """A campaign's dynamic runs to dynamic coefficients: the whole path, point by point; runs over a band by their own."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import Conditions, holding, merged
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.estimate.arrowhead import real_numbers
-from tpjb_ident.estimate.equation import RigStiffness, Sensor, campaign_rig, sensors_of
+from tpjb_ident.estimate.equation import Rig, RigStiffness, campaign_rig, mounted
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimators.estimate import MIN_COHERENCE, fit_conditions, method_of
 from tpjb_ident.estimators.stiffness import DynamicStiffness
@@ -99,8 +99,8 @@ def identify(
     if not runs:
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     report = progress or (lambda text, done, total: None)
-    lines = replace(chosen.phasors.lines, mains=mains_frequency(campaign, chosen.phasors.lines.mains))
-    settings = replace(chosen, method=method or chosen.method, phasors=replace(chosen.phasors, lines=lines))
+    phasors = replace(chosen.phasors, mains=mains_frequency(campaign, chosen.phasors.mains))
+    settings = replace(chosen, method=method or chosen.method, phasors=phasors)
     solver, _ = method_of(settings.method)
     dry = dry_test(campaign, settings.phasors, SOLVED if solver == "iv" else solver)  # it has no command
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
@@ -199,22 +199,22 @@ def identify_bands(
 
     excluded: list[ExcludedRun] = []
 
-    def solve(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> BandSolution:
-        fast = {sensor.name: rates[sensor.clock] for sensor in sensors if sensor.clock in rates}
+    def solve(rig: Rig) -> BandSolution:
+        fast = {sensor.name: rig.rates[sensor.clock] for sensor in rig.channels if sensor.clock in rig.rates}
         points = []
         excluded[:] = unusable
         for group in groups:
-            point, without = read_point(group, campaign.housing_mass, settings.phasors, fast)
+            point, without = read_point(group, settings.phasors, fast)
             points += [] if point is None else [point]
             excluded.extend(without)
         if not points:
             raise excluded[0].error
         loads = static_loads(campaign, points)
-        data = band_blocks(points, sensors, loads, settings.clearance)
-        known = {"bare": bare, "rates": rates, "to_set_point": settings.correct}
-        return solve_bands(campaign_rig(campaign, loads.doubted(sensors), data.blocks, loads.common, **known), data)
+        data = band_blocks(points, rig, loads, settings.clearance)
+        return solve_bands(mounted(loads.doubted(rig), data.blocks, campaign.mount, loads.common), data)
 
-    solved = solved_with_clocks(sensors_of(campaign), min(run.sample_rate for run in runs), solve)
+    rig = campaign_rig(campaign, bare=bare, to_set_point=settings.correct)
+    solved = solved_with_clocks(rig, min(run.sample_rate for run in runs), solve)
     results, numbers = [], []
     points = solved.points
     for b, point in enumerate(points):

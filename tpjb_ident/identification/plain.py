@@ -20,8 +20,7 @@ from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.estimate.arrowhead import real_numbers
 from tpjb_ident.estimators.estimate import RlmSettings, rlm_fit
 from tpjb_ident.estimators.r_matrix import r_matrix
-from tpjb_ident.phasors.lines import Line, LineSet, WindowSettings
-from tpjb_ident.phasors.run_data import PhasorSettings
+from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_phasors import extract
 from tpjb_ident.results.point_result import quality_cell
 from tpjb_ident.runs.point_data import PointData, gather
@@ -54,11 +53,10 @@ class PlainPoint:
 
 def plain_points(campaign: Campaign, settings: PlainSettings) -> list[PlainPoint]:
     """Solve every operating point of a campaign as the paper prints it."""
-    phasors = PhasorSettings(windows=WindowSettings(length=settings.window, max_inflation=np.inf, min_cycles=1.0))
     runs = []
     for run in (run for run in campaign.of_kind("dynamic") if not is_broadband(run)):
         lines = LineSet((Line("excitation", run.point.excitation_hz),), (), (), run.point.shaft_speed_hz)
-        runs.append(extract(run, campaign.housing_mass, phasors, lines))
+        runs.append(extract(run, lines, window=settings.window))
     return [_solved(data, settings) for data in gather(runs)]
 
 
@@ -101,7 +99,7 @@ def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
             group = file.create_group(f"point-{number:03d}")
             point = p.data.point
             group.attrs.update(zip(POINT_KEY, point.key))
-            group.attrs["runs"] = [run.run for run in p.data.runs]
+            group.attrs["runs"] = p.data.names
             whole = p.data.whole
             rows = (*r_matrix(p.data.D[whole], p.data.F[whole]), p.data.run_index[whole])
             for name, values in zip(("R", "f", "run_index"), rows):

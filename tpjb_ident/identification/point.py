@@ -56,15 +56,15 @@ def point_share(solved: CampaignSolution, data: PointData, p: int, dry: DryTest,
     runs, m = len(data.runs), len(solution.rig)
     shift, factor = np.zeros((runs, m), complex), np.ones((runs, m), complex)
     change, weight = np.zeros((runs, 2, 2), complex), np.zeros(runs)
-    names, mine = [run.run for run in data.runs], np.flatnonzero(blocks.point == p)
-    g = [names.index(blocks.runs[run]) for run in blocks.run[mine]]
-    shift[g], factor[g] = (solution.shift + solved.mains_shift)[mine], solution.factor[mine]
+    mine = np.flatnonzero(blocks.point == p)
+    g = [data.names.index(blocks.runs[run]) for run in blocks.run[mine]]
+    shift[g], factor[g] = solution.shift[mine], solution.factor[mine]
     change[g], weight[g] = solution.run_change[mine], solution.scatter.weights[mine]
     estimate, budget = _estimate(solved, p, weight, data)
     if solved.means[p].shaft_conditions:  # more than runs say of the shaft on their lines
         data = replace(data, runs=tuple(map(_without_shaft, data.runs)))
-    z, _ = channel_windows(data, solved.task)
-    D, F = vectors((z - shift[data.run_index]) / factor[data.run_index], data, solved.task)
+    z, _ = channel_windows(data, solution.rig)
+    D, F = vectors((z - shift[data.run_index]) / factor[data.run_index], data, solution.rig)
     corrected = replace(data, D=D, F=F - np.einsum("nij,nj->ni", change[data.run_index], D))
     miss, film = solved.loads.misses[p], solved.film[p]
     conditions = *_conditions(solved, p), *dry.missing(data.omega)
@@ -117,7 +117,7 @@ def _estimate(
         means.condition,
         float(solution.chi_square[p]),
         int(max(solution.spare[p], 0)),
-        means_attenuation(windows, solved.task),
+        means_attenuation(windows, solution.rig),
         total(shared),
     )
     return estimate, random | shared

@@ -1,20 +1,18 @@
 """The windows of one operating point: a robust start of H, and one phasor per run and channel."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
-from rigdata.vector import directions
 from tpjb_ident.conditions import Condition, Conditions
-from tpjb_ident.estimate.equation import Sensor, alive
+from tpjb_ident.estimate.equation import Rig, alive
 from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation, motion_in, window_means
 from tpjb_ident.estimators.least_trimmed import mm_fit, within_directions
 from tpjb_ident.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
 from tpjb_ident.phasors.frequency import shaft_order
-from tpjb_ident.phasors.run_data import Directed, by_channel
+from tpjb_ident.phasors.run_data import by_channel, places_of
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 
@@ -38,54 +36,41 @@ class PointMeans:
     shaft_conditions: Conditions = ()
 
 
-@dataclass(frozen=True)
-class MeansTask(Directed):
-    """What every point's windows are averaged with."""
-
-    channels: tuple[Sensor, ...]
-    rates: Mapping[str, float] = field(default_factory=dict)  #: of the devices' clocks, relative
-
-    @property
-    def along(self) -> FloatArray:
-        """Unit vectors of the sensors' axes, (m, 2)."""
-        return directions([sensor.axis or 0.0 for sensor in self.channels])
-
-
-def point_means(task: MeansTask, data: PointData) -> PointMeans:
+def point_means(rig: Rig, data: PointData) -> PointMeans:
     """Robust start and means of one point."""
-    z, channels = channel_windows(data, task)
+    z, channels = channel_windows(data, rig)
     present = np.array([[channel is not None for channel in run] for run in channels])
-    D, F = vectors(z, data, task)
+    D, F = vectors(z, data, rig)
     table = phasor_table(D, F, data.run_index)
     weights, start, status = _robust_start(table)
-    film = _film(task, data.mass)
-    readings = Readings([sensor.clock for sensor in task.channels], film)
+    film = _film(rig, data.mass)
+    readings = Readings([sensor.clock for sensor in rig.channels], film)
     means = window_means(z, data.run_index, _window_times(data), readings, weights, present)
     condition = displacement_condition(table.D, weights[table.valid])
-    shaft, conditions = _shaft(data, means, task)
-    residual = _residual_density(data, task, means, film)
+    shaft, conditions = _shaft(data, means, rig)
+    residual = _residual_density(data, rig, means, film)
     return PointMeans(start, means, channels, condition, residual, status, shaft, conditions)
 
 
-def _film(task: MeansTask, mass: float) -> FloatArray:
+def _film(rig: Rig, mass: float) -> FloatArray:
     """Displacements and oil forces as the sensors see them, of their readings, (m, m)."""
-    film = np.diag([float(sensor.quantity != "acceleration") for sensor in task.channels])
-    cells, accelerometers = task.pick("force"), task.pick("acceleration")
+    film = np.diag([float(sensor.quantity != "acceleration") for sensor in rig.channels])
+    cells, accelerometers = rig.pick("force"), rig.pick("acceleration")
     if len(accelerometers) > 1:
-        inertia = mass * task.along[cells] @ np.linalg.pinv(task.along[accelerometers])
+        inertia = mass * rig.along[cells] @ np.linalg.pinv(rig.along[accelerometers])
         film[np.ix_(cells, accelerometers)] = inertia
     return film
 
 
 def _residual_density(
-    data: PointData, task: MeansTask, means: WindowMeans | None, film: FloatArray
+    data: PointData, rig: Rig, means: WindowMeans | None, film: FloatArray
 ) -> tuple[ComplexArray, float]:
     """Noise of a phasor times the length of its fit (m, m), by what lines leave of the records, and its freedom."""
-    m = len(task.channels)
+    m = len(rig.channels)
     rows: list[ComplexArray] = [np.zeros((0, m), complex)]
     for run, line in zip(data.runs, data.lines):
         if line < len(run.residual):
-            bins = by_channel(run.residual[line], run.channels, task.channels)
+            bins = by_channel(run.residual[line], run.channels, rig.channels)
             rows.append(np.sqrt(len(run.start) * run.length) * bins[np.isfinite(bins).all(axis=1)])
     bins = np.concatenate(rows)
     if means is not None:
@@ -94,7 +79,7 @@ def _residual_density(
     return bins.T @ bins.conj() / max(freedom, 1.0), freedom
 
 
-def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple[ComplexArray, Conditions]:
+def _shaft(data: PointData, means: WindowMeans | None, rig: Rig) -> tuple[ComplexArray, Conditions]:
     """Unit phasor of what turns with the shaft in every run (g,), where the runs tell it from the motion."""
     none = np.full(len(data.runs), np.nan + 0j)
     first = data.runs[0].lines
@@ -105,7 +90,7 @@ def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple
     s = np.array([run.shaft_phase[i] if len(run.shaft_phase) else np.nan for run, i in zip(data.runs, data.lines)])
     motion = np.full((len(data.runs), 2), np.nan + 0j)
     if means is not None:
-        motion = task.plane("displacement", means.mean)
+        motion = rig.plane("displacement", means.mean)
     reason = not_told(order, s, motion)
     if reason:
         return none, (Condition(name, f"what turns with the shaft cannot be told from the motion: {reason}"),)
@@ -113,36 +98,35 @@ def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple
     return s, (Condition(SHAFT_FITTED, text),)
 
 
-def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tuple[tuple[Channel | None, ...], ...]]:
+def channel_windows(data: PointData, rig: Rig) -> tuple[ComplexArray, tuple[tuple[Channel | None, ...], ...]]:
     """Phasors of the windows channel by channel (n, m), NaN where there is none, and the channels of each run (g, m).
 
     What clocks run ahead is off it.
     """
-    z = np.full((len(data.run_index), len(task.channels)), np.nan + 0j)
+    z = np.full((len(data.run_index), len(rig.channels)), np.nan + 0j)
     for g, (run, line) in enumerate(zip(data.runs, data.lines)):
-        phasors = by_channel(run.z[:, line], run.channels, task.channels)
+        phasors = by_channel(run.z[:, line], run.channels, rig.channels)
         least = _LEAST_WINDOWS * np.isfinite(run.z[:, line]).mean(axis=0).max(initial=0.0)
         # in more than a share of the windows, and not zeros throughout
         usable = (np.isfinite(phasors).mean(axis=0) > least) & np.nan_to_num(phasors).any(axis=0)
         z[data.run_index == g] = np.where(usable, phasors, np.nan)
     # channels that show nothing of what others of their quantity do
-    z[:, ~alive(task.channels, np.abs(np.nan_to_num(z)).max(axis=0, initial=0.0))] = np.nan
+    z[:, ~alive(rig.channels, np.abs(np.nan_to_num(z)).max(axis=0, initial=0.0))] = np.nan
     living = []
     for g, run in enumerate(data.runs):
-        named = {(channel.name, channel.quantity): channel for channel in run.channels}
-        shown = zip(task.channels, np.isfinite(z[data.run_index == g]).any(axis=0))
-        living.append(tuple(named[sensor.name, sensor.quantity] if is_shown else None for sensor, is_shown in shown))
+        shown = zip(places_of(rig.channels, run.channels), np.isfinite(z[data.run_index == g]).any(axis=0))
+        living.append(tuple(run.channels[k] if is_shown else None for k, is_shown in shown))
     # how far the devices' clocks have run ahead
-    rates = [task.rates.get(sensor.clock, 0.0) for sensor in task.channels]
+    rates = [rig.rates.get(sensor.clock, 0.0) for sensor in rig.channels]
     omega = 2 * np.pi * np.array([r.lines.driven[i] for r, i in zip(data.runs, data.lines)])
     ahead = np.multiply.outer(omega[data.run_index] * _window_times(data), rates)
     return z * np.exp(1j * ahead), tuple(living)
 
 
-def vectors(z: ComplexArray, data: PointData, task: MeansTask) -> tuple[ComplexArray, ComplexArray]:
+def vectors(z: ComplexArray, data: PointData, rig: Rig) -> tuple[ComplexArray, ComplexArray]:
     """Displacement and oil force of channels' phasors (n, m), (n, 2) each, from the sensors that have one."""
-    inertia = np.nan_to_num(data.mass * task.plane("acceleration", z))
-    return task.plane("displacement", z), task.plane("force", z) + inertia
+    inertia = np.nan_to_num(data.mass * rig.plane("acceleration", z))
+    return rig.plane("displacement", z), rig.plane("force", z) + inertia
 
 
 def _window_times(data: PointData) -> FloatArray:
@@ -164,9 +148,9 @@ def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, Conditi
     return weights, fit.coefficients * table.h_scale, conditions
 
 
-def means_attenuation(means: WindowMeans, task: MeansTask) -> FloatArray:
+def means_attenuation(means: WindowMeans, rig: Rig) -> FloatArray:
     """Noise over total power of the displacements, (2,)."""
-    rows = task.pick("displacement")
-    plane = np.linalg.pinv(task.along[rows])
+    rows = rig.pick("displacement")
+    plane = np.linalg.pinv(rig.along[rows])
     noise = plane @ means.noise[np.ix_(rows, rows)] @ plane.T
     return attenuation(means.mean[:, rows] @ plane.T, means.count, noise)

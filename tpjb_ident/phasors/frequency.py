@@ -14,7 +14,7 @@ from rigdata.run import Run, pulse_times
 from tpjb_ident.conditions import Condition, Conditions, holding
 from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.lines import NAMED_HARMONICS, SPEED_DRIFT, LineSet, known_lines
-from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors, phasor_noise
+from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 
 #: Samples of tachometer and keyphasor that are looked at.
 FIRST_LOOK = 2**17
@@ -171,11 +171,11 @@ def phase_advance(phasors: ComplexArray, start: FloatArray, noise: float) -> _Ad
     return _Advance(windows, turns / spacing, noise / size / (2 * np.pi * float(np.median(spacing))))
 
 
-def _line_slip(result: RunPhasors, line: int | None, rate: float, places: list[int] | slice = _ALL) -> float:
+def _line_slip(result: RunPhasors, line: int | None, places: list[int] | slice = _ALL) -> float:
     """Frequency error of a line by some channels together, each weighted by its power over its noise [Hz]."""
     if line is None:
         return 0.0
-    z, noise = result.z[:, line, places], 0.5 * phasor_noise(result, rate)[places]
+    z, noise = result.z[:, line, places], 0.5 * result.noise[places]
     present = np.isfinite(z).any(axis=0) & np.isfinite(noise)
     # a channel without noise must not stand for all
     least = 1e-9 * np.nanmax(np.abs(z[:, present]), axis=0)
@@ -187,12 +187,12 @@ def tuned(
     run: Run, result: RunPhasors, driven: tuple[float, ...], speed: float, settings: PhasorSettings
 ) -> Tuning | None:
     """Compare a first fit with what it assumed; None where it was good enough."""
-    rate, span = run.sample_rate, result.start[-1] - result.start[0] + result.length
-    slips = np.array([_line_slip(result, i, rate) for i in range(len(result.lines.excitation))])
+    span = result.start[-1] - result.start[0] + result.length
+    slips = np.array([_line_slip(result, i) for i in range(len(result.lines.excitation))])
     slips[np.abs(slips) * span <= MAX_SLIP] = 0.0
     exact = tuple((np.array(result.lines.driven) + slips).tolist())
     settled = bool(np.all(np.abs(slips) * result.length <= MAX_RETUNED))
-    turning, follow = _line_slip(result, result.lines.place("1X"), rate), _drifting(result, rate) if settled else None
+    turning, follow = _line_slip(result, result.lines.place("1X")), _drifting(result) if settled else None
     if not slips.any() and follow is None and abs(turning) * span <= 5 * MAX_SLIP:
         return None
     shown, stated = ", ".join(f"{f:.5g}" for f in exact), ", ".join(f"{f:g}" for f in driven)
@@ -201,11 +201,12 @@ def tuned(
     if follow is not None:
         low, high = follow.speed.min(), follow.speed.max()
         conditions += (Condition(DRIFT, f"shaft speed between {low:.4g} and {high:.4g} Hz; followed by window"),)
-    lines = known_lines(exact, speed + turning, rate, settings.lines, result.lines.found, run.length / rate)
+    rate = run.sample_rate
+    lines = known_lines(exact, speed + turning, rate, settings.mains, result.lines.found, run.length / rate)
     return Tuning(lines, follow, conditions, settled)
 
 
-def device_rates(result: RunPhasors, rate: float) -> dict[str, float]:
+def device_rates(result: RunPhasors) -> dict[str, float]:
     """How much faster the clocks of several devices let the excitation turn than the lines have it, relative."""
     devices = tuple(dict.fromkeys(result.device))
     if len(devices) < 2:
@@ -214,34 +215,34 @@ def device_rates(result: RunPhasors, rate: float) -> dict[str, float]:
     rates = {}
     for device in devices:
         places = [k for k, name in enumerate(result.device) if name == device]
-        rates[device] = _line_slip(result, 0, rate, places) / frequency
+        rates[device] = _line_slip(result, 0, places) / frequency
     ahead = max(abs(value) for value in rates.values()) * frequency * result.length
     return rates if ahead > MAX_CLOCK_SLIP else {}
 
 
-def exact_frequencies(result: RunPhasors, places: list[int], rate: float) -> FloatArray:
+def exact_frequencies(result: RunPhasors, places: list[int]) -> FloatArray:
     """Frequencies of the whole record's lines by the clock of some channels, (n_whole_lines,) [Hz]."""
-    turning = _line_slip(result, result.lines.place("1X"), rate, places)
+    turning = _line_slip(result, result.lines.place("1X"), places)
     frequencies = np.array([line.frequency + turning * line.order for line in result.lines.whole])
     for k, line in enumerate(result.lines.whole):
         if line.name in ("excitation", "mains"):
-            frequencies[k] += _line_slip(result, k, rate, places)
+            frequencies[k] += _line_slip(result, k, places)
     return frequencies
 
 
-def _drifting(result: RunPhasors, rate: float) -> ShaftCourse | None:
+def _drifting(result: RunPhasors) -> ShaftCourse | None:
     """Course of the speed, where the shaft's phase runs away within a window.
 
     Where no runout tells it there is nothing to follow; a tachometer's own noise looks like a drift.
     """
-    speeds, doubt = speeds_from_runout(result, rate) or (np.empty(0), 0.0)
+    speeds, doubt = speeds_from_runout(result) or (np.empty(0), 0.0)
     good = np.isfinite(speeds)
     if good.sum() < 2 or np.ptp(speeds[good]) / 2 <= max(MAX_WINDOW_SLIP / result.length, 4 * doubt):
         return None
     return ShaftCourse(result.start[good] + 0.5 * result.length, speeds[good])
 
 
-def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, float] | None:
+def speeds_from_runout(result: RunPhasors) -> tuple[FloatArray, float] | None:
     """Shaft speed in every window (n,) from the turning of its 1X phasors in the probes, and its standard error [Hz].
 
     Runout and unbalance draw the same 1X from window to window; between the middles of two windows its phase
@@ -250,7 +251,7 @@ def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, flo
     line = result.lines.place("1X")
     if line is None:
         return None
-    noise = 0.5 * np.median(phasor_noise(result, rate)[result.pick("displacement")])
+    noise = 0.5 * np.median(result.noise[result.pick("displacement")])
     advance = phase_advance(result.displacement[:, line], result.start, noise)
     if advance is None:
         return None

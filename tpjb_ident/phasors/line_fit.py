@@ -57,12 +57,6 @@ def usual_scale(scale: FloatArray) -> FloatArray:
     return window_median(scale, np.inf)
 
 
-def is_present(values: FloatArray) -> BoolArray:
-    """Whether a reading is a value: finite, and no overflow mark; (n,)."""
-    with np.errstate(invalid="ignore"):  # a NaN compared is what "no value" looks like
-        return np.abs(values) < OVERFLOW
-
-
 def with_flanks(outlying: BoolArray) -> BoolArray:
     """Bad samples: isolated ones by themselves, disturbances with their flanks; `outlying` (n,)."""
     bad = np.array(outlying)
@@ -153,7 +147,8 @@ class LineFitter:
         """Fit windows, and give what is left of them, (n_channels, n_windows, length), with bad samples as zero."""
         q, n = rows.shape[:2]
         stack = rows.reshape(q * n, self.length)
-        present = is_present(stack)
+        with np.errstate(invalid="ignore"):  # a NaN compared is what "no value" looks like
+            present = np.abs(stack) < OVERFLOW
         count = np.maximum(present.sum(axis=1, keepdims=True), 1)
         offset = np.sum(stack, axis=1, keepdims=True, where=present) / count
         values = np.where(present, stack - offset, 0.0)

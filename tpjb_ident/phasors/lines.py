@@ -32,8 +32,8 @@ _NAMED = tuple(f"{n}X" for n in range(1, NAMED_HARMONICS + 1))
 _EXACT = 1e-6
 #: Lines closer than this are one [1 / record length].
 ONE_LINE = 0.6
-#: Harmonics of the shaft that are looked at in the whole record.
-_FAINT_SHAFT = 4
+#: Harmonics of the shaft that are fitted in every window, and that are looked at in the whole record.
+_STRONG_SHAFT, _FAINT_SHAFT = 2, 4
 
 
 @dataclass(frozen=True)
@@ -98,29 +98,19 @@ class LineSet:
         return replace(self, speed=speed, **moved)
 
 
-@dataclass(frozen=True)
-class LineSettings:
-    """Which disturbing lines to expect."""
-
-    mains: float = 50.0
-    shaft_harmonics: int = 2
-    mains_harmonics: int = 1
-
-
 def known_lines(
     excitation: tuple[float, ...],
     speed: float,
     rate: float,
-    settings: LineSettings | None = None,
+    mains: float = 50.0,
     extra: tuple[float, ...] = (),
     duration: float = np.inf,
 ) -> LineSet:
     """Collect the lines of one run; coinciding ones are one, named in the order excitation, shaft, mains, others."""
-    settings = settings or LineSettings()
     top, spacing = HIGHEST * rate, ONE_LINE / duration
     driven = tuple(Line("excitation", float(f)) for f in sorted(set(excitation)))
-    faint = _faint_lines(driven, speed, settings)
-    strong = strong_lines(driven, speed, settings)
+    faint = _faint_lines(driven, speed)
+    strong = strong_lines(driven, speed, mains)
     for f in extra:
         strong.append(next((line for line in faint if abs(line.frequency - f) < spacing), Line("found", f, _EXACT)))
     conditions: list[Condition] = []
@@ -153,17 +143,19 @@ def _shaft_lines(speed: float, first: int, last: int) -> list[Line]:
     return [Line(f"{n}X", n * speed, n * SPEED_DRIFT, n) for n in orders]
 
 
-def strong_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
-    """What turns with the shaft, the mains, what the actuator makes of the drive."""
-    orders = range(1, settings.mains_harmonics + 1) if settings.mains > 0 else ()
-    mains = [Line("mains" if n == 1 else f"mains {n}", n * settings.mains, MAINS_DRIFT) for n in orders]
-    shaft = _shaft_lines(speed, 1, settings.shaft_harmonics)
-    return shaft + mains + [Line("harmonic 2", 2 * line.frequency, _EXACT) for line in driven]
+def strong_lines(
+    driven: tuple[Line, ...], speed: float, mains: float, of_shaft: int = _STRONG_SHAFT, of_mains: int = 1
+) -> list[Line]:
+    """What turns with the shaft, the mains, what the actuator makes of the drive; harmonics of the first two."""
+    orders = range(1, of_mains + 1) if mains > 0 else ()
+    supply = [Line("mains" if n == 1 else f"mains {n}", n * mains, MAINS_DRIFT) for n in orders]
+    drive = [Line("harmonic 2", 2 * line.frequency, _EXACT) for line in driven]
+    return _shaft_lines(speed, 1, of_shaft) + supply + drive
 
 
-def _faint_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
+def _faint_lines(driven: tuple[Line, ...], speed: float) -> list[Line]:
     """Further harmonics, and what a film that is not linear makes of the shaft's and the drive's motion."""
-    faint = _shaft_lines(speed, settings.shaft_harmonics + 1, _FAINT_SHAFT)
+    faint = _shaft_lines(speed, _STRONG_SHAFT + 1, _FAINT_SHAFT)
     for e in driven:
         twice, half = 2 * speed - e.frequency, 2 * e.frequency - speed
         faint.append(Line("harmonic 3", 3 * e.frequency, _EXACT))
@@ -172,16 +164,8 @@ def _faint_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings)
     return faint
 
 
-@dataclass(frozen=True)
-class WindowSettings:
-    """How long windows are to be."""
-
-    length: float | None = None
-    target_count: int = 20
-    max_inflation: float = 1.3
-    min_cycles: float = 4.0
-
-
+#: Windows of a record that is long enough, cycles of the excitation in one, at least, and its variance inflation.
+_COUNT, _CYCLES, MAX_INFLATION = 20, 4.0, 1.3
 #: Samples per window, where a shorter one resolves the lines.
 MAX_SAMPLES = 2**16
 
@@ -219,16 +203,15 @@ def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, ra
     return float((variance * 0.5 * design.shape[0]).max())
 
 
-def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> float:
+def shortest_window(lines: LineSet, rate: float) -> float:
     """Shortest window [s] that keeps the excitation lines within the accepted inflation."""
     frequencies = lines.frequencies
     n_driven = len(lines.excitation)
-    start = settings.min_cycles / min(lines.driven)
-    length = start
+    length = start = _CYCLES / min(lines.driven)
     # A dozen beats between neighbours separate any two lines; what is not resolved then never is.
     longest = max(start, 12.0 / _gap(lines))
     while length <= longest:
-        if variance_inflation(frequencies, n_driven, length, rate) <= settings.max_inflation:
+        if variance_inflation(frequencies, n_driven, length, rate) <= MAX_INFLATION:
             return length
         length *= 1.05
     raise RecordTooShortError(
@@ -236,13 +219,13 @@ def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> fl
     )
 
 
-def plan_windows(n_samples: int, rate: float, lines: LineSet, settings: WindowSettings) -> tuple[int, int]:
-    """Choose window length and count for one run."""
-    shortest = shortest_window(lines, rate, settings)
+def plan_windows(n_samples: int, rate: float, lines: LineSet, length: float | None = None) -> tuple[int, int]:
+    """Choose window length and count for one run; windows of a stated length [s] need no more than a cycle."""
+    shortest = shortest_window(lines, rate) if length is None else 1 / min(lines.driven)
     available = n_samples / rate
     # Very long records are cut into more windows, not into windows that fill the memory.
-    wanted = settings.length or max(shortest, min(available / settings.target_count, MAX_SAMPLES / rate))
-    limits = [("a window", settings.length or math.inf), ("the record", available)]
+    wanted = length or max(shortest, min(available / _COUNT, MAX_SAMPLES / rate))
+    limits = [("a window", length or math.inf), ("the record", available)]
     for name, seconds in limits:
         if seconds < shortest * 0.999:
             raise RecordTooShortError(
@@ -250,7 +233,7 @@ def plan_windows(n_samples: int, rate: float, lines: LineSet, settings: WindowSe
                 f"{_gap(lines):.3g} Hz away; it takes at least {shortest:.3g} s"
             )
     count = max(1, int(available / wanted + 1e-9))
-    return n_samples // count if settings.length is None else round(wanted * rate), count
+    return n_samples // count if length is None else round(wanted * rate), count
 
 
 def _gap(lines: LineSet) -> float:

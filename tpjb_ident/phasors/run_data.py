@@ -20,10 +20,10 @@ from rigdata.device import Device
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
 from rigdata.run import Run
-from rigdata.vector import directions, plane_vector
+from rigdata.vector import Directed
 from tpjb_ident.conditions import Conditions
 from tpjb_ident.phasors.line_fit import usual_scale
-from tpjb_ident.phasors.lines import LineSet, LineSettings, WindowSettings
+from tpjb_ident.phasors.lines import LineSet
 
 
 @dataclass(frozen=True)
@@ -75,26 +75,9 @@ def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
 class PhasorSettings:
     """How phasors are extracted."""
 
-    lines: LineSettings = field(default_factory=LineSettings)
-    windows: WindowSettings = field(default_factory=WindowSettings)
+    mains: float = 50.0
     delays: dict[str, float] = field(default_factory=dict)
     excitation_lines: tuple[float, ...] = ()
-
-
-class Directed:
-    """What several channels show, side by side; `channels` have a quantity and an axis each."""
-
-    channels: Any
-
-    def pick(self, quantity: str) -> list[int]:
-        """Places of the channels of a quantity."""
-        return [k for k, channel in enumerate(self.channels) if channel.quantity == quantity]
-
-    def plane(self, quantity: str, values: ComplexArray | FloatArray) -> ComplexArray:
-        """X and Y (.., 2) of a quantity from values (.., n_channels) of all channels, NaN where there is none."""
-        places = self.pick(quantity)
-        along = directions([self.channels[k].axis or 0.0 for k in places])
-        return plane_vector(along, np.asarray(values[..., places], complex))
 
 
 @dataclass(frozen=True)
@@ -124,6 +107,13 @@ class RunPhasors(Directed):
     rounding: FloatArray = field(default_factory=lambda: np.empty(0))  #: (n_channels,), SI^2: by it on a line, at most
     temperatures: dict[int, float] = field(default_factory=dict)  #: K: mean by pad
     temperature: float = np.nan  #: K: at the probes, as stated, else the mean of the thermometers
+    sample_rate: float = 0.0
+
+    @property
+    def noise(self) -> FloatArray:
+        """Standard deviation of a window's phasor by what its lines leave, channel by channel (n_channels,)."""
+        samples = self.length * self.sample_rate
+        return np.maximum(2 * usual_scale(self.scale) / np.sqrt(samples), np.finfo(float).tiny)
 
     @cached_property
     def displacement(self) -> ComplexArray:
@@ -157,21 +147,21 @@ class RunPhasors(Directed):
         return self.film_force(self.z)
 
 
+def places_of(wanted: Sequence[Channel], channels: Sequence[Channel]) -> list[int]:
+    """Place of every channel that is wanted among some, -1 of one that is missing."""
+    places = {(channel.name, channel.quantity): k for k, channel in enumerate(channels)}
+    return [places.get((channel.name, channel.quantity), -1) for channel in wanted]
+
+
 def by_channel(values: np.ndarray, channels: Sequence[Channel], wanted: Sequence[Channel]) -> np.ndarray:
     """Values (.., n) of some channels in the order of those that are wanted, (.., m); NaN of those that are missing."""
-    places = {(channel.name, channel.quantity): k for k, channel in enumerate(channels)}
-    order = np.array([places.get((channel.name, channel.quantity), -1) for channel in wanted], dtype=int)
-    return np.concatenate([values, np.full((*values.shape[:-1], 1), np.nan)], axis=-1)[..., order]
+    padded = np.concatenate([values, np.full((*values.shape[:-1], 1), np.nan)], axis=-1)
+    return padded[..., places_of(wanted, channels)]
 
 
 def complex_median(z: ComplexArray) -> ComplexArray:
     """Median of real and imaginary parts over the first axis; `z` (n, ...)."""
     return np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0)
-
-
-def phasor_noise(run: RunPhasors, rate: float) -> FloatArray:
-    """Standard deviation of a window's phasor by what its lines leave, channel by channel (n_channels,)."""
-    return np.maximum(2 * usual_scale(run.scale) / np.sqrt(run.length * rate), np.finfo(float).tiny)
 
 
 #: Lines nearer than this are one [Hz].

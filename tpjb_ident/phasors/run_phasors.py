@@ -31,7 +31,6 @@ from tpjb_ident.phasors.run_data import (
     beginning_of,
     complex_median,
     device_readers,
-    phasor_noise,
     with_kept_beginning,
 )
 from tpjb_ident.phasors.whole_record import (
@@ -55,10 +54,10 @@ _DEVIATIONS, _QUIET = 3.0, 0.1
 _ACROSS = 0.05
 
 
-def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
+def longest_stretch(result: RunPhasors) -> RunPhasors:
     """The run with the windows of its longest stretch alone; those of others give no phasor."""
     driven = len(result.lines.excitation)
-    noise = phasor_noise(result, rate)
+    noise = result.noise
     quantity = np.array([c.quantity for c in result.channels])
     live = np.isfinite(noise) & (quantity != "acceleration")
     z, quantity = result.z[:, :driven, live] / noise[live], quantity[live]
@@ -127,17 +126,19 @@ MAX_JITTER = 0.02
 
 def extract(
     run: Run,
-    housing_mass: float,
-    settings: PhasorSettings,
     lines: LineSet,
     follow: ShaftCourse | None = None,
     clocks: Mapping[str, float] | None = None,
+    window: float | None = None,
 ) -> RunPhasors:
-    """Fit all windows of a run; `clocks`: by how much lines turn faster by a device's clock, relative."""
+    """Fit all windows of a run, of a stated length [s] or of one that tells the lines apart.
+
+    `clocks`: by how much lines turn faster by a device's clock, relative.
+    """
     readers = device_readers(run)
     channels = [(c, reader.device.name) for reader in readers for c in reader.channels]
     channels.sort(key=lambda described: VECTOR_QUANTITIES.index(described[0].quantity))
-    length, count = plan_windows(run.length, run.sample_rate, lines, settings.windows)
+    length, count = plan_windows(run.length, run.sample_rate, lines, window)
     seconds = length / run.sample_rate
     middles = np.asarray((np.arange(count) + 0.5) * length / run.sample_rate, dtype=float)
     speeds = np.full(count, np.nan) if follow is None else follow.at(middles)
@@ -167,8 +168,9 @@ def extract(
         seconds,
         tuple(channel for channel, _ in channels),
         *fit,
-        housing_mass,
+        run.housing_mass,
         device=tuple(name for _, name in channels),
+        sample_rate=run.sample_rate,
     )
 
 
@@ -228,7 +230,7 @@ def _device_windows(
 _TUNINGS = 3
 
 
-def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None = None) -> RunPhasors:
+def run_phasors(run: Run, settings: PhasorSettings | None = None) -> RunPhasors:
     """Extract the phasors of one run."""
     settings = settings or PhasorSettings()
     if run.excitation_kind != "sine":
@@ -236,7 +238,7 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
         cure = "Excite with sines, or leave the run out"
         raise refuse(run.file, "excitation", text, cure, run.id)
     run = with_kept_beginning(run)
-    fit = _beginning_fit(run, housing_mass, settings)
+    fit = _beginning_fit(run, settings)
     if fit.run.length < run.length:
         fit.extend(run)
     result, slower = fit.result, fit.slower
@@ -249,14 +251,14 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
     return compensated(described, run, slower, settings.delays)
 
 
-def _beginning_fit(run: Run, housing_mass: float, settings: PhasorSettings) -> _RunFit:
+def _beginning_fit(run: Run, settings: PhasorSettings) -> _RunFit:
     """Fit of a run, of the beginning of a long one."""
     if run.length > SHORT:
         try:
-            return _RunFit(beginning_of(run, SHORT), housing_mass, settings)
+            return _RunFit(beginning_of(run, SHORT), settings)
         except RecordTooShortError:  # the beginning is not enough; all of it may be
             pass
-    return _RunFit(run, housing_mass, settings)
+    return _RunFit(run, settings)
 
 
 class _RunFit:
@@ -267,8 +269,8 @@ class _RunFit:
     follow: ShaftCourse | None
     clocks: Mapping[str, float] | None = None
 
-    def __init__(self, run: Run, housing_mass: float, settings: PhasorSettings) -> None:
-        self.run, self.mass, self.settings = run, housing_mass, settings
+    def __init__(self, run: Run, settings: PhasorSettings) -> None:
+        self.run, self.settings = run, settings
         self.driven = settings.excitation_lines or (run.point.excitation_hz,)
         self.speed, self.conditions = shaft_speed(run)
         self._fit(self._lines(self.driven, ()))
@@ -283,7 +285,7 @@ class _RunFit:
             self._fit(better.lines, better.follow)
             if better.settled:
                 break
-        self.clocks = device_rates(self.result, run.sample_rate)
+        self.clocks = device_rates(self.result)
         if self.clocks:
             self._fit(self.result.lines, self.follow)
         self.result = with_record(self.result, self.records)
@@ -313,7 +315,7 @@ class _RunFit:
             fault = f"{rate:g} samples per second cannot show an excitation of {beyond[0]:g} Hz"
             cure = "Check sample_rate, the unit of the time column (ms called s?) and excitation_frequency"
             raise refuse(run.file, "time", fault, cure, run.id)
-        return known_lines(excitation, self.speed, rate, self.settings.lines, extra, run.length / rate)
+        return known_lines(excitation, self.speed, rate, self.settings.mains, extra, run.length / rate)
 
     def _fit(self, lines: LineSet, follow: ShaftCourse | None = None) -> None:
         self._fit_windows(lines, follow)
@@ -322,8 +324,8 @@ class _RunFit:
     def _fit_windows(self, lines: LineSet, follow: ShaftCourse | None = None) -> None:
         """Windows of the run's longest stretch of one excitation."""
         self.follow = follow
-        windows = extract(self.run, self.mass, self.settings, lines, follow, self.clocks)
-        self.result = longest_stretch(windows, self.run.sample_rate)
+        windows = extract(self.run, lines, follow, self.clocks)
+        self.result = longest_stretch(windows)
 
     def _add_unexpected(self) -> None:
         """Fit lines along that stand out of the residual, but for the images of what was filled up."""
@@ -337,7 +339,7 @@ class _RunFit:
         """Fit lines along that no window tells from the excitation: their beat looks like a drive off its set point."""
         lines, exact, neighbours = self.result.lines, list(self.result.lines.driven), []
         for i in range(len(exact)):
-            pair = near_line(self.result, i, self.records[0].duration, self.run.sample_rate)
+            pair = near_line(self.result, i, self.records[0].duration)
             if pair is not None:
                 exact[i] = pair[0]
                 neighbours.append(pair[1])

@@ -32,7 +32,7 @@ from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.phasors.frequency import exact_frequencies
 from tpjb_ident.phasors.line_fit import LineFitter, white_noise
 from tpjb_ident.phasors.lines import HIGHEST, LineSet
-from tpjb_ident.phasors.run_data import RunPhasors, device_readers, phasor_noise
+from tpjb_ident.phasors.run_data import RunPhasors, device_readers
 
 #: Noise of a line is looked at in the bins so far from it [1 / record length],
 _BESIDE = (3, 14)
@@ -91,7 +91,7 @@ def whole_records(run: Run, result: RunPhasors) -> tuple[WholeRecord, ...]:
     for reader in device_readers(run):
         names = [c.name for c in reader.channels]
         places = [k for k, c in enumerate(result.channels) if c.name in names]
-        frequencies = exact_frequencies(result, places, reader.rate)
+        frequencies = exact_frequencies(replace(result, sample_rate=reader.rate), places)
         first, stop = 0, reader.length
         if result.span is not None:
             first, stop = np.minimum(reader.first_samples(np.array(result.span)), reader.length).tolist()
@@ -244,14 +244,14 @@ _CLEAR_POWER = 25.0
 _LEFT = 0.004
 
 
-def near_line(result: RunPhasors, driven: int, duration: float, rate: float) -> tuple[float, float] | None:
+def near_line(result: RunPhasors, driven: int, duration: float) -> tuple[float, float] | None:
     """Frequencies [Hz] of an excitation line of a record of `duration` [s] and of a line close beside it, if there is.
 
     Its beat shows in the windows' phasors. A drive that is off its set point, or changes slowly, has none.
     """
     frequency = result.lines.excitation[driven].frequency
     others = (np.delete(result.lines.frequencies, driven) - frequency) * duration
-    noise = phasor_noise(result, rate)
+    noise = result.noise
     live = np.isfinite(noise)
     z = result.z[:, driven, live] / noise[live]
     good = np.isfinite(z).all(axis=1)

@@ -8,7 +8,7 @@ that loses all of its runs is told as lost.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from rigdata.run import Run
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.columns import amount, place_of
 from tpjb_ident.conditions import Conditions, holding
-from tpjb_ident.phasors.run_data import FilmLines, RunPhasors, film_lines, mains_lines
+from tpjb_ident.phasors.run_data import SHORT, FilmLines, RunPhasors, film_lines, mains_lines
 from tpjb_ident.rounding import listed
 
 #: Runs named one by one; more are counted.
@@ -34,22 +34,19 @@ class RunDigest(RunPhasors):
     mains: ComplexArray | None = None  #: (2,) complex, m: displacement at the mains line, where it stands apart
     mains_force: ComplexArray | None = None  #: (2,) complex, N: oil force at the mains line, where it stands apart
     harmonics: tuple[FilmLines | None, ...] = ()
-    sample_rate: float = 0.0
     observations: tuple[Observation, ...] = ()
 
 
-def digest(phasors: RunPhasors, sample_rate: float = 0.0, observations: tuple[Observation, ...] = ()) -> RunDigest:
-    """Sum up the phasors of all lines of a run that was recorded at `sample_rate` [Hz]."""
+def digest(phasors: RunPhasors, observations: tuple[Observation, ...] = ()) -> RunDigest:
+    """Sum up the phasors of all lines of a run."""
     lines = len(phasors.lines.excitation)
     excitation = replace(phasors, z=phasors.z[:, :lines].copy(), residual=phasors.residual[:lines])
-    phasors_left: dict[str, Any] = {f.name: getattr(excitation, f.name) for f in fields(excitation)}
     mains, force = mains_lines(phasors)
     return RunDigest(
-        **phasors_left,
+        **vars(excitation),
         mains=mains,
         mains_force=force,
         harmonics=film_lines(phasors),
-        sample_rate=sample_rate,
         observations=observations,
     )
 
@@ -122,10 +119,6 @@ class FinishedRuns:
         if outcomes and not remaining.digests:
             raise remaining.excluded[0].error
         return remaining
-
-
-#: Samples from which a run's temperatures are taken.
-_TEMPERATURE_SAMPLES = 2**17
 
 
 @dataclass(frozen=True)
@@ -205,18 +198,12 @@ def finite_mean(rows: FloatArray) -> FloatArray:
 
 def gather(runs: Sequence[RunPhasors]) -> list[PointData]:
     """Group runs by operating point; a record with several excitation lines feeds several points."""
-    groups = group([(run.point, run.lines.driven) for run in runs])
-    return [point_data(point, [(runs[k], i) for k, i in members]) for point, members in groups]
-
-
-def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:
-    """Operating points in order, each with the places of its runs and which line of the run is meant."""
-    groups: dict[tuple[object, ...], tuple[OperatingPoint, list[tuple[int, int]]]] = {}
-    for k, (set_points, frequencies) in enumerate(runs):
-        for i, frequency in enumerate(frequencies):
-            point = point_of(set_points, frequency)
-            groups.setdefault(point.key, (point, []))[1].append((k, i))
-    return [groups[key] for key in sorted(groups)]
+    groups: dict[tuple[object, ...], tuple[OperatingPoint, list[tuple[RunPhasors, int]]]] = {}
+    for run in runs:
+        for i, frequency in enumerate(run.lines.driven):
+            point = point_of(run.point, frequency)
+            groups.setdefault(point.key, (point, []))[1].append((run, i))
+    return [point_data(*groups[key]) for key in sorted(groups)]
 
 
 def point_of(point: OperatingPoint, frequency: float) -> OperatingPoint:
@@ -229,10 +216,8 @@ def point_of(point: OperatingPoint, frequency: float) -> OperatingPoint:
 
 def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> PointData:
     """Windows of a point's runs, each with the line that is meant."""
-    runs = tuple(run for run, _ in members)
-    lines = tuple(i for _, i in members)
-    D = [run.displacement[:, i] for run, i in zip(runs, lines)]
-    F = [run.force[:, i] for run, i in zip(runs, lines)]
+    runs, lines = zip(*members)
+    D, F = [run.displacement[:, i] for run, i in members], [run.force[:, i] for run, i in members]
     index = np.repeat(np.arange(len(runs)), [len(d) for d in D])
     return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), index)
 
@@ -241,7 +226,7 @@ def mean_temperatures(run: Run) -> dict[int, float]:
     """Mean temperature per pad over a run [K]; pads with several sensors give their mean."""
     means = []
     for sensor in run.temperatures():
-        values = run.record(sensor.name, 0, _TEMPERATURE_SAMPLES).values
+        values = run.record(sensor.name, 0, SHORT).values
         values = values[np.isfinite(values)]
         if sensor.pad is not None and len(values):
             means.append({sensor.pad: float(values.mean())})

@@ -86,7 +86,7 @@ def file_state(path: Path) -> FileState | None:
     return (status.st_size, status.st_mtime_ns, status.st_ino) if path.is_file() else None
 
 
-def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
+def fingerprint(run: Run, settings: PhasorSettings) -> str:
     """SHA-256 of everything that a run's phasors depend on; "" where its file is gone."""
     reader: Any = run.reader
     try:
@@ -94,7 +94,7 @@ def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
     except OSError:  # whoever reads it next says what is wrong with it
         return ""
     entry = (run.id, run.kind, run.point, run.excitation_direction, dict(run.channels), reader)
-    described = (dict(reader.channels), housing_mass, settings)
+    described = (dict(reader.channels), run.housing_mass, settings)
     text = "\n".join([record, repr(entry), repr(described), repr(QUESTIONS), source_stamp()])
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -211,7 +211,6 @@ def all_runs(
 ) -> FinishedRuns:
     """What every dynamic run says; one that cannot be used is left out and named."""
     runs = campaign.of_kind("dynamic")
-    mass = campaign.housing_mass
     progress(runs[0].id if runs else "", 0, len(runs))
     jobs = []
     for run in runs:  # workers may stand in another folder
@@ -219,7 +218,7 @@ def all_runs(
         if not reader.path.is_absolute():
             reader = replace(reader, path=reader.path.absolute())
         stored = None if store is None else store.known(run.id)
-        jobs.append((replace(run, reader=reader), mass, settings, stored))
+        jobs.append((replace(run, reader=reader), settings, stored))
     finished: list[RunDigest | ExcludedRun] = []
     results = (workers or Workers()).map(process_run, jobs)
     for run, (mark, result) in zip(runs, results, strict=True):
@@ -227,7 +226,7 @@ def all_runs(
             store.keep(mark, result)
         if store is not None and result is None:  # or cleared by another command since
             result = store.load(run, mark)
-        finished.append(result or one_run(run, mass, settings))
+        finished.append(result or one_run(run, settings))
         progress(run.id, len(finished), len(runs))
     gathered = FinishedRuns(tuple(finished))
     return gathered.without(_dead_accelerometers(gathered.digests))
@@ -244,9 +243,7 @@ def _dead_accelerometers(digests: Sequence[RunDigest]) -> dict[str, Problem]:
     return dead if 2 * len(dead) < len(digests) else {}
 
 
-def process_run(
-    run: Run, housing_mass: float, settings: PhasorSettings, stored: str | None
-) -> tuple[str, RunDigest | ExcludedRun | None]:
+def process_run(run: Run, settings: PhasorSettings, stored: str | None) -> tuple[str, RunDigest | ExcludedRun | None]:
     """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
 
     The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
@@ -254,24 +251,24 @@ def process_run(
     """
     try:
         if stored is None:
-            return "", one_run(run, housing_mass, settings)
+            return "", one_run(run, settings)
         with run.opened():  # once for both
-            mark = fingerprint(run, housing_mass, settings)
+            mark = fingerprint(run, settings)
             if mark and mark == stored:
                 return mark, None
             before = file_state(run.reader.path)
-            result = one_run(run, housing_mass, settings)
+            result = one_run(run, settings)
         return (mark if before == file_state(run.reader.path) else ""), result
     except (RigDataError, RecordTooShortError) as error:
         return "", ExcludedRun(run.id, run.point, error)
 
 
-def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDigest:
+def one_run(run: Run, settings: PhasorSettings) -> RunDigest:
     """What one run says."""
     with run.opened():
         cached = with_kept_beginning(run)
         try:
-            phasors = run_phasors(cached, housing_mass, settings)
+            phasors = run_phasors(cached, settings)
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}") from error
         observations = _observed(run, cached, phasors)
@@ -281,7 +278,7 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDiges
         conditions = merged(phasors.conditions, dead, repaired)
         phases, temperatures = shaft_phases(cached, phasors), mean_temperatures(cached)
         result = replace(phasors, conditions=conditions, shaft_phase=phases, temperatures=temperatures)
-        return digest(result, run.sample_rate, observations)
+        return digest(result, observations)
 
 
 def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
@@ -391,7 +388,7 @@ def dry_test(campaign: Campaign, settings: PhasorSettings, method: str) -> DryTe
         errors = [f.problem for f in observe(run).report.findings if f.problem.severity == "error"]
         if errors:  # clipped or dead: there is no dry test without its channels
             raise RigDataError(errors)
-    points = gather([run_phasors(run, campaign.housing_mass, settings) for run in runs])
+    points = gather([run_phasors(run, settings) for run in runs])
     estimates = [estimate_table(phasor_table(p.D, p.F, p.run_index), p.omega, method) for p in points]
     good = sorted((est for est in estimates if np.isfinite(est.covariance).all()), key=lambda est: est.omega)
     bad = [f"{est.omega / (2 * np.pi):g} Hz" for est in estimates if not np.isfinite(est.covariance).all()]

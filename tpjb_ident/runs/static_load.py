@@ -14,7 +14,7 @@ that is off looks like a load that misses its set point by more the smaller it i
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
 from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.conditions import Conditions, holding
-from tpjb_ident.estimate.equation import Sensor
+from tpjb_ident.estimate.equation import Rig
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.runs.point_data import RunsOfPoint
@@ -70,12 +70,13 @@ class StaticLoads:
         text += f"(standard error {self.zero_error:.0f} N); it was taken off"
         return load_conditions(self.misses[point], self.common) + holding((size, "cells-not-tared", text))
 
-    def doubted(self, sensors: Sequence[Sensor]) -> tuple[Sensor, ...]:
-        """The sensors, cells as uncertain as all set points differ from them: either may be wrong."""
+    def doubted(self, rig: Rig) -> Rig:
+        """The rig, its cells as uncertain as all set points differ from them: either may be wrong."""
         ratio = np.log(self.common or 1 + 0j)
         sizes = np.abs([ratio.real, ratio.imag])
         gain, turn = (CHANGE_AS_DEVIATION * sizes * (sizes > (_NOTICED, MAX_SIDEWAYS))).tolist()
-        return tuple(s.doubted(gain, turn) if s.quantity == "force" else s for s in sensors)
+        sensors = tuple(s.doubted(gain, turn) if s.quantity == "force" else s for s in rig.channels)
+        return replace(rig, channels=sensors)
 
 
 def missed_load(misses: ComplexArray, members: Sequence[int]) -> complex:

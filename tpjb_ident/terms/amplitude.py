@@ -28,7 +28,7 @@ class Amplitude(FilmTerm):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        motion = blocks.z[:, rig.of("displacement")]
+        motion = blocks.z[:, rig.pick("displacement")]
         number = len(blocks.points)
         runs = np.maximum(totals(blocks.point, np.ones(len(blocks)), number), 1.0)
         self._mean = totals(blocks.point, np.sum(np.abs(motion) ** 2, axis=1), number) / runs

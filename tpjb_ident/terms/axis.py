@@ -16,9 +16,9 @@ class Axis(Additive):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        self._rows = [j for j, sensor in enumerate(rig.sensors) if sensor.axis_uncertainty]
+        self._rows = [j for j, sensor in enumerate(rig.channels) if sensor.axis_uncertainty]
         self.parameters = tuple(
-            Parameter(rig.sensors[j].name, "rad", rig.sensors[j].axis_uncertainty) for j in self._rows
+            Parameter(rig.channels[j].name, "rad", rig.channels[j].axis_uncertainty) for j in self._rows
         )
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:

@@ -27,11 +27,11 @@ class Clock(Factor):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        devices = list(dict.fromkeys(sensor.clock for sensor in rig.sensors))[1:]
+        devices = list(dict.fromkeys(sensor.clock for sensor in rig.channels))[1:]
         self._devices = devices
         self._taken_off = np.array([rig.rates.get(device, 0.0) for device in devices])
         self.parameters = tuple(Parameter(device or "records", "100 ppm", _QUARTZ) for device in devices)
-        self.sensors = np.array([[sensor.clock == device for device in devices] for sensor in rig.sensors], dtype=float)
+        self.sensors = np.array([[s.clock == device for device in devices] for s in rig.channels], dtype=float)
 
     def rates(self, value: FloatArray) -> dict[str, float]:
         """Rates by device, relative."""

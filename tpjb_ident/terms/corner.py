@@ -30,7 +30,7 @@ class Corner(Factor):
         self.sensors = np.zeros((len(rig), 0))
         asked = {"cells": ("force", not rig.static), "accelerometers": ("acceleration", rig.out_of_step)}
         for name, (quantity, applies) in asked.items():
-            uncertain = np.array([s.corner_uncertainty * (s.quantity == quantity) for s in rig.sensors])
+            uncertain = np.array([s.corner_uncertainty * (s.quantity == quantity) for s in rig.channels])
             if uncertain.any() and applies:
                 self.sensors = np.column_stack([self.sensors, uncertain > 0])
                 self.parameters += (Parameter(name, "Hz", float(uncertain[uncertain > 0][0])),)
@@ -45,7 +45,7 @@ class Corner(Factor):
 
     def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
         """Accelerometers asked for theirs where the cells' is negative."""
-        if rig.out_of_step or not len(rig.of("acceleration")) or not fitted.value[0] < -fitted.deviation[0]:
+        if rig.out_of_step or not len(rig.pick("acceleration")) or not fitted.value[0] < -fitted.deviation[0]:
             return None
         return replace(rig, out_of_step=True)
 

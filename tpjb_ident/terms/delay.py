@@ -25,8 +25,8 @@ class Delay(Factor):
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
         self._omega = blocks.usual_omega
-        devices = np.array([sensor.clock or sensor.quantity for sensor in rig.sensors])
-        deviation = np.array([sensor.delay_uncertainty for sensor in rig.sensors])
+        devices = np.array([sensor.clock or sensor.quantity for sensor in rig.channels])
+        deviation = np.array([sensor.delay_uncertainty for sensor in rig.channels])
         names = list(dict.fromkeys(devices[deviation > 0].tolist()))
         self.sensors = ((devices[:, None] == np.array(names, dtype=str)) & (deviation[:, None] > 0)).astype(float)
         largest = (self.sensors * deviation[:, None]).max(axis=0) / _MILLISECOND

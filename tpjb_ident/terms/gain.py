@@ -24,7 +24,7 @@ class Gain(Factor):
         """Parameters and what goes with them."""
         self._places: list[tuple[int, int]] = []
         parameters = []
-        for j, sensor in enumerate(rig.sensors):
+        for j, sensor in enumerate(rig.channels):
             if not sensor.uncertainty:
                 continue
             calibrations = np.unique(blocks.calibration[:, j]).tolist() or [0]
@@ -46,12 +46,12 @@ class Gain(Factor):
         spread = {}
         for quantity, values in self._differing(fitted).items():
             spread[quantity] = float(np.sqrt(np.sum(np.square(values)) / max(len(values) - 1, 1)))
-        sensors = tuple(sensor.doubted(spread.get(sensor.quantity, 0.0)) for sensor in rig.sensors)
-        return replace(rig, sensors=sensors) if spread else None
+        sensors = tuple(sensor.doubted(spread.get(sensor.quantity, 0.0)) for sensor in rig.channels)
+        return replace(rig, channels=sensors) if spread else None
 
     def _differing(self, fitted: Fitted) -> dict[str, list[float]]:
         """Gains by quantity, of those whose channels differ beyond what is stated."""
-        quantities = [self.rig.sensors[j].quantity for j, _ in self._places]
+        quantities = [self.rig.channels[j].quantity for j, _ in self._places]
         differing = {quantities[k] for k in exceeding(fitted, self.parameters)}
         return {name: [float(v) for v, q in zip(fitted.value, quantities) if q == name] for name in differing}
 

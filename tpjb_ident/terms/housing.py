@@ -55,7 +55,7 @@ class Housing(Term):
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
         self._omega = blocks.usual_omega
-        self._inertia = rig.mass * _usual_ratio(blocks.z[:, rig.of("acceleration")], blocks.z[:, rig.of("force")])
+        self._inertia = rig.mass * _usual_ratio(blocks.z[:, rig.pick("acceleration")], blocks.z[:, rig.pick("force")])
         self._blocks = blocks
         usual, across, loss = _CELLS
         if not rig.has_acceleration:
@@ -183,7 +183,7 @@ class Housing(Term):
         A spring's loss is positive, late cells lower it. Accelerometers with which nothing else is wrong may have led
         by a corner of their own.
         """
-        is_stated = any(sensor.delay_uncertainty for sensor in rig.sensors)
+        is_stated = any(sensor.delay_uncertainty for sensor in rig.channels)
         if is_stated or rig.mount == "unknown" or not rig.has_acceleration:
             return None
         lag, error = float(fitted.value[-1]), float(fitted.deviation[-1])
@@ -194,8 +194,8 @@ class Housing(Term):
         else:
             compared, sound = "displacement", not (self._is_unexplained(fitted) or _otherwise(fitted, _GROSS))
         late = {compared: -lag / self._omega}
-        sensors = tuple(replace(s, delay_uncertainty=late.get(s.quantity, 0.0)) for s in rig.sensors)
-        return replace(rig, sensors=sensors, out_of_step=sound)
+        sensors = tuple(replace(s, delay_uncertainty=late.get(s.quantity, 0.0)) for s in rig.channels)
+        return replace(rig, channels=sensors, out_of_step=sound)
 
 
 def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
@@ -209,7 +209,7 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
     none = np.zeros_like(x)
     design = np.stack([np.stack([x, none, y], axis=1), np.stack([none, y, x], axis=1)], axis=1)
     lines = np.round(np.log(blocks.omega) / _ONE_LINE)
-    noise = np.sqrt(blocks.noise_power(rig.of("acceleration")))
+    noise = np.sqrt(blocks.noise_power(rig.pick("acceleration")))
     lines[~(np.linalg.norm(acceleration, axis=1) > 2 * _CLEAR * noise)] = np.nan
     low, supports, left, judged = [], 0, 0.0, 0.0
     usable = np.unique(lines[np.isfinite(lines)])

@@ -25,9 +25,9 @@ class RunGain(Factor):
         runs, first = np.unique(blocks.run, return_index=True)
         sizes = dict(zip(runs.tolist(), blocks.gain_scatter[first].tolist()))
         self._first = dict(zip(runs.tolist(), first.tolist()))
-        self._places = [(r, int(j)) for r, size in sizes.items() if size > 0 for j in rig.of("force")]
+        self._places = [(r, int(j)) for r, size in sizes.items() if size > 0 for j in rig.pick("force")]
         self.parameters = tuple(
-            Parameter(f"{rig.sensors[j].name} in {blocks.runs[r]}", "1", sizes[r]) for r, j in self._places
+            Parameter(f"{rig.channels[j].name} in {blocks.runs[r]}", "1", sizes[r]) for r, j in self._places
         )
 
     def exponent(self, blocks: Blocks) -> ComplexArray:
@@ -46,7 +46,7 @@ class RunGain(Factor):
         prior = np.array([p.deviation for p in self.parameters])
         share = np.clip(1 - (fitted.deviation / prior) ** 2, 0.0, 1.0)
         expected = np.array([by_load[self._first[r]] for r, _ in self._places])
-        freedom = share.sum() / len(self.rig.of("force"))  # a warmer film moves all cells of a run alike
+        freedom = share.sum() / len(self.rig.pick("force"))  # a warmer film moves all cells of a run alike
         size, counted = usual
         usual_variance = counted / (counted + freedom) * size**2
         if freedom < _LEAST:

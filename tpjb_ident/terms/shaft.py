@@ -34,7 +34,7 @@ class Shaft(Additive):
         parameters = []
         for point in self.points:
             self._size[point] = np.median(np.abs(blocks.z[blocks.point == point]), axis=0) + 1e-300
-            for sensor in rig.sensors:
+            for sensor in rig.channels:
                 names = f"{sensor.name} at {blocks.points[point].excitation_hz:g} Hz"
                 parameters += [Parameter(f"{names}, {part}", "1", _WIDE) for part in ("re", "im")]
         self.parameters = tuple(parameters)

@@ -22,11 +22,11 @@ class Temperature(Factor):
         """Parameters and what goes with them."""
         measured = np.isfinite(blocks.temperature)
         self._reference = float(blocks.temperature[measured].mean()) if measured.any() else 0.0
-        uncertain = [j for j, sensor in enumerate(rig.sensors) if sensor.temperature_coefficient_uncertainty]
+        uncertain = [j for j, sensor in enumerate(rig.channels) if sensor.temperature_coefficient_uncertainty]
         rows = uncertain if measured.any() else []
         self.sensors = np.eye(len(rig))[:, rows]
         self.parameters = tuple(
-            Parameter(rig.sensors[j].name, "1e-3/K", rig.sensors[j].temperature_coefficient_uncertainty / _UNIT)
+            Parameter(rig.channels[j].name, "1e-3/K", rig.channels[j].temperature_coefficient_uncertainty / _UNIT)
             for j in rows
         )
 

@@ -20,7 +20,7 @@ class Tilt(Term):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        planes = [sensor.plane if sensor.quantity == "displacement" else 0.0 for sensor in rig.sensors]
+        planes = [sensor.plane if sensor.quantity == "displacement" else 0.0 for sensor in rig.channels]
         self._plane = np.array(planes)
 
     def random_effects(self, blocks: Blocks, state: State) -> ComplexArray | None:
