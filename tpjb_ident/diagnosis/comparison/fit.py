@@ -193,7 +193,10 @@ def solved_places(run: Map, problem: Problem, start: Start) -> list[tuple[float,
 def fitted(run: Map, problem: Problem, start: Start, linear: Linear) -> Fit:
     """Fit from one of a start's places."""
     unknowns = Unknowns(problem, start.faults)
-    return _settled(run, unknowns, _past_jumps(run, unknowns, linear) if start.coarse else linear)
+    fit = _settled(run, unknowns, _past_jumps(run, unknowns, linear) if start.coarse else linear)
+    # a direction beside its grid does nothing where nothing is there yet, and its derivative there says so
+    idle = np.flatnonzero(~fit.linear.jacobian.any(axis=0)).tolist()
+    return _settled(run, unknowns, _renewed(run, unknowns, fit.linear, idle)) if idle else fit
 
 
 def _past_jumps(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
