@@ -175,6 +175,32 @@ def test_derivatives_stay_where_they_foretell_a_step_there_and_back_however_it_b
     assert (again is fit) == (wrong == 0.0)
 
 
+def test_a_number_that_does_nothing_at_the_start_is_asked_again_where_its_effect_has_a_size():
+    """An effect of a size and a direction, far from the one where its fit begins: of no size none does anything."""
+    rng = np.random.default_rng(6)
+    along, across = rng.normal(size=(2, 40))
+    errors = ErrorModel(0.02**2 * np.eye(40), 1e-4 * np.eye(40), np.ones(1))
+    truth = np.array([2.0, 0.6])
+
+    def shown(theta):
+        return theta[0] * (along * np.cos(theta[1]) + across * np.sin(theta[1]))
+
+    def run(task, jobs):
+        if task is prediction:
+            return [shown(theta) for _, theta in jobs]
+        ((_, theta, indices),) = jobs
+        steps = 1e-6 * np.eye(2)
+        return [[(shown(theta + steps[i]) - shown(theta)) / 1e-6 for i in indices]]
+
+    run.opened = SimpleNamespace(count=1)
+    problem = SimpleNamespace(
+        measured=shown(truth), errors=errors, nuisances=tuple(SimpleNamespace(column=None) for _ in range(2))
+    )
+    linear = Linear(problem.measured, np.zeros(2), np.column_stack([along, np.zeros(40)]), np.ones(2))
+    fit = fitted(run, problem, Start((), (np.zeros(2),), linear.jacobian), linear)
+    assert fit.linear.theta == pytest.approx(truth, abs=0.01)
+
+
 def predicts(shown, slopes=None):
     """Predictions and derivatives of a model of numbers alone."""
 
