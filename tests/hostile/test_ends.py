@@ -143,7 +143,11 @@ def ends(monkeypatch):
         monkeypatch.undo()
         return end.value.code, told(errors)
 
-    return run
+    kinds = (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)
+    former = {kind: signal.getsignal(kind) for kind in kinds}
+    yield run
+    for kind, handler in former.items():  # a command that has ended ignores them, and so would what is begun later
+        signal.signal(kind, handler)
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "cp932", "cp437"])
