@@ -295,11 +295,15 @@ def test_what_a_leader_rose_by_is_allowed_to_rivals_of_as_many_faults(labels, es
     assert tried._promising(proposal, tried._leader()) == fitted
 
 
-@pytest.mark.parametrize(("estimate", "kept"), [(1.0, "plain"), (-1.0, "coarse")])
-def test_a_start_that_would_lead_takes_the_place_of_a_coarse_one_though_nothing_is_tenable(estimate, kept):
+@pytest.mark.parametrize(
+    ("estimate", "scale", "kept"),
+    [(1.0, 0.1, "plain"), (-1.0, 0.1, "coarse"), (1.0, 2.0, "coarse")],  # the last: no fit is past the jumps yet
+)
+def test_a_start_that_would_lead_takes_the_place_of_a_coarse_one_though_nothing_is_tenable(estimate, scale, kept):
     tried = stub_search(total=0.0, estimate=0.0)
     tried._leader = lambda: None
     tried.fits = {frozenset("ab"): stub_fit(0.0, frozenset("ab"))}
+    tried.fits[frozenset("ab")].posterior.scale = scale
     labels = frozenset("a")
     coarse = SimpleNamespace(labels=labels, coarse=True, estimate=50.0)
     plain = SimpleNamespace(labels=labels, coarse=False, estimate=estimate)

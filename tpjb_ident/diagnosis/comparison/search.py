@@ -393,7 +393,7 @@ class _Search:
         else:
             better = fit is None or proposal.estimate > self._log_probability(fit) + Deciding.better
         if known is not None and known.coarse and not proposal.coarse:  # a start that would lead is past the jumps
-            best = self._leader() or self._best_of_all
+            best = self._leader() or (self._best_of_all if self._passed else None)
             better &= best is not None and proposal.estimate > self._log_probability(best)
         elif known is not None:
             better &= (known.coarse, known.estimate) < (proposal.coarse, proposal.estimate)
