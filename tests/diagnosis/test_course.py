@@ -193,11 +193,11 @@ def test_a_number_that_does_nothing_at_the_start_is_asked_again_where_its_effect
         return [[(shown(theta + steps[i]) - shown(theta)) / 1e-6 for i in indices]]
 
     run.opened = SimpleNamespace(count=1)
-    problem = SimpleNamespace(
-        measured=shown(truth), errors=errors, nuisances=tuple(SimpleNamespace(column=None) for _ in range(2))
-    )
+    problem = SimpleNamespace(measured=shown(truth), errors=errors, nuisances=())
+    prior = np.array([[0.0, 0.0], [1.0, 1.0], [-9.0, -9.0], [9.0, 9.0]])
+    fault = SimpleNamespace(name="x", own=-1, prior=prior, width=prior[1])
     linear = Linear(problem.measured, np.zeros(2), np.column_stack([along, np.zeros(40)]), np.ones(2))
-    fit = fitted(run, problem, Start((), (np.zeros(2),), linear.jacobian), linear)
+    fit = fitted(run, problem, Start((fault,), (np.zeros(2),), linear.jacobian), linear)
     assert fit.linear.theta == pytest.approx(truth, abs=0.01)
 
 

@@ -87,8 +87,7 @@ def find_period(clean: Samples, band: tuple[float, float], lines: tuple[Line, ..
     pairs = (rows * window, rows * window), (rows**2, window[None] ** 2)
     alike, power = (_correlation(*pair, finer) for pair in pairs)
     part = alike[::finer][first : n // _MIN_PERIODS + 1]
-    tops = local_maxima(part)
-    lags = tops[part[tops] >= 0.0] + first
+    lags = local_maxima(part, 0.0) + first
     if not len(lags):
         return None
     periods, remainder = _combed((alike, power), lags, clean.rate / band[1], finer)

@@ -210,8 +210,7 @@ def _peaks(record: WholeRecord, columns: list[int], lines: FloatArray, smallest:
     amplitude = np.linalg.norm(hann_amplitude(record.spectrum[:, columns]), axis=1)
     step = 1 / record.duration
     least = np.maximum(_PROMINENCE * noise_floor(amplitude), smallest)
-    tops = local_maxima(amplitude)
-    tops = tops[amplitude[tops] >= least[tops]]
+    tops = local_maxima(amplitude, least)
     tops = tops[np.abs(tops[:, None] * step - [0.0, *lines]).min(axis=1) >= _LOBE * step]
     peaks = [float(i * step + step * vertex(amplitude[i - 1 : i + 2])) for i in tops]
     faint = record.lines.faint
@@ -220,9 +219,10 @@ def _peaks(record: WholeRecord, columns: list[int], lines: FloatArray, smallest:
     return peaks + [line.frequency for line, size, limit in zip(faint, sizes, least[at]) if size > limit]
 
 
-def local_maxima(values: FloatArray) -> IntArray:
-    """Where values are larger than both neighbours, (m,): `scipy.signal` takes longer to import than a run to read."""
-    return 1 + np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] > values[2:]))
+def local_maxima(values: FloatArray, least: FloatArray | float = -np.inf) -> IntArray:
+    """Where values of a least size top their neighbours, (m,): `scipy.signal` takes longer to import than this."""
+    is_top = (values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])
+    return 1 + np.flatnonzero(is_top & (values >= least)[1:-1])
 
 
 def vertex(three: FloatArray) -> float:

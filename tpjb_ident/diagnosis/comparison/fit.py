@@ -195,7 +195,7 @@ def fitted(run: Map, problem: Problem, start: Start, linear: Linear) -> Fit:
     unknowns = Unknowns(problem, start.faults)
     fit = _settled(run, unknowns, _past_jumps(run, unknowns, linear) if start.coarse else linear)
     # a direction beside its grid does nothing where nothing is there yet, and its derivative there says so
-    idle = np.flatnonzero(~fit.linear.jacobian.any(axis=0)).tolist()
+    idle = [i for i in unknowns.of_faults if not fit.linear.jacobian[:, i].any()]
     return _settled(run, unknowns, _renewed(run, unknowns, fit.linear, idle)) if idle else fit
 
 
@@ -204,7 +204,7 @@ def _past_jumps(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
     held, coarse = unknowns.width.copy(), unknowns.problem.errors.coarse
     held[unknowns.tolerances] = Deciding.held
     # those from before the jump say nothing behind it; of tolerances that are held little is asked
-    linear = _renewed(run, unknowns, linear, [i for at in unknowns.slices for i in range(at.start, at.stop)])
+    linear = _renewed(run, unknowns, linear, unknowns.of_faults)
     linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
     return _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
 
@@ -234,9 +234,7 @@ def _foretells(run: Map, fit: Fit) -> bool:
     draw = np.random.default_rng(0).standard_normal(len(linear.theta))
     room = np.minimum(linear.theta - unknowns.low, unknowns.high - linear.theta)
     step = np.clip(np.linalg.cholesky(fit.posterior.covariance) @ draw, -room, room)
-    step[unknowns.is_reading] = 0.0  # these are linear
-    ends = [(unknowns.faults, linear.theta + step), (unknowns.faults, linear.theta - step)]
-    ahead, back = run(prediction, ends)
+    ahead, back = run(prediction, [(unknowns.faults, linear.theta + end) for end in (step, -step)])
     if ahead is None or back is None:
         return False
     surprise = unknowns.problem.errors.white(0.5 * (ahead - back) - linear.jacobian @ step, fit.posterior.leading)

@@ -168,7 +168,7 @@ class _Search:
         From the baseline they say little of what a second fault does beside a large one.
         """
         best = self._best_of_all
-        if best is not None and len(best.faults) == 1 and best.labels not in self.moved:
+        if best and len(best.faults) == 1 and best.labels not in self.moved:
             self.moved.add(best.labels)
             # tolerances have derivatives there
             sizes = [0.0 if path.fault.own >= 0 else float(path.fault.width[0]) for path in self.paths]

@@ -41,6 +41,8 @@ class Unknowns:
             start += count if fault.own < 0 else 0
             self.slices.append(slice(first, first + count))
             priors[:, self.slices[-1]] = fault.prior
+        #: where the faults' numbers are
+        self.of_faults = [i for at in self.slices for i in range(at.start, at.stop)]
         self.origin, self.width, self.low, self.high = priors
         stated = np.delete(np.arange(plain.shape[1]), [fault.own for fault in faults if fault.own >= 0])
         #: (t,): where tolerances with their stated prior are

@@ -126,9 +126,8 @@ def parameters_of(fit: Fit, index: int) -> dict[str, Estimate]:
         return np.array([values[parameter.name] for parameter in free])
 
     value, steps = sizes(amplitudes), 1.96 * np.diag(fit.errors[index])
-    ends = np.array([[sizes(amplitudes - step), sizes(amplitudes + step)] for step in steps])
     with np.errstate(invalid="ignore"):  # what does not give is infinitely stiff
-        ends = ends - value
+        ends = np.array([[sizes(amplitudes - step), sizes(amplitudes + step)] for step in steps]) - value
     below, above = (np.linalg.norm(end, axis=0) for end in (ends.min(axis=1), ends.max(axis=1)))
     rows = zip(free, value.tolist(), (value - below).tolist(), (value + above).tolist(), strict=True)
     out = {parameter.name: Estimate(size, low, high, parameter.unit) for parameter, size, low, high in rows}

@@ -88,15 +88,13 @@ def held_out_gap(run: Map, fit: Fit) -> HeldOut:
         return HeldOut(fit, None)
     there, known = _without_terms(fit, theta)
     whole, changes = _acting(run, fit, there, known)
-    if (
-        whole is not None and not changes
-    ):  # without a fault there is no equilibrium there: as all acts where it is stated
+    if whole is not None and known and not changes:
+        # without a fault there is no equilibrium there: what each does where all tolerances are as stated
         _, changes = _acting(run, fit, _neutral(there, fit.unknowns.tolerances), known)
-    touched = []
-    if whole is not None and changes:
-        touched = [
-            _touched(fit, there, fault, (whole, change)) for (fault, _), change in zip(known, changes, strict=True)
-        ]
+    if whole is None or not changes:
+        return HeldOut(fit, stated)
+    pairs = zip(known, changes, strict=True)
+    touched = [_touched(fit, there, fault, (whole, change)) for (fault, _), change in pairs]
     return HeldOut(fit, stated, tuple(sorted(touched, key=lambda one: -one.remaining)))
 
 
