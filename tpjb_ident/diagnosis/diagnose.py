@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +21,9 @@ from tpjb_ident.diagnosis.comparison.unknowns import derivatives
 from tpjb_ident.diagnosis.forward.candidates import candidates
 from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.forward.nuisance import nuisances
+from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map, workers
-from tpjb_ident.diagnosis.next_test import Separation, options_for, ranked, say, separated, suggested
+from tpjb_ident.diagnosis.next_test import Check, Design, Separation, options_for, ranked, say, separated, suggested
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Observations, Where
 from tpjb_ident.diagnosis.verdict.decide import Decision, decide
@@ -98,9 +100,16 @@ def _next_test(run: Map, decision: Decision, comparison: Comparison, setup: Setu
     if not rivals:
         return ""
     others = [fit.effects for fit in rivals]
-    options = options_for(setup, model.problem.observations.layout)
-    tried = run(_separated, [(setup, option, model.effects, others, settings.tolerances) for option in options])
-    tests = ranked([separation for separation in tried if separation is not None])
+
+    def asked(options: Sequence[Design | Check], *tolerances: Tolerances) -> list[Separation]:
+        tried = run(_separated, [(setup, option, model.effects, others, *tolerances) for option in options])
+        return ranked([separation for separation in tried if separation is not None])
+
+    # tolerances blur what a test separates, and cost most of its predictions: asked where a test could still be best
+    most = asked(options_for(setup, model.problem.observations.layout))
+    tests = asked([test.design for test in most[:1]], settings.tolerances)
+    least = tests[0].expected if tests and tests[0].expected >= Deciding.enough else 0.0
+    tests = ranked([*tests, *asked([test.design for test in most[1:] if test.expected > least], settings.tolerances)])
     if not tests:
         return ""
     text = say(suggested(tests), model.label, *(fit.label for fit in rivals))

@@ -209,9 +209,13 @@ def options_for(setup: Setup, layout: Layout) -> tuple[Design | Check, ...]:
 
 
 def separated(
-    setup: Setup, design: Design | Check, first: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Tolerances
+    setup: Setup,
+    design: Design | Check,
+    first: Sequence[Effect],
+    rivals: Sequence[Sequence[Effect]],
+    known: Tolerances | None = None,
 ) -> Separation | None:
-    """What one design would show; None where it cannot be, or the model refuses."""
+    """What one design would show, no less without tolerances; None where it cannot be, or the model refuses."""
     if isinstance(design, Check):
         return Separation(design, tuple(design.separation(first, rival) for rival in rivals))
     if not design.fits(first, *rivals):
@@ -221,7 +225,7 @@ def separated(
         planned = design.planned(setup)
         forward = design.forward(setup, planned)
         prediction = forward(acting)
-        columns = at_baseline(forward, acting, setup, known, prediction)
+        columns = at_baseline(forward, acting, setup, known, prediction) if known else prediction[:, None][:, :0]
         others = [forward(design.acting(rival)) for rival in rivals]
     except (ValueError, NoEquilibriumError):
         return None
@@ -229,9 +233,9 @@ def separated(
     return Separation(design, tuple(np.linalg.norm(white, axis=0).tolist()))
 
 
-def ranked(tests: Sequence[Separation]) -> tuple[Separation, ...]:
+def ranked(tests: Sequence[Separation]) -> list[Separation]:
     """The furthest from the nearest rival first."""
-    return tuple(sorted(tests, key=lambda s: -s.expected))
+    return sorted(tests, key=lambda s: -s.expected)
 
 
 def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:
