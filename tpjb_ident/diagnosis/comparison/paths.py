@@ -74,7 +74,7 @@ class Path:
 
 
 def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
-    """Lay the path of every fault to a typical size on one side; a tolerance's own number is known from its column.
+    """Lay the path of every fault to a typical size on one side; one pad's or sensor's own number is known straight.
 
     Those without an equilibrium anywhere are left out.
     """
@@ -82,10 +82,17 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
     curved = [f for f in problem.faults if len(f.width) == 1 and f.name not in SLOW]
     straight = [f for f in problem.faults if f not in curved]
     columns = problem.scaled(problem.columns)
-    paths = [path_through(f, [(1.0, columns[:, f.own])]) for f in curved if f.own >= 0]
-    points = [Path(f, columns[:, :0], np.zeros(1)) for f in curved if f.own < 0]
-    first_sizes = [_NEAR * float(point.fault.width[0]) for point in points]
-    paths += [path for path in lengthened(run, ((), stated), points, first_sizes, 1) if path.columns.size]
+    towards = np.sign(columns.T @ (problem.measured - problem.scaled(problem.base)))
+    begun, sizes = [], []
+    for fault in curved:
+        path, side = Path(fault, columns[:, :0], np.zeros(1)), 1.0
+        if fault.own >= 0:
+            path = path_through(fault, [(1.0, columns[:, fault.own])])
+            # what a number of the whole bearing does bends, and straight on it misleads
+            side = 0.0 if problem.nuisances[fault.own].place else float(towards[fault.own])
+        begun.append(path)
+        sizes.append(side * _NEAR * float(fault.width[0]))
+    paths = [path for path in lengthened(run, ((), stated), begun, sizes, 1) if path.columns.size]
     jobs = [((f,), np.append(np.zeros(len(f.width)), stated), tuple(range(len(f.width)))) for f in straight]
     for fault, found in zip(straight, run(derivatives, jobs), strict=True):
         whole = [column for column in found if column is not None]

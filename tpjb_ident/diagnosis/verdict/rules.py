@@ -108,7 +108,7 @@ def _named(held: HeldOut, drift: Sequence[Drift]) -> Judgement:
         reason = f"the size of {drift[0].effect} {drift[0].words}, so its name is not the whole story"
     if terms:
         reason = f"{_shrunk(held)}; beside it stands a term that no effect of the library stands for"
-    partly = held.remaining(held.free) <= Deciding.rest
+    partly = held.earns_all and held.remaining(held.free) <= Deciding.rest
     return Judgement("partly-explained" if partly else "unexplained", held, (reason,))
 
 
