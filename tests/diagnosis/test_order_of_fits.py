@@ -9,7 +9,7 @@ from model.effects import Effect, known_effects
 from tests.diagnosis.rocker_case import noisy, rocker_setup, whole_layout
 from tpjb_ident.diagnosis.comparison import search
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, posterior
-from tpjb_ident.diagnosis.comparison.paths import Path
+from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths
 from tpjb_ident.diagnosis.comparison.scores import Strain, scores
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import diagnose, pose
@@ -106,6 +106,16 @@ def fits_of(campaign, promising=search._Search._promising, **changed):
 @pytest.fixture(scope="module")
 def usual(campaign):
     return fits_of(campaign)
+
+
+@pytest.mark.slow
+def test_a_number_of_the_whole_bearing_is_followed_as_it_bends_towards_the_gap(campaign):
+    forward, problem = campaign
+    with workers(forward, problem, 1) as run:
+        (oil,) = (path for path in lay_paths(run, problem) if path.fault.label == "oil_viscosity")
+    near, straight_on = oil.weights(np.array([[oil.nodes.min()], [1.0]])) @ oil.columns.T
+    assert oil.nodes.min() < -1.5  # thinner, and not thicker
+    assert np.linalg.norm(near - straight_on * oil.nodes.min()) > 0.02 * np.linalg.norm(near)
 
 
 @pytest.mark.slow  # seconds: the bearing model itself

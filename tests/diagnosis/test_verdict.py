@@ -11,7 +11,7 @@ from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
 from tpjb_ident.diagnosis.verdict.decide import parameters_of
 from tpjb_ident.diagnosis.verdict.held_out import HeldOut, Touched, held_out_gap
-from tpjb_ident.diagnosis.verdict.rules import look_alikes
+from tpjb_ident.diagnosis.verdict.rules import _named, look_alikes
 
 
 def fit(values, amplitudes, errors, names, basis=()):
@@ -90,13 +90,34 @@ def test_each_effect_halves_the_gap_along_what_it_moves(after, along, shrunk):
     assert HeldOut(held.fit, np.full(2, after), tuple(touched)).is_shrunk == shrunk
 
 
-def bent_case(contradicted):
-    """A fit of one effect beside a tolerance 1.5 deviations out, which bends along what the effect moves."""
+@pytest.mark.parametrize(
+    ("along", "verdict"),
+    [
+        (((8.0, 0.5), (4.0, 3.0)), "partly-explained"),
+        (((8.0, 0.5), (4.0, 4.1)), "unexplained"),  # by the second the gap grows
+        ((), "unexplained"),
+    ],
+)
+def test_an_effect_by_which_the_gap_grows_is_no_part_of_a_story(along, verdict):
+    held = held_out(5.0)
+    held.fit.has_terms = False
+    touched = sorted((Touched("x", *ends, True) for ends in along), key=lambda one: -one.remaining)
+    held = HeldOut(held.fit, np.full(2, 2.0), tuple(touched))
+    vars(held)["free"] = 0.3  # with tolerances free all of it is closed
+    assert _named(held, ()).name == verdict
+
+
+def bent_case(contradicted, jump=0.0):
+    """A fit of one effect beside a tolerance 1.5 deviations out, which bends along what the effect moves.
+
+    Just short of that place K and C jump.
+    """
     effect, tolerance = np.random.default_rng(4).normal(size=(2, 12))
     held, there = np.arange(12) >= 4, np.array([1.0, 1.5])
 
     def solved(theta):
-        return effect * theta[0] + tolerance * theta[1] + 0.4 * effect * theta[1] ** 2
+        smooth = effect * theta[0] + tolerance * theta[1] + 0.4 * effect * theta[1] ** 2
+        return smooth + jump * (theta[1] < 1.5)
 
     measured = solved(there) + 2.0 * contradicted * held * effect
     elements = tuple(Element("h", "kxx", (("load", float(k)),)) for k in range(12))
@@ -122,6 +143,11 @@ def test_how_a_tolerance_bends_is_no_gap_of_an_effect(contradicted):
     (touched,) = held_out_gap(run, fit).touched
     assert touched.unseen
     assert (touched.remaining > Deciding.halved**2) == contradicted
+
+
+def test_a_jump_of_k_and_c_beside_the_fit_is_no_gap_of_an_effect():
+    (expected,), (touched,) = (held_out_gap(run, fit).touched for fit, run in (bent_case(False), bent_case(False, 1.0)))
+    assert (touched.before, touched.after) == pytest.approx((expected.before, expected.after))
 
 
 def test_a_fault_without_which_there_is_no_equilibrium_acts_as_where_all_is_stated():
