@@ -6,11 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, posterior
+from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
 from tpjb_ident.diagnosis.verdict.decide import parameters_of
 from tpjb_ident.diagnosis.verdict.held_out import HeldOut, Touched, held_out_gap
+from tpjb_ident.diagnosis.verdict.interval import errors_each_way
 from tpjb_ident.diagnosis.verdict.rules import _named, look_alikes
 
 
@@ -158,6 +161,58 @@ def test_a_fault_without_which_there_is_no_equilibrium_acts_as_where_all_is_stat
 
     (expected,), (touched,) = held_out_gap(solved, fit).touched, held_out_gap(run, fit).touched
     assert (touched.before, touched.after) == pytest.approx((expected.before, expected.after))
+
+
+def kinked_case(slope):
+    """A fit of one effect whose work grows by another slope on either side of a place near the fit."""
+    effect, tolerance = np.random.default_rng(4).normal(size=(2, 12))
+    there = np.array([1.0, 0.0])
+
+    def solved(theta):
+        return effect * (1.0 + slope * (theta[0] - 1.0)) + tolerance * theta[1]
+
+    noise, prior = 0.0025 * np.eye(12), np.array([[0.0], [9.0], [-9.0], [9.0]])
+    nuisance = SimpleNamespace(column=None)
+    errors = ErrorModel(noise, 1e-9 * np.eye(12), np.array([1.0]))
+    problem = SimpleNamespace(measured=solved(there), sigma=np.ones(12), nuisances=(nuisance,), errors=errors)
+    fault = SimpleNamespace(name="x", label="x", own=-1, is_term=False, width=prior[1], prior=prior)
+    unknowns = Unknowns(problem, (fault,))
+    linear = Linear(np.zeros(12), there, np.column_stack([effect, tolerance]), unknowns.width)
+    return Fit(unknowns, linear, posterior(errors, linear)), lambda task, jobs: [solved(theta) for _, theta in jobs]
+
+
+@pytest.mark.parametrize(
+    ("slope", "times"),
+    [
+        (1.0, 1.0),
+        (0.4, 2.5),  # beside the fit the effect does less than its derivative says: its size is less sure
+        (0.1, 4.0),  # no more than that is asked for
+        (2.0, 1.0),  # no nearer than derivatives say
+    ],
+)
+def test_an_interval_ends_where_the_profile_does_and_no_nearer_than_derivatives_say(slope, times):
+    fit, run = kinked_case(slope)
+    ((below, above),) = errors_each_way(run, fit)
+    assert below / fit.errors[0] == pytest.approx(times, rel=0.01)
+    assert above / fit.errors[0] == pytest.approx(times, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("answer", "times"),
+    [
+        (lambda y, far: None if far else y, 1.0),  # no equilibrium: the interval is that of derivatives
+        (lambda y, far: y if far else y + 1.0, 2.5),  # a rise on the way is no end
+    ],
+)
+def test_an_interval_beyond_what_is_solved_or_jumps(answer, times):
+    fit, run = kinked_case(0.4)
+    limit = 1.5 * 1.96 * fit.errors[0][0]
+
+    def changed(task, jobs):
+        return [answer(y, abs(theta[0] - 1.0) > limit) for (_, theta), y in zip(jobs, run(task, jobs), strict=True)]
+
+    ((below, above),) = errors_each_way(changed, fit)
+    assert [*below / fit.errors[0], *above / fit.errors[0]] == pytest.approx([times, times], rel=0.01)
 
 
 def test_a_group_of_look_alikes_begins_with_the_effect_that_is_listed():

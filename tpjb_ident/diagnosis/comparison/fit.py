@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -241,6 +242,33 @@ def _foretells(run: Map, fit: Fit) -> bool:
     return float(surprise @ surprise) < Deciding.surprise
 
 
+def rise(run: Map, fit: Fit, index: int, deviations: float) -> float:
+    """Rise of chi-square where a number is held off by some of its deviations and all others are fitted anew.
+
+    Infinite out of bounds or without an equilibrium.
+    """
+    unknowns, linear, covariance = Unknowns(fit.problem, fit.faults), fit.linear, fit.posterior.covariance
+    place = fit.posterior.mean + deviations * covariance[:, index] / math.sqrt(covariance[index, index])
+    if not unknowns.low[index] <= place[index] <= unknowns.high[index]:
+        return math.inf
+    unknowns.low[index] = unknowns.high[index] = place[index]
+    held = linear.jacobian.copy()
+    held[:, index] = 0.0
+    place = np.clip(place, unknowns.low, unknowns.high)
+    (predicted,) = run(prediction, [(fit.faults, place)])
+    if predicted is None:
+        return math.inf
+    start = replace(linear, theta=place, residual=fit.problem.measured - predicted, jacobian=held)
+    errors, scale = fit.problem.errors, fit.posterior.leading
+    moved = _stepped(run, unknowns, start, errors)
+    return max(_chi_square(errors, moved, scale) - _chi_square(errors, linear, scale), 0.0)
+
+
+def _chi_square(errors: ErrorModel, at: Linear, scale: int) -> float:
+    white = errors.white(at.residual, scale)
+    return float(white @ white + np.sum((at.theta / at.width) ** 2))
+
+
 def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:
     moved = _stepped(run, unknowns, linear, unknowns.problem.errors)
     return Fit(unknowns, moved, posterior(unknowns.problem.errors, moved))
@@ -279,8 +307,7 @@ def _stepped(run: Map, unknowns: Unknowns, linear: Linear, errors: ErrorModel) -
             return linear
 
         def cost(at: Linear, scale: int = state.leading) -> float:
-            white = errors.white(at.residual, scale)
-            return float(white @ white + np.sum((at.theta / at.width) ** 2))
+            return _chi_square(errors, at, scale)
 
         moved = _step(run, unknowns, linear, target, cost)
         if moved is None:

@@ -19,6 +19,7 @@ from tpjb_ident.diagnosis.observations.gap import contradictions, gap, gap_by_ob
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.verdict.behaviour import behaviours
 from tpjb_ident.diagnosis.verdict.held_out import as_stated, free_gap, free_prediction
+from tpjb_ident.diagnosis.verdict.interval import errors_each_way
 from tpjb_ident.diagnosis.verdict.rules import Judgement, judge
 from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
 
@@ -62,7 +63,7 @@ def decide(run: Map, problem: Problem, comparison: Comparison, known: Tolerances
     observations, rows = problem.observations, problem.held
     judgement = judge(run, comparison)
     held, model = judgement.held, judgement.held.fit
-    effects = _effects(comparison, judgement) if judgement.has_effects else ()
+    effects = _effects(run, comparison, judgement) if judgement.has_effects else ()
     after = unseen = problem.base
     if effects and held.stated is not None:
         unseen, exact = held.stated, as_stated(run, model, model.posterior.mean)
@@ -102,32 +103,33 @@ def decide(run: Map, problem: Problem, comparison: Comparison, known: Tolerances
     return Decision(verdict, model, after)
 
 
-def _effects(comparison: Comparison, judgement: Judgement) -> tuple[FoundEffect, ...]:
+def _effects(run: Map, comparison: Comparison, judgement: Judgement) -> tuple[FoundEffect, ...]:
     """The effects of the model, the largest change of the prediction first."""
     fit, shares = judgement.held.fit, comparison.shares
-    rows = []
+    rows, errors = [], errors_each_way(run, fit)
     for index, (fault, at) in enumerate(zip(fit.faults, fit.unknowns.slices, strict=True)):
         if fault.is_term:
             continue
-        parameters = parameters_of(fit, index)
+        parameters = parameters_of(fit, index, errors[index])
         change = float(np.linalg.norm(fit.linear.jacobian[:, at] @ fit.linear.theta[at]))
         words = _stands_in(fault, parameters[fault.candidate.parameter.name])
         rows.append((change, FoundEffect(fault.name, parameters, words, round(shares[fault.name], 4))))
     return tuple(effect for _, effect in sorted(rows, key=lambda row: -row[0]))
 
 
-def parameters_of(fit: Fit, index: int) -> dict[str, Estimate]:
-    """Parameters of one fault of a fit with their 95 % intervals."""
+def parameters_of(fit: Fit, index: int, each_way: FloatArray | None = None) -> dict[str, Estimate]:
+    """Parameters of one fault of a fit with their 95 % intervals, by errors below and above (2, k)."""
     fault, amplitudes = fit.faults[index], fit.amplitudes[index]
+    below, above = 1.96 * np.broadcast_to(fit.errors[index] if each_way is None else each_way, (2, len(amplitudes)))
     free = fault.candidate.free
 
     def sizes(at: FloatArray) -> FloatArray:
         values = fault.values(at)
         return np.array([values[parameter.name] for parameter in free])
 
-    value, steps = sizes(amplitudes), 1.96 * np.diag(fit.errors[index])
+    value, steps = sizes(amplitudes), zip(np.diag(below), np.diag(above), strict=True)
     with np.errstate(invalid="ignore"):  # what does not give is infinitely stiff
-        ends = np.array([[sizes(amplitudes - step), sizes(amplitudes + step)] for step in steps]) - value
+        ends = np.array([[sizes(amplitudes - low), sizes(amplitudes + high)] for low, high in steps]) - value
     below, above = (np.linalg.norm(end, axis=0) for end in (ends.min(axis=1), ends.max(axis=1)))
     rows = zip(free, value.tolist(), (value - below).tolist(), (value + above).tolist(), strict=True)
     out = {parameter.name: Estimate(size, low, high, parameter.unit) for parameter, size, low, high in rows}
