@@ -65,6 +65,7 @@ def verdict_sentences(
             checks=dict.fromkeys(word.check for word in words if word is not None),
             worse=worse,
             beyond=[a for a in verdict.assumptions if abs(a.deviation) > Deciding.visible],
+            farthest=max(verdict.assumptions, key=lambda a: abs(a.deviation), default=None),
         )
     )
     return text.splitlines()
