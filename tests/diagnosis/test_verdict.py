@@ -11,6 +11,7 @@ from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
+from tpjb_ident.diagnosis.verdict.behaviour import _words
 from tpjb_ident.diagnosis.verdict.decide import parameters_of
 from tpjb_ident.diagnosis.verdict.held_out import HeldOut, Touched, held_out_gap
 from tpjb_ident.diagnosis.verdict.interval import errors_each_way
@@ -213,6 +214,20 @@ def test_an_interval_beyond_what_is_solved_or_jumps(answer, times):
 
     ((below, above),) = errors_each_way(changed, fit)
     assert [*below / fit.errors[0], *above / fit.errors[0]] == pytest.approx([times, times], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("ends", "words"),
+    [
+        ([-2e-6, 0.0], "changes from -2e-06 to 0"),  # at its bound
+        ([0.0, 1.0], "changes from 0 to 1"),
+        ([-1.0, 1.0], "changes from -1 to 1"),
+        ([1.0, 2.0], "grows in proportion"),
+        ([-4.0, -1.0], "falls"),
+    ],
+)
+def test_a_drift_has_words_whatever_its_ends(ends, words):
+    assert _words(ends, [1000.0, 2000.0], "static_load").startswith(words)
 
 
 def test_a_group_of_look_alikes_begins_with_the_effect_that_is_listed():
