@@ -222,6 +222,7 @@ def test_an_interval_beyond_what_is_solved_or_jumps(answer, times):
         ([-2e-6, 0.0], "changes from -2e-06 to 0"),  # at its bound
         ([0.0, 1.0], "changes from 0 to 1"),
         ([-1.0, 1.0], "changes from -1 to 1"),
+        ([math.inf, 1e9], "changes from inf to 1e+09"),  # a spring that gives at one end alone
         ([1.0, 2.0], "grows in proportion"),
         ([-4.0, -1.0], "falls"),
     ],

@@ -159,7 +159,7 @@ def _over(fit: Fit, fault: Fault, index: int, row: tuple[str, str, int]) -> tupl
 
 def _words(ends: list[float], known: list[float], over: str) -> str:
     spoken = over.replace("_", " ")
-    if ends[0] * ends[1] <= 0.0:
+    if not 0.0 < ends[0] * ends[1] < math.inf:
         return f"changes from {ends[0]:.3g} to {ends[1]:.3g} over the {spoken}"
     power = math.log(ends[1] / ends[0]) / math.log(known[-1] / known[0])
     if 0.8 < power < 1.2:
