@@ -206,7 +206,7 @@ def test_a_text_without_numbers_is_no_record_and_a_folder_without_records_says_w
     with pytest.raises(RigDataError, match="no table of numbers"):
         find_head(RecordFile(tmp_path / "a.txt", "a.txt"))
     (tmp_path / "b.csv").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64))
-    with pytest.raises(RigDataError, match="is not text"):
+    with pytest.raises(RigDataError, match="holds bytes of zero"):
         find_head(RecordFile(tmp_path / "b.csv", "b.csv"))
 
 

@@ -81,7 +81,7 @@ def diagnose(
     >>> others = frozenset(known_effects()) - {"pivot_flexibility", "soft_pivot"}
     >>> result = ti.diagnose(demo, settings=DiagnoseSettings(skip=others))
     >>> print(result.summary().split(" and ")[0])
-    demo: All pivots have 37.6 ± 1.8 % of the formula's stiffness
+    demo: All pivots have 37.6 ± 2.1 % of the formula's stiffness
     """
     opened = as_campaign(campaign, "campaign")
     return diagnose_campaign(opened, _bearing_of(opened, bearing), Baseline(pivots, thermal, tuple(effects)), settings)

@@ -87,16 +87,9 @@ class _HeadFinder:
         self.delimiters = _DELIMITERS if self.spec.delimiter is None else (self.spec.delimiter,)
 
     def _refuse(self, line: int, fault: str, remedy: str) -> RigDataError:
+        if any("\0" in text for text in self.lines):
+            line, fault, remedy = 0, "holds bytes of zero, as no text does", "Name it by its format, such as .h5"
         return self.record.refuse(f"line {line}" if line else "", fault, remedy)
-
-    def _no_table(self, fault: str, remedy: str) -> RigDataError:
-        """What hides the table; a file of another format under a name of text is told as that."""
-        if any("\0" in line for line in self.lines):
-            fault, remedy = (
-                "is not text: it holds bytes of zero",
-                "Name it by its format, such as .h5; or export it again",
-            )
-        return self._refuse(0, fault, remedy)
 
     def find(self) -> Head:
         if not any(map(str.strip, self.lines)):
@@ -137,7 +130,7 @@ class _HeadFinder:
         if best is None:
             names = ", ".join(sorted(self.channels)[:6])
             remedy = "Name the manifest's channels as the columns are named"
-            raise self._no_table(f"no line holds a channel name of the manifest ({names}, ..)", remedy)
+            raise self._refuse(0, f"no line holds a channel name of the manifest ({names}, ..)", remedy)
         stated = self._best(self.delimiters, every_line[line - 1 : line] if line else every_line)
         matched = 0 if stated is None else stated.matched
         if stated is not None and (matched >= best.matched or stated.line != best.line):
@@ -179,7 +172,7 @@ class _HeadFinder:
             if count > width:
                 first, width, best = start, count, delimiter
         if not best:
-            raise self._no_table("no table of numbers begins in its first lines", "Is it a record?")
+            raise self._refuse(0, "no table of numbers begins in its first lines", "Is it a record?")
         if self.spec.names:
             return _NamesLine(first, best, self.spec.names, self.spec.names), first
         header, names = 0, [f"column{i + 1}" for i in range(width)]
