@@ -106,7 +106,7 @@ class _Search:
         leader = self._leader()
         if leader is None or leader.posterior.scale > Deciding.right:
             return None
-        return self._look_alike(leader) or self._passed_over(leader)
+        return self._look_alike(leader)
 
     def _waiting(self) -> list[Start]:
         """Proposals that may change the answer."""
@@ -124,13 +124,6 @@ class _Search:
             if proposal.labels not in self.fits:
                 return proposal
         return None
-
-    def _passed_over(self, leader: Fit) -> Start | None:
-        """A coarse start that others came before: one cause that does it all is likelier than several."""
-        waiting = [p for p in self.proposals.values() if p.coarse and p.labels not in self.fits]
-        if len(leader.faults) < 2 or not waiting:
-            return None
-        return self.proposals.pop(max(waiting, key=lambda p: p.estimate).labels)
 
     def _alike(self, fit: Fit, fault: Fault) -> list[Path]:
         """Paths of effects that a campaign could not tell from a fault at a size that it sees."""
