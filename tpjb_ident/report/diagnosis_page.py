@@ -107,7 +107,7 @@ def place(range_text: str) -> str:
     """A range of operating points in words and in kN, Hz and degrees."""
 
     def kilo(match: re.Match[str]) -> str:
-        ends = [f"{float(end) / size('load'):.6g}" for end in match[1].split("-")]
+        ends = [f"{float(end) / size('load'):.4g}" for end in match[1].split("-")]
         return f"{' to '.join(ends)} {symbol('load')}"
 
     text = re.sub(r"((?:\d+(?:\.\d+)?)(?:-\d+(?:\.\d+)?)?) N\b(?!/| s)", kilo, range_text)
