@@ -9,9 +9,9 @@ from model.effects import Effect, known_effects
 from model.setup import Mesh
 from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, posterior
-from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined, solved_places
+from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import lengthened, path_through
-from tpjb_ident.diagnosis.comparison.search import _Search, compare
+from tpjb_ident.diagnosis.comparison.search import compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, prediction
 from tpjb_ident.diagnosis.diagnose import pose
@@ -133,9 +133,8 @@ def test_a_start_without_an_equilibrium_is_taken_nearer_to_what_is_stated():
     jacobian = np.column_stack([np.zeros(len(planned)), problem.scaled(problem.columns)])
     with workers(forward, problem, 1) as run:
         assert next(iter(run(prediction, [((fault,), theta)]))) is None
-        start = Start((fault,), (theta,), jacobian)
-        ((_, linear),) = solved_places(run, problem, start)
-        fit = fitted(run, problem, start, linear)
+        start = Start((fault,), theta, jacobian)
+        fit = fitted(run, problem, start)
     assert abs(fit.linear.theta[0]) <= np.radians(1.0)
 
 
@@ -151,10 +150,9 @@ def test_a_fit_goes_on_while_its_steps_pay():
         return straight @ theta + bent @ theta**2
 
     problem = SimpleNamespace(measured=shown(truth), errors=errors, nuisances=nuisances)
-    start = Start((), (np.zeros(6),), straight)
+    start = Start((), np.zeros(6), straight)
     run = predicts(shown)
-    ((_, linear),) = solved_places(run, problem, start)
-    fit = fitted(run, problem, start, linear)
+    fit = fitted(run, problem, start)
     assert fit.linear.theta == pytest.approx(truth, abs=0.05)
     assert fit.posterior.refused < 1.0
 
@@ -197,7 +195,7 @@ def test_a_number_that_does_nothing_at_the_start_is_asked_again_where_its_effect
     prior = np.array([[0.0, 0.0], [1.0, 1.0], [-9.0, -9.0], [9.0, 9.0]])
     fault = SimpleNamespace(name="x", own=-1, prior=prior, width=prior[1])
     linear = Linear(problem.measured, np.zeros(2), np.column_stack([along, np.zeros(40)]), np.ones(2))
-    fit = fitted(run, problem, Start((fault,), (np.zeros(2),), linear.jacobian), linear)
+    fit = fitted(run, problem, Start((fault,), np.zeros(2), linear.jacobian))
     assert fit.linear.theta == pytest.approx(truth, abs=0.01)
 
 
@@ -209,25 +207,3 @@ def predicts(shown, slopes=None):
 
     run.opened = SimpleNamespace(count=1)
     return run
-
-
-def test_a_fit_ends_at_the_better_of_where_its_places_lead_whichever_comes_first():
-    """A jump lies between where nothing is off and the truth; no derivative foretells it."""
-    rng = np.random.default_rng(5)
-    straight = rng.normal(size=(40, 3))
-    jump = 2.0 * straight[:, 0] + 0.5 * rng.normal(size=40)  # from before it another size does nearly the same
-    errors = ErrorModel(0.02**2 * np.eye(40), 1e-4 * np.eye(40), np.ones(1))
-    truth = np.array([1.5, -1.0, 0.5])
-
-    def shown(theta):
-        return straight @ theta + jump * (theta[0] < 1.0)
-
-    problem = SimpleNamespace(measured=shown(truth), errors=errors, nuisances=(SimpleNamespace(column=None),) * 3)
-    near, far = truth - 0.1, np.zeros(3)
-    reached = {}
-    for name, places in {"far": (far,), "near": (near,), "both": (near, far), "turned": (far, near)}.items():
-        tried = object.__new__(_Search)
-        tried.run, tried.problem, tried.fits, tried.places = predicts(shown, straight), problem, {}, {}
-        reached[name] = tried._reached(Start((), places, straight)).posterior.total
-    assert reached["far"] < reached["near"] - 1000.0
-    assert reached["both"] == reached["turned"] == reached["near"]

@@ -184,8 +184,8 @@ def test_no_fault_at_all_is_proposed_from_where_a_single_one_leads(monkeypatch):
     )  # fmt: skip
     (nothing,) = proposals
     assert nothing.faults == ()
-    # where all that is left has taken over what it did, by the model that the single one has reached, or before it has
-    np.testing.assert_allclose(nothing.places, [posterior(errors, linear).mean, linear.theta])
+    # where all that is left has taken over what it did, by the model that the single one has reached
+    np.testing.assert_allclose(nothing.place, posterior(errors, linear).mean)
 
 
 @pytest.mark.slow
@@ -210,23 +210,6 @@ def test_a_fault_that_no_derivative_sizes_is_needed_where_it_alone_makes_the_dif
     assert tried._is_tenable(whole)
     whole.on_bound = True
     assert not tried._is_tenable(whole)
-
-
-def test_only_what_a_campaign_could_not_tell_from_a_fault_of_the_leader_is_fitted_in_its_place():
-    errors, linear, columns = linear_case([1.0])
-    rng = np.random.default_rng(5)
-    own = linear.jacobian[:, 2]
-    alike, other = own + 0.1 * rng.normal(size=40), columns[:, 0]
-    labels = {"own": own, "alike": alike, "other": other, "term": own}
-    paths = [straight(column, name) for name, column in labels.items()]
-    for path in paths:
-        path.fault.is_term = path.fault.label == "term"
-    leader = SimpleNamespace(
-        labels=frozenset({"own"}), faults=(paths[0].fault,), linear=linear,
-        unknowns=SimpleNamespace(slices=[slice(2, 3)]), posterior=SimpleNamespace(leading=0),
-    )  # fmt: skip
-    tried = search_with(paths=tuple(paths), problem=SimpleNamespace(errors=errors))
-    assert [path.fault.label for path in tried._alike(leader, paths[0].fault)] == ["alike"]
 
 
 def test_what_tolerances_say_together_is_their_derivatives_beside_a_fit(campaign):
@@ -267,7 +250,7 @@ def test_a_fit_gets_derivatives_of_its_own_near_the_leader(monkeypatch, total, r
     tried = stub_search(total=0.0, estimate=0.0)
     monkeypatch.setattr(search, "fitted", lambda *_: stub_fit(total))
     monkeypatch.setattr(search, "refined", lambda run, fit: asked.append(fit) or fit)
-    tried._led(SimpleNamespace(coarse=False), None)
+    tried._reached(SimpleNamespace(coarse=False))
     assert bool(asked) == renewed
 
 
@@ -290,7 +273,7 @@ def test_after_a_coarse_start_derivatives_are_asked_again_unless_they_were_refus
     tried = stub_search(total=0.0, estimate=0.0)
     monkeypatch.setattr(search, "fitted", lambda *_: stub_fit(total))
     monkeypatch.setattr(search, "refined", refined)
-    tried._led(SimpleNamespace(estimate=-100.0, coarse=True), None)
+    tried._reached(SimpleNamespace(estimate=-100.0, coarse=True))
     assert len(asked) == times
 
 

@@ -18,10 +18,10 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (113.38, 13_552),
     "model": (75.10, 10_146),
-    "rigdata": (59.25, 7_969),
-    "diagnosis": (37.66, 4_620),
+    "rigdata": (59.27, 7_971),
+    "diagnosis": (37.90, 4_660),
     "cli": (22.12, 3_064),
-    "report": (23.11, 3_022),
+    "report": (23.13, 3_022),
     "pivot": (19.27, 2_507),
     "clearance": (10.30, 1_238),
     "compare": (11.92, 1_570),

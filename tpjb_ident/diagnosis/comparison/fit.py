@@ -172,7 +172,7 @@ class Start:
     """An explanation to be fitted, and where its fit begins, on derivatives known from nearby."""
 
     faults: tuple[Fault, ...]
-    places: tuple[FloatArray, ...] = field(repr=False)  #: the best end counts: jumps of K and C may lie between them
+    place: FloatArray = field(repr=False)
     jacobian: FloatArray = field(repr=False)
     coarse: bool = False  #: past jumps of K and C first: every element off by itself, tolerances held
     estimate: float = 0.0  #: log p(y, model) to first order [nats]
@@ -183,21 +183,26 @@ class Start:
         return frozenset(fault.label for fault in self.faults)
 
 
-def solved_places(run: Map, problem: Problem, start: Start) -> list[tuple[float, Linear]]:
-    """A start's places with what they promise, the most first; none: no equilibrium."""
+def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
+    """Fit from a start; None where there is no equilibrium."""
     unknowns = Unknowns(problem, start.faults)
-    solved = [_solved_place(run, unknowns, place, start.jacobian) for place in start.places]
-    places = [(posterior(problem.errors, at).promised, at) for at in solved if at is not None]
-    return sorted(places, key=lambda row: -row[0])
-
-
-def fitted(run: Map, problem: Problem, start: Start, linear: Linear) -> Fit:
-    """Fit from one of a start's places."""
-    unknowns = Unknowns(problem, start.faults)
+    linear = _solved(run, unknowns, start)
+    if linear is None:
+        return None
     fit = _settled(run, unknowns, _past_jumps(run, unknowns, linear) if start.coarse else linear)
     # a direction beside its grid does nothing where nothing is there yet, and its derivative there says so
     idle = [i for i in unknowns.of_faults if not fit.linear.jacobian[:, i].any()]
     return _settled(run, unknowns, _renewed(run, unknowns, fit.linear, idle)) if idle else fit
+
+
+def _solved(run: Map, unknowns: Unknowns, start: Start) -> Linear | None:
+    """The model where a start begins, or nearer to what is stated, where there is no equilibrium."""
+    for share in _SHARES:
+        theta = share * np.clip(start.place, unknowns.low, unknowns.high)
+        (predicted,) = tuple(run(prediction, [(unknowns.faults, theta)]))
+        if predicted is not None:
+            return Linear(unknowns.problem.measured - predicted, theta, start.jacobian, unknowns.width)
+    return None
 
 
 def _past_jumps(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
@@ -208,16 +213,6 @@ def _past_jumps(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
     linear = _renewed(run, unknowns, linear, unknowns.of_faults)
     linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
     return _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
-
-
-def _solved_place(run: Map, unknowns: Unknowns, place: FloatArray, jacobian: FloatArray) -> Linear | None:
-    """The model at a place, or nearer to what is stated, where there is no equilibrium; None where there is none."""
-    for share in _SHARES:
-        theta = share * np.clip(place, unknowns.low, unknowns.high)
-        (predicted,) = tuple(run(prediction, [(unknowns.faults, theta)]))
-        if predicted is not None:
-            return Linear(unknowns.problem.measured - predicted, theta, jacobian, unknowns.width)
-    return None
 
 
 def refined(run: Map, fit: Fit) -> Fit:

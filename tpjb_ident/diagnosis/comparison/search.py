@@ -2,8 +2,6 @@
 
 Scores of one more fault beside a fitted model, and of one less, propose the next explanations. The likeliest proposal
 is fitted, and proposes further ones where it comes near the leader: the same step for the first fault and the third.
-What the campaign hardly tells from a fault of the leader is fitted in its place at last, whatever its score: beside
-others that already do a look-alike's work a score says little.
 """
 
 import functools
@@ -16,10 +14,10 @@ import numpy as np
 from scipy.special import logsumexp
 
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
-from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined, solved_places
+from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
-from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores, separations
+from tpjb_ident.diagnosis.comparison.scores import Score, scores
 from tpjb_ident.diagnosis.comparison.unknowns import SLOW, Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
@@ -78,7 +76,6 @@ class _Search:
         self.proposals: dict[frozenset[str], Start] = {}
         self.begun: dict[frozenset[str], float] = {}  #: estimates of coarse starts that were fitted
         self.paths: tuple[Path, ...] = ()
-        self.exchanged: dict[frozenset[str], list[Start]] = {}  #: look-alikes by the leader that they are held against
         self.moved: set[frozenset[str]] = set()  #: single faults beside which paths were asked
         self.whole = True  #: whether paths are known as far as jumps of K and C ask for
         self.clear = -math.inf  #: coarse estimate from which a start comes before all others [nats]
@@ -86,7 +83,7 @@ class _Search:
 
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
-        self._fit(Start((), (self._stated.theta,), self._stated.jacobian))
+        self._fit(Start((), self._stated.theta, self._stated.jacobian))
         self.report("every effect of the library", 0.1)
         self._propose_singles()
         self._propose_neighbours(self.fits[frozenset()])  # from where its tolerances have gone
@@ -103,48 +100,12 @@ class _Search:
             self._ask_further_paths()
         if promising := self._waiting():
             return self.proposals.pop(max(promising, key=lambda p: (self._comes_first(p), p.estimate)).labels)
-        leader = self._leader()
-        if leader is None or leader.posterior.scale > Deciding.right:
-            return None
-        return self._look_alike(leader)
+        return None
 
     def _waiting(self) -> list[Start]:
         """Proposals that may change the answer."""
         leader = self._leader()
         return [p for p in self.proposals.values() if leader is None or self._promising(p, leader)]
-
-    def _look_alike(self, leader: Fit) -> Start | None:
-        """The leader with a fault exchanged for what the campaign hardly tells from it; None where all were fitted."""
-        if leader.labels not in self.exchanged:
-            pairs = [(fault, path) for fault in leader.faults for path in self._alike(leader, fault)]
-            self.exchanged[leader.labels] = [self._exchange(leader, fault, path) for fault, path in pairs]
-        proposals = self.exchanged[leader.labels]
-        while proposals:
-            proposal = proposals.pop(0)
-            if proposal.labels not in self.fits:
-                return proposal
-        return None
-
-    def _alike(self, fit: Fit, fault: Fault) -> list[Path]:
-        """Paths of effects that a campaign could not tell from a fault at a size that it sees."""
-        at, linear, level = fit.unknowns.slices[fit.faults.index(fault)], fit.linear, fit.posterior.leading
-        beside = np.delete(linear.jacobian * linear.width, at, axis=1)  # everything else that is free
-        whitening = np.linalg.inv(np.linalg.cholesky(self.problem.errors.covariance(level) + beside @ beside.T))
-        own = whitening @ linear.jacobian[:, at]
-        alike = []
-        for path in self.paths:
-            apart = separations(np.hstack([own, whitening @ path.columns]))[: own.shape[1], own.shape[1] :]
-            near = np.nan_to_num(apart, nan=np.inf).min() < Deciding.visible
-            if near and not (path.fault.label in fit.labels or path.fault.is_term):
-                alike.append(path)
-        return alike
-
-    def _exchange(self, fit: Fit, fault: Fault, path: Path) -> Start:
-        """A fit with another fault in the place of one of its own."""
-        faults, linear = self._without(fit, fault)
-        nothing = Strain(np.zeros((0, len(linear.theta))), np.zeros(0))
-        score = scores(self.problem.errors, linear, [path], nothing)[0]
-        return self._with(score, faults, linear)
 
     @property
     def _passed(self) -> bool:
@@ -195,17 +156,10 @@ class _Search:
         return again if again.posterior.total > fit.posterior.total - Deciding.better else fit
 
     def _reached(self, start: Start) -> Fit | None:
-        """Where a start leads, from each of its places that promises clearly more than was reached."""
-        best: Fit | None = None
-        for promise, linear in solved_places(self.run, self.problem, start):
-            if best is None or promise > best.posterior.total + Deciding.better:
-                fit = self._led(start, linear)
-                best = fit if best is None else max(best, fit, key=lambda end: end.posterior.total)
-        return best
-
-    def _led(self, start: Start, linear: Linear) -> Fit:
-        """Where a place leads; steps that fail on derivatives from elsewhere say nothing: what they promise counts."""
-        fit, leader = fitted(self.run, self.problem, start, linear), self._leader()
+        """Where a start leads; steps that fail on derivatives from elsewhere say nothing: what they promise counts."""
+        fit, leader = fitted(self.run, self.problem, start), self._leader()
+        if fit is None:
+            return None
         if start.coarse:  # derivatives from before a jump led here, and say little of what lies behind it
             before, fit = fit, self._renewed(fit)
             if fit is before:  # refused once, they would be refused again
@@ -228,7 +182,7 @@ class _Search:
         # of slow effects a coarse start takes half a minute
         if stopped and fit.faults and proposal.labels not in self.begun and fit.names.isdisjoint(SLOW):
             self.begun[proposal.labels] = -math.inf
-            coarse = self._reached(Start(fit.faults, (fit.linear.theta,), fit.linear.jacobian, coarse=True))
+            coarse = self._reached(Start(fit.faults, fit.linear.theta, fit.linear.jacobian, coarse=True))
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
         known = self.fits.get(proposal.labels)
         if known is not None and known.posterior.total >= fit.posterior.total:
@@ -358,15 +312,14 @@ class _Search:
         jacobian[:, at] = score.path.columns @ score.path.slopes(score.amplitudes[None, :])[0]
         wanted = theta.copy()
         wanted[at] = score.amplitudes  # counted from where nothing happens: what its tolerance had found is in it
-        return Start(faults, (wanted,) if coarse else (wanted, theta), jacobian, coarse, estimate)
+        return Start(faults, wanted, jacobian, coarse, estimate)
 
     def _propose_without(self, fit: Fit, fault: Fault) -> None:
         """Take a fault from a model."""
         faults, linear = self._without(fit, fault)
         state = posterior(self.problem.errors, linear)
         estimate = state.promised - fit.posterior.refused + self._log_prior(faults)
-        # pads may lose or take up load before all others have taken over what it did, or after
-        self._offer(Start(faults, (state.mean, linear.theta), linear.jacobian, estimate=estimate))
+        self._offer(Start(faults, state.mean, linear.jacobian, estimate=estimate))
 
     def _without(self, fit: Fit, fault: Fault) -> tuple[tuple[Fault, ...], Linear]:
         """A model without one of its faults, whose tolerance has its stated prior again and stays where it is."""
