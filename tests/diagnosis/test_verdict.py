@@ -94,6 +94,14 @@ def test_each_effect_halves_the_gap_along_what_it_moves(after, along, shrunk):
     assert HeldOut(held.fit, np.full(2, after), tuple(touched)).is_shrunk == shrunk
 
 
+@pytest.mark.parametrize(("unseen", "shrunk"), [(True, False), (False, True)])
+def test_points_left_out_that_do_not_show_an_effect_do_not_judge_it(unseen, shrunk):
+    held = held_out(2.0)
+    held.fit.problem.held = np.array([True, False])
+    held = HeldOut(held.fit, np.array([2.1, 0.5]), (Touched("x", 8.0, 0.5, unseen),))
+    assert held.is_shrunk == shrunk
+
+
 @pytest.mark.parametrize(
     ("along", "verdict"),
     [

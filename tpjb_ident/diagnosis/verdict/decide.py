@@ -60,9 +60,9 @@ class Decision:
 
 def decide(run: Map, problem: Problem, comparison: Comparison, known: Tolerances) -> Decision:
     """Turn a comparison into a verdict."""
-    observations, rows = problem.observations, problem.held
-    judgement = judge(run, comparison)
+    observations, judgement = problem.observations, judge(run, comparison)
     held, model = judgement.held, judgement.held.fit
+    rows = held.rows
     effects = _effects(run, comparison, judgement) if judgement.has_effects else ()
     after = unseen = problem.base
     if effects and held.stated is not None:
@@ -78,7 +78,7 @@ def decide(run: Map, problem: Problem, comparison: Comparison, known: Tolerances
         next_test="",
         candidates=_ranked(comparison),
         disagreement=localise(observations, problem.base),
-        gap_by_observable=gap_by_observable(observations, problem.base, unseen, rows),
+        gap_by_observable=gap_by_observable(observations, problem.base, unseen, problem.held),
         gap={
             "before": gap(observations, problem.base),
             "after": gap(observations, after),

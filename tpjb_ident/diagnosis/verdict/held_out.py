@@ -36,7 +36,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """An explanation on held-out points."""
+    """An explanation on points left out of the fit, or on all where these do not show it."""
 
     fit: Fit
     #: (n,): its faults alone, every tolerance as stated; None: no equilibrium
@@ -44,23 +44,33 @@ class HeldOut:
     touched: tuple[Touched, ...] = ()  #: by fault, the largest remainder first; none where one has no equilibrium
 
     @property
+    def rows(self) -> BoolArray:
+        """Elements that judge it: those left out, or all where these do not show every fault, (n,)."""
+        held = self.fit.problem.held
+        return held if all(one.unseen for one in self.touched) else np.ones_like(held)
+
+    def gap(self, predicted: FloatArray) -> float:
+        """Gap of a prediction (n,) on them."""
+        return gap(self.fit.problem.observations, predicted, self.rows)
+
+    @property
     def as_stated(self) -> float:
         """Gap with exactly the faults, every tolerance as stated."""
-        return math.inf if self.stated is None else _gap(self.fit, self.stated)
+        return math.inf if self.stated is None else self.gap(self.stated)
 
     @functools.cached_property
     def free(self) -> float:
         """Gap with tolerances where the other points put them."""
-        return free_gap(self.fit)
+        return self.gap(free_prediction(self.fit))
 
     @property
     def before(self) -> float:
         """Gap of the baseline as stated."""
-        return _gap(self.fit, self.fit.problem.base)
+        return self.gap(self.fit.problem.base)
 
     def remaining(self, after: float) -> float:
         """Share of the baseline's squared gap above noise that a gap leaves; none where it leaves noise alone."""
-        return _share(after, self.before, noise_floor(self.fit.problem.observations, self.fit.problem.held))
+        return _share(after, self.before, noise_floor(self.fit.problem.observations, self.rows))
 
     @property
     def along_effects(self) -> dict[str, float]:
@@ -164,7 +174,7 @@ def _covariance(fit: Fit, rows: BoolArray, columns: FloatArray) -> FloatArray:
 
 def free_gap(fit: Fit) -> float:
     """Held-out gap with all numbers where the other points put them, in closed form."""
-    return _gap(fit, free_prediction(fit))
+    return gap(fit.problem.observations, free_prediction(fit), fit.problem.held)
 
 
 def free_prediction(fit: Fit) -> FloatArray:
@@ -172,10 +182,6 @@ def free_prediction(fit: Fit) -> FloatArray:
     problem, linear = fit.problem, fit.linear
     moved = linear.jacobian @ (_from_others(fit) - linear.theta)
     return np.asarray((problem.measured - linear.residual + moved) * problem.sigma)
-
-
-def _gap(fit: Fit, predicted: FloatArray) -> float:
-    return gap(fit.problem.observations, predicted, fit.problem.held)
 
 
 def _from_others(fit: Fit) -> FloatArray:

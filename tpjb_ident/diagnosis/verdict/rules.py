@@ -113,7 +113,8 @@ def _named(held: HeldOut, drift: Sequence[Drift]) -> Judgement:
 
 
 def _shrunk(held: HeldOut) -> str:
-    whole = f"the held-out gap goes from {held.before:.2f} to {held.as_stated:.2f} sigma with all tolerances as stated"
+    name = "gap" if held.rows.all() else "held-out gap"
+    whole = f"the {name} goes from {held.before:.2f} to {held.as_stated:.2f} sigma with all tolerances as stated"
     if not held.touched:
         return whole
     one = held.touched[0]
