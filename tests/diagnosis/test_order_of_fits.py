@@ -12,8 +12,9 @@ from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, posteri
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths
 from tpjb_ident.diagnosis.comparison.scores import Strain, scores
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.comparison.unknowns import path_changes
 from tpjb_ident.diagnosis.diagnose import diagnose, pose
-from tpjb_ident.diagnosis.forward.forward import Forward
+from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError, with_coarse
 from tpjb_ident.diagnosis.forward.nuisance import TOGETHER
 from tpjb_ident.diagnosis.forward.workers import workers
 from tpjb_ident.diagnosis.observations.constants import Deciding
@@ -116,6 +117,31 @@ def test_a_number_of_the_whole_bearing_is_followed_as_it_bends_towards_the_gap(c
     near, straight_on = oil.weights(np.array([[oil.nodes.min()], [1.0]])) @ oil.columns.T
     assert oil.nodes.min() < -1.5  # thinner, and not thicker
     assert np.linalg.norm(near - straight_on * oil.nodes.min()) > 0.02 * np.linalg.norm(near)
+
+
+@pytest.mark.slow
+def test_what_a_fault_changes_is_nearly_the_same_on_a_coarser_mesh(campaign):
+    forward, problem = campaign
+    oil = next(fault for fault in problem.faults if fault.name == "oil_viscosity")
+    place = (), np.zeros(len(problem.nuisances))
+    both = with_coarse(forward)
+    assert both.coarse.setup.mesh != forward.setup.mesh == both.setup.mesh
+    ((_, fine),), ((_, coarse),) = (
+        path_changes(model.fresh(), problem, place, [(oil, [-4.0])], 1)[0] for model in (forward, both)
+    )
+    assert 0.0 < np.linalg.norm(coarse - fine) < 0.03 * np.linalg.norm(fine)
+
+
+def test_a_model_whose_coarser_mesh_has_no_equilibrium_does_without():
+    def refused(self, *asked):
+        raise NoEquilibriumError("none")
+
+    setup = rocker_setup(accuracy=1e-5)
+    planned = planned_observations(setup, whole_layout((2500.0,)))
+    forward = Forward(setup, planned.layout, planned.elements)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Forward, "__call__", refused)
+        assert with_coarse(forward).of_differences is forward
 
 
 @pytest.mark.slow  # seconds: the bearing model itself

@@ -19,7 +19,7 @@ from tpjb_ident.diagnosis.comparison.search import Comparison, Progress, compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import derivatives
 from tpjb_ident.diagnosis.forward.candidates import candidates
-from tpjb_ident.diagnosis.forward.forward import Forward
+from tpjb_ident.diagnosis.forward.forward import Forward, with_coarse
 from tpjb_ident.diagnosis.forward.nuisance import nuisances
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map, workers
@@ -62,7 +62,7 @@ def diagnose(
     """Find the effects that a baseline lacks to describe a campaign."""
     settings = settings or DiagnoseSettings()
     quick = setup.change(accuracy=ACCURACY)
-    forward = Forward(quick, observations.layout, observations.elements)
+    forward = with_coarse(Forward(quick, observations.layout, observations.elements))
     problem = pose(observations, forward, settings)
     with workers(forward, problem, settings.workers) as run:
         comparison = compare(run, problem, progress)
@@ -80,7 +80,7 @@ def pose(observations: Observations, forward: Forward, settings: DiagnoseSetting
     unseen = frozenset() if observations.layout.push_load is not None else frozenset({"clearance_error"})
     pool = candidates(forward.setup, settings.skip | unseen)
     problem = Problem(trusted, base, listed, np.zeros((len(base), len(listed))), pool)
-    with workers(forward, problem, settings.workers) as run:
+    with workers(forward.of_differences, problem, settings.workers) as run:
         jobs = [((), np.zeros(len(listed)), (i,)) for i in range(len(listed))]
         for i, (column,) in enumerate(run(derivatives, jobs)):
             if column is not None:

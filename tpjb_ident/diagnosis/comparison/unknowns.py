@@ -110,7 +110,7 @@ def path_changes(
     forward: Forward, problem: Problem, place: Place, asked: Sequence[tuple[Fault, Sequence[float]]], most: int
 ) -> list[list[tuple[float, FloatArray]]]:
     """Job: changes of the prediction from a place along every fault's first amplitude, at `most` of its nodes."""
-    faults, theta = place
+    (faults, theta), forward = place, forward.of_differences
     base = Unknowns(problem, faults).predict(forward, theta)
     if base is None:
         return [[] for _ in asked]

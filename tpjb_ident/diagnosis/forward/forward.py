@@ -116,6 +116,7 @@ class Forward:
     elements: tuple[Element, ...] = field(repr=False)
     cache: ModelCache = field(default_factory=ModelCache, repr=False)
     last: Change | None = None  #: of a rig that a test itself has changed, after effects and nuisances
+    coarse: Forward | None = field(default=None, repr=False)  #: the same on a coarser mesh, for differences
 
     def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
         """Predict, (n,)."""
@@ -136,7 +137,13 @@ class Forward:
 
     def fresh(self, near: bool = False) -> Forward:
         """Return a copy that knows what this one knows now, whatever this one goes on to solve."""
-        return replace(self, cache=self.cache.copy(near))
+        coarse = None if self.coarse is None else self.coarse.fresh(near)
+        return replace(self, cache=self.cache.copy(near), coarse=coarse)
+
+    @property
+    def of_differences(self) -> Forward:
+        """What tells what a number changes: a mesh's error is in both ends of a difference, and falls out."""
+        return self.coarse or self
 
     @functools.cached_property
     def _drawn(self) -> FloatArray:
@@ -165,6 +172,17 @@ class Forward:
 
     def _solve(self, setup: Setup, test: LocusTest, excitation: Sequence[float] = ()) -> SolvedPoint:
         return self.cache.ask(setup, test.point, tuple(excitation), self._sensors)
+
+
+def with_coarse(forward: Forward) -> Forward:
+    """With the same on a coarser mesh, which has its baseline solved; without where that finds no equilibrium."""
+    setup = forward.setup
+    coarse = replace(forward, setup=setup.change(mesh=setup.mesh.coarser()), cache=ModelCache())
+    try:
+        coarse()
+    except NoEquilibriumError:
+        return forward
+    return replace(forward, coarse=coarse)
 
 
 def _locus(test: LocusTest, reading: SolvedPoint) -> FloatArray:
