@@ -47,6 +47,8 @@ STIFFNESS = Coefficient("k", "stiffness", "N_per_m")  # Re h at the excitation f
 DAMPING = Coefficient("c", "damping", "Ns_per_m")  # Im h / omega there
 MASS = Coefficient("m", "mass", "kg")  # apparent mass of K - omega^2 M
 KINDS = {kind.symbol: kind for kind in (STIFFNESS, DAMPING, MASS)}
+#: Half of a 95 % interval in standard errors.
+HALF_INTERVAL = 1.96
 #: Columns of K and C, row by row.
 COEFFICIENT_COLUMNS = (*STIFFNESS.columns, *DAMPING.columns)
 #: Columns that say which operating point a row is about: static point first.

@@ -14,7 +14,7 @@ from tpjb_ident.diagnosis.comparison.scores import Strain, scores
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import path_changes
 from tpjb_ident.diagnosis.diagnose import diagnose, pose
-from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError, with_coarse
+from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError, with_coarser_mesh
 from tpjb_ident.diagnosis.forward.nuisance import TOGETHER
 from tpjb_ident.diagnosis.forward.workers import workers
 from tpjb_ident.diagnosis.observations.constants import Deciding
@@ -124,8 +124,8 @@ def test_what_a_fault_changes_is_nearly_the_same_on_a_coarser_mesh(campaign):
     forward, problem = campaign
     oil = next(fault for fault in problem.faults if fault.name == "oil_viscosity")
     place = (), np.zeros(len(problem.nuisances))
-    both = with_coarse(forward)
-    assert both.coarse.setup.mesh != forward.setup.mesh == both.setup.mesh
+    both = with_coarser_mesh(forward)
+    assert both.coarser.setup.mesh != forward.setup.mesh == both.setup.mesh
     ((_, fine),), ((_, coarse),) = (
         path_changes(model.fresh(), problem, place, [(oil, [-4.0])], 1)[0] for model in (forward, both)
     )
@@ -141,7 +141,7 @@ def test_a_model_whose_coarser_mesh_has_no_equilibrium_does_without():
     forward = Forward(setup, planned.layout, planned.elements)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Forward, "__call__", refused)
-        assert with_coarse(forward).of_differences is forward
+        assert with_coarser_mesh(forward) is forward
 
 
 @pytest.mark.slow  # seconds: the bearing model itself

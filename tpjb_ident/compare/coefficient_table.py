@@ -14,7 +14,7 @@ from rigdata.operating_point import ROTATIONS, OperatingPoint
 from tpjb_ident.columns import amount, spinning
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.table_reader import read_table
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, POINT_COLUMNS, POINT_KEY
 
 HZ = 2.0 * math.pi
 VALUES = list(COEFFICIENT_COLUMNS)
@@ -24,8 +24,6 @@ _NEEDED = ("static_load_N", "shaft_speed_Hz")
 _COEFFICIENT = re.compile(r"[A-Za-z]{1,5}_[A-Za-z_]*per_(?:m|in)(_se|_lo|_hi|)")
 #: Cells of columns that are not there.
 _DEFAULTS = {"rotation": ROTATIONS[0], "converged": True, "quality": "", "status": ""}
-#: Half of a 95 % interval in standard errors.
-HALF = 1.96
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ def read_rows(path: Path) -> pd.DataFrame:
     rows["excitation_Hz"] = rows["excitation_Hz"].fillna(rows["shaft_speed_Hz"])
     rows["static_load_direction_deg"] = rows["static_load_direction_deg"].fillna(-90.0)
     low, high = (rows[ends[k::2]].to_numpy(float) for k in (0, 1))
-    stated = (high - low) / (2 * HALF)  # our own tables have both: the interval holds calibration too
+    stated = (high - low) / (2 * HALF_INTERVAL)  # our own tables have both: the interval holds calibration too
     rows[ERRORS] = np.where(np.isnan(stated), rows[ERRORS], stated)
     flags = rows["quality"].where(rows["quality"] != "", rows["status"]).astype(object) + "; " + assumed
     rows["status"] = flags.map(_flags)

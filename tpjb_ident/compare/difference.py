@@ -16,13 +16,13 @@ from rigdata.arrays import FloatArray, IntArray
 from rigdata.campaign import Campaign
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, symbol
-from tpjb_ident.compare.coefficient_table import HALF, described, partners
+from tpjb_ident.compare.coefficient_table import described, partners
 from tpjb_ident.compare.static_tests import StaticTests
 from tpjb_ident.conditions import errors_in
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.rounding import counted, percent, with_interval
 from tpjb_ident.runtime.table_reader import read_table
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, TANGENT
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, KINDS, POINT_COLUMNS, TANGENT
 
 #: Set points of both that are the same: share of the load, deg of its direction, share of the frequencies.
 _SAME_POINT = (0.002, 0.5, 0.002)
@@ -169,10 +169,10 @@ def _random(frame: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray]:
     """Random variance of a quantity and its degrees of freedom; of a table without them by the interval."""
     if f"{name}_random95" not in frame:
         half = 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]).to_numpy(float)
-        return (half / HALF) ** 2, np.full(len(frame), np.inf)
+        return (half / HALF_INTERVAL) ** 2, np.full(len(frame), np.inf)
     error, half = (frame[f"{name}{ending}"].to_numpy(float) for ending in ("_se", "_random95"))
     with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
-        quantile = np.nan_to_num(half / error, nan=HALF)
+        quantile = np.nan_to_num(half / error, nan=HALF_INTERVAL)
     return error**2, np.interp(-quantile, -stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL), _FREEDOM)
 
 
@@ -248,7 +248,7 @@ def _clearance(a: Side, b: Side) -> pd.DataFrame:
     frames = []
     for table in (a.clearance, b.clearance):
         frame = pads.merge(table)
-        for end, sign in (("_lo", -HALF), ("_hi", HALF)):
+        for end, sign in (("_lo", -HALF_INTERVAL), ("_hi", HALF_INTERVAL)):
             frame[_CLEARANCE + end] = frame[_CLEARANCE] + sign * frame[f"{_CLEARANCE}_se"]
         frames.append(frame)
     judged = _judged(_CLEARANCE, frames, 0.0, _NO_CHANGE * frames[0][_CLEARANCE], len(pads))

@@ -19,7 +19,7 @@ from tpjb_ident.diagnosis.comparison.search import Comparison, Progress, compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import derivatives
 from tpjb_ident.diagnosis.forward.candidates import candidates
-from tpjb_ident.diagnosis.forward.forward import Forward, with_coarse
+from tpjb_ident.diagnosis.forward.forward import Forward, with_coarser_mesh
 from tpjb_ident.diagnosis.forward.nuisance import nuisances
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map, workers
@@ -28,7 +28,7 @@ from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Observations, Where
 from tpjb_ident.diagnosis.verdict.decide import Decision, decide
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, coefficient_column
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, POINT_KEY, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,7 +62,7 @@ def diagnose(
     """Find the effects that a baseline lacks to describe a campaign."""
     settings = settings or DiagnoseSettings()
     quick = setup.change(accuracy=ACCURACY)
-    forward = with_coarse(Forward(quick, observations.layout, observations.elements))
+    forward = with_coarser_mesh(Forward(quick, observations.layout, observations.elements))
     problem = pose(observations, forward, settings)
     with workers(forward, problem, settings.workers) as run:
         comparison = compare(run, problem, progress)
@@ -153,7 +153,7 @@ def _coefficients(observations: Observations, vector: FloatArray) -> pd.DataFram
     """K and C of every operating point of a vector (n,) with the measured intervals' widths; NaN where it has none."""
     import pandas as pd
 
-    half = 1.96 * np.sqrt(np.diag(observations.covariance))
+    half = HALF_INTERVAL * np.sqrt(np.diag(observations.covariance))
     rows: dict[Where, dict[str, Any]] = {}
     for element, value, width in zip(observations.elements, vector, half, strict=True):
         if element.family != "h":

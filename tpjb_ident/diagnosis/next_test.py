@@ -225,7 +225,7 @@ def separated(
         planned = design.planned(setup)
         forward = design.forward(setup, planned)
         prediction = forward(acting)
-        columns = at_baseline(forward, acting, setup, known, prediction) if known else prediction[:, None][:, :0]
+        columns = at_baseline(forward, acting, setup, known, prediction) if known else np.zeros((len(prediction), 0))
         others = [forward(design.acting(rival)) for rival in rivals]
     except (ValueError, NoEquilibriumError):
         return None

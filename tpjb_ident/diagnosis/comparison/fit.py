@@ -18,6 +18,7 @@ from tpjb_ident.diagnosis.comparison.scores import Strain
 from tpjb_ident.diagnosis.comparison.unknowns import SLOW, Unknowns, derivatives, prediction
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
+from tpjb_ident.schema import HALF_INTERVAL
 
 #: Steps on one set of derivatives, which every step corrects, at the most; and the fall of chi-square that pays one.
 _STEPS, _LEAST = 12, 1.0
@@ -108,7 +109,7 @@ class Fit:
         return tuple(
             fault.label
             for fault, size, at, error in rows
-            if not np.any(np.abs(size - self.unknowns.origin[at]) > 1.96 * error)
+            if not np.any(np.abs(size - self.unknowns.origin[at]) > HALF_INTERVAL * error)
         )
 
     @property
@@ -256,10 +257,10 @@ def rise(run: Map, fit: Fit, index: int, deviations: float) -> float:
     start = replace(linear, theta=place, residual=fit.problem.measured - predicted, jacobian=held)
     errors, scale = fit.problem.errors, fit.posterior.leading
     moved = _stepped(run, unknowns, start, errors)
-    return max(_chi_square(errors, moved, scale) - _chi_square(errors, linear, scale), 0.0)
+    return max(_chi_square(errors, scale, moved) - _chi_square(errors, scale, linear), 0.0)
 
 
-def _chi_square(errors: ErrorModel, at: Linear, scale: int) -> float:
+def _chi_square(errors: ErrorModel, scale: int, at: Linear) -> float:
     white = errors.white(at.residual, scale)
     return float(white @ white + np.sum((at.theta / at.width) ** 2))
 
@@ -301,9 +302,7 @@ def _stepped(run: Map, unknowns: Unknowns, linear: Linear, errors: ErrorModel) -
         if np.all(np.abs(target - linear.theta) < _ARRIVED * deviation):
             return linear
 
-        def cost(at: Linear, scale: int = state.leading) -> float:
-            return _chi_square(errors, at, scale)
-
+        cost = functools.partial(_chi_square, errors, state.leading)
         moved = _step(run, unknowns, linear, target, cost)
         if moved is None:
             return linear

@@ -85,8 +85,9 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
     towards = np.sign(columns.T @ (problem.measured - problem.scaled(problem.base)))
     begun, sizes = [], []
     for fault in curved:
-        path, side = Path(fault, columns[:, :0], np.zeros(1)), 1.0
-        if fault.own >= 0:
+        if fault.own < 0:
+            path, side = Path(fault, columns[:, :0], np.zeros(1)), 1.0
+        else:
             path = path_through(fault, [(1.0, columns[:, fault.own])])
             # what a number of the whole bearing does bends, and straight on it misleads
             side = 0.0 if problem.nuisances[fault.own].place else float(towards[fault.own])

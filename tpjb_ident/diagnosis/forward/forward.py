@@ -116,7 +116,7 @@ class Forward:
     elements: tuple[Element, ...] = field(repr=False)
     cache: ModelCache = field(default_factory=ModelCache, repr=False)
     last: Change | None = None  #: of a rig that a test itself has changed, after effects and nuisances
-    coarse: Forward | None = field(default=None, repr=False)  #: the same on a coarser mesh, for differences
+    coarser: Forward | None = field(default=None, repr=False)  #: the same on a coarser mesh, for differences
 
     def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
         """Predict, (n,)."""
@@ -137,13 +137,12 @@ class Forward:
 
     def fresh(self, near: bool = False) -> Forward:
         """Return a copy that knows what this one knows now, whatever this one goes on to solve."""
-        coarse = None if self.coarse is None else self.coarse.fresh(near)
-        return replace(self, cache=self.cache.copy(near), coarse=coarse)
+        return replace(self, cache=self.cache.copy(near))
 
     @property
     def of_differences(self) -> Forward:
-        """What tells what a number changes: a mesh's error is in both ends of a difference, and falls out."""
-        return self.coarse or self
+        """A copy that tells what a number changes: a mesh's error is in both ends of a difference, and falls out."""
+        return (self.coarser or self).fresh()
 
     @functools.cached_property
     def _drawn(self) -> FloatArray:
@@ -174,15 +173,15 @@ class Forward:
         return self.cache.ask(setup, test.point, tuple(excitation), self._sensors)
 
 
-def with_coarse(forward: Forward) -> Forward:
+def with_coarser_mesh(forward: Forward) -> Forward:
     """With the same on a coarser mesh, which has its baseline solved; without where that finds no equilibrium."""
     setup = forward.setup
-    coarse = replace(forward, setup=setup.change(mesh=setup.mesh.coarser()), cache=ModelCache())
+    coarser = replace(forward, setup=setup.change(mesh=setup.mesh.coarser()), cache=ModelCache())
     try:
-        coarse()
+        coarser()
     except NoEquilibriumError:
         return forward
-    return replace(forward, coarse=coarse)
+    return replace(forward, coarser=coarser)
 
 
 def _locus(test: LocusTest, reading: SolvedPoint) -> FloatArray:

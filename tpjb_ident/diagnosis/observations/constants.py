@@ -101,6 +101,8 @@ class Deciding:
     axis = 0.1
 
     # What is said.
+    #: Times that an interval by derivatives becomes at the most, where the likelihood's profile does not end before.
+    stretched = 4.0
     #: Standard deviations from which a size would have been seen, a tolerance is beyond what is stated, two effects are
     #: told apart and a test tells: a chance of 1 in 370 each.
     visible = 3.0

@@ -18,6 +18,7 @@ from tpjb_ident.diagnosis.comparison.problem import Fault
 from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import named, places
+from tpjb_ident.schema import HALF_INTERVAL
 
 #: What a pad by itself may be off by: the effect that says it, and the kind of behaviour.
 _PADS = {"pad_offset": "clearance by pad", "pad_bore": "bore of a pad", "soft_pivot": "pivot law of a pad"}
@@ -67,7 +68,8 @@ def _pads(fit: Fit) -> list[Behaviour]:
         effect, _, number = nuisance.effect.split()
         own, pad = OWN_NUMBERS[effect], float(number)
         error = math.sqrt(max(1.0 - deviation.heard, 0.0))
-        size, low, high = (own.parameter((deviation.size + k * error) * nuisance.sigma) for k in (0.0, -1.96, 1.96))
+        half = HALF_INTERVAL * error
+        size, low, high = (own.parameter((deviation.size + off) * nuisance.sigma) for off in (0.0, -half, half))
         parameter = kind_of(effect).parameters[-1]
         estimate = Estimate(size, low, high, parameter.unit)
         words = finding(effect, {"pad": Estimate(pad, pad, pad), parameter.name: estimate})

@@ -18,10 +18,11 @@ from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import contradictions, gap, gap_by_observable, localise, noise_floor
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.verdict.behaviour import behaviours
-from tpjb_ident.diagnosis.verdict.held_out import as_stated, free_gap, free_prediction
+from tpjb_ident.diagnosis.verdict.held_out import as_stated, free_prediction
 from tpjb_ident.diagnosis.verdict.interval import errors_each_way
 from tpjb_ident.diagnosis.verdict.rules import Judgement, judge
 from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
+from tpjb_ident.schema import HALF_INTERVAL
 
 #: What a source allows where that is not three typical sizes of the library, whose sources stand with the effects.
 _PIVOTS, _SPRINGS = (0.2, 2.0), (1e8, math.inf)
@@ -120,7 +121,8 @@ def _effects(run: Map, comparison: Comparison, judgement: Judgement) -> tuple[Fo
 def parameters_of(fit: Fit, index: int, each_way: FloatArray | None = None) -> dict[str, Estimate]:
     """Parameters of one fault of a fit with their 95 % intervals, by errors below and above (2, k)."""
     fault, amplitudes = fit.faults[index], fit.amplitudes[index]
-    below, above = 1.96 * np.broadcast_to(fit.errors[index] if each_way is None else each_way, (2, len(amplitudes)))
+    errors = fit.errors[index] if each_way is None else each_way
+    below, above = HALF_INTERVAL * np.broadcast_to(errors, (2, len(amplitudes)))
     free = fault.candidate.free
 
     def sizes(at: FloatArray) -> FloatArray:
@@ -162,8 +164,9 @@ def _ranked(comparison: Comparison) -> tuple[RankedCandidate, ...]:
                 fault.label: {k: vars(p) for k, p in parameters_of(fit, i).items()}
                 for i, fault in enumerate(fit.faults)
             }
-            score = fit.posterior.total - rest
-            out.append(RankedCandidate(fit.label, score, free_gap(fit), parameters, probability))
+            score, problem = fit.posterior.total - rest, fit.problem
+            left = gap(problem.observations, free_prediction(fit), problem.held)
+            out.append(RankedCandidate(fit.label, score, left, parameters, probability))
     return tuple(out[:_MOST_LISTED])
 
 

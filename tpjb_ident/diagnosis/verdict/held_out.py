@@ -172,13 +172,8 @@ def _covariance(fit: Fit, rows: BoolArray, columns: FloatArray) -> FloatArray:
     return np.asarray(fit.problem.errors.covariance(fit.posterior.leading)[np.ix_(rows, rows)] + columns @ columns.T)
 
 
-def free_gap(fit: Fit) -> float:
-    """Held-out gap with all numbers where the other points put them, in closed form."""
-    return gap(fit.problem.observations, free_prediction(fit), fit.problem.held)
-
-
 def free_prediction(fit: Fit) -> FloatArray:
-    """What a fit predicts with all numbers where the points that are not held out put them, SI, (n,)."""
+    """What a fit predicts with all numbers where the points not held out put them, in closed form, SI, (n,)."""
     problem, linear = fit.problem, fit.linear
     moved = linear.jacobian @ (_from_others(fit) - linear.theta)
     return np.asarray((problem.measured - linear.residual + moved) * problem.sigma)
