@@ -100,9 +100,10 @@ def _next_test(run: Map, decision: Decision, comparison: Comparison, setup: Setu
     if not rivals:
         return ""
     others = [fit.effects for fit in rivals]
+    coarser = setup.change(mesh=setup.mesh.coarser())  # what separates two is a difference: a mesh's error falls out
 
     def asked(options: Sequence[Design | Check], *tolerances: Tolerances) -> list[Separation]:
-        tried = run(_separated, [(setup, option, model.effects, others, *tolerances) for option in options])
+        tried = run(_separated, [(coarser, option, model.effects, others, *tolerances) for option in options])
         return ranked([separation for separation in tried if separation is not None])
 
     # tolerances blur what a test separates, and cost most of its predictions: asked where a test could still be best

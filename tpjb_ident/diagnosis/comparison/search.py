@@ -182,7 +182,7 @@ class _Search:
         # of slow effects a coarse start takes half a minute
         if stopped and fit.faults and proposal.labels not in self.begun and fit.names.isdisjoint(SLOW):
             self.begun[proposal.labels] = -math.inf
-            coarse = self._reached(Start(fit.faults, fit.linear.theta, fit.linear.jacobian, coarse=True))
+            coarse = self._reached(replace(proposal, coarse=True))  # its end lies astray
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
         known = self.fits.get(proposal.labels)
         if known is not None and known.posterior.total >= fit.posterior.total:
