@@ -59,7 +59,7 @@ class Case:
     mass_uncertainty: float = 0.0
     gains: Mapping[str, float] = field(default_factory=dict)  #: logarithms
     turned: Mapping[str, float] = field(default_factory=dict)  #: rad
-    late: Mapping[str, float] = field(default_factory=dict)  #: s, by quantity
+    late: Mapping[str, float] = field(default_factory=dict)  #: s, by sensor or quantity
     rates: Mapping[str, float] = field(default_factory=dict)  #: relative, by quantity
     drift: Mapping[str, float] = field(default_factory=dict)  #: 1/K
     kelvins: float = 0.0  #: standard deviation of the runs' temperatures
@@ -203,7 +203,7 @@ def _readings(case, sensors, u, force) -> np.ndarray:
 def _factor(case, sensors, omega, temperature) -> np.ndarray:
     """What electronics make of a reading of one, (n, m)."""
     gain = np.array([case.gains.get(sensor.name, 0.0) for sensor in sensors])
-    late = np.array([case.late.get(sensor.quantity, 0.0) for sensor in sensors])
+    late = np.array([case.late.get(sensor.name, case.late.get(sensor.quantity, 0.0)) for sensor in sensors])
     fast = np.array([case.rates.get(sensor.quantity, 0.0) for sensor in sensors])
     drift = np.array([case.drift.get(sensor.name, 0.0) for sensor in sensors])
     away = temperature - temperature.mean()

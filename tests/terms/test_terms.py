@@ -156,6 +156,20 @@ def test_accelerometers_that_lead_have_a_corner_or_the_cells_come_late(seed, her
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("late", [{"F1": 4e-4}, {"F2": 4e-4}, {"F2": 1.5e-3}])
+def test_one_cell_that_comes_late_is_told_by_its_own_axis(seed, late):
+    """As behind a multiplexer: one loss of both springs would take half of it, and the other half K and C."""
+    rig, blocks, truth = made(Case(hertz=(25.0, 41.0), late=late, noise=2e-4), seed)
+    first = solved(rig, blocks, truth)
+    assert not held(first, truth)
+    solution = solved(learnt_rig(rig, first), blocks, truth)
+    assert held(solution, truth)
+    (told,) = [condition for condition in solution.conditions() if condition == _LATE]
+    assert f"the cells along {'X' if 'F1' in late else 'Y'} were" in told.detail
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("wrong", [[-1.0, -1.0], [-1.0, 1.0]])
 @pytest.mark.parametrize(
     "leads", [{"late": {"force": 5e-4}}, {"corner": 1e-9, "input_corner": 1.0}], ids=["late", "corner"]
@@ -225,7 +239,7 @@ def test_the_springs_under_the_housing_are_told(seed):
     solution = solved(*made(Case(), seed))
     housing = of(solution, "housing")
     c = 1e9 * COMPLIANCE.real
-    assert told(housing, [c[0, 0], c[1, 1], c[0, 1], 0.01])
+    assert told(housing, [c[0, 0], c[1, 1], c[0, 1], 0.01, 0.01])
     assert solution.terms[0].conditions(housing) == ()
 
 

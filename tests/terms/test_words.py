@@ -25,8 +25,8 @@ def test_a_drift_and_a_delay_are_said_with_their_figures_and_named_beyond_what_w
     assert term.conditions(fitted) == ("probes-drift",)
     late = Case(late={"force": 6e-4}, hertz=(30.0, 90.0), stated={"force": {"delay_uncertainty": 1e-4}})
     term, fitted = term_of(solved(*made(late)), "delay")
-    (sentence,) = term.words(fitted)
-    assert sentence.startswith("force late by 0.")
+    first, second = term.words(fitted)
+    assert first.startswith("F1 late by 0.") and second.startswith("F2 late by 0.")
     assert term.conditions(fitted) == ("cells-and-accelerometers-out-of-phase",)
 
 
@@ -37,7 +37,7 @@ def test_what_is_as_stated_is_not_named():
         term, fitted = term_of(solution, name)
         assert term.conditions(fitted) == ()
     springs = term_of(solution, "housing")[0].words(solution.fitted["housing"])
-    assert [sentence.split()[0] for sentence in springs] == ["c_xx", "c_yy", "c_xy", "loss"]
+    assert [sentence.split()[0] for sentence in springs] == ["c_xx", "c_yy", "c_xy", "loss_x", "loss_y"]
 
 
 def test_points_run_at_several_amplitudes_say_so():

@@ -1,6 +1,6 @@
 """Delays of devices against one another, as far as the manifest states them: one number a device.
 
-Sensors of one clock share a device; where no clock is stated, those of one quantity do. The housing's equations tell
+Sensors of one clock share a device; where no clock is stated, each has a delay of its own, as behind a multiplexer. The housing's equations tell
 cells from accelerometers (a spring knows no phase); probes against cells only a film of known form would tell.
 """
 
@@ -25,7 +25,7 @@ class Delay(Factor):
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
         self._omega = blocks.usual_omega
-        devices = np.array([sensor.clock or sensor.quantity for sensor in rig.channels])
+        devices = np.array([sensor.clock or sensor.name for sensor in rig.channels])
         deviation = np.array([sensor.delay_uncertainty for sensor in rig.channels])
         names = list(dict.fromkeys(devices[deviation > 0].tolist()))
         self.sensors = ((devices[:, None] == np.array(names, dtype=str)) & (deviation[:, None] > 0)).astype(float)

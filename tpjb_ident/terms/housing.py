@@ -67,7 +67,8 @@ class Housing(Term):
                 Parameter("c_yy", "nm/N", SOFT, usual),
                 Parameter("c_xy", "nm/N", across),
                 # what is beyond a mount's loss is then a delay's or a corner's
-                Parameter("loss", "1", _LOSS / 2 if rig.out_of_step or not rig.static else loss),
+                Parameter("loss_x", "1", _LOSS / 2 if rig.out_of_step or not rig.static else loss),
+                Parameter("loss_y", "1", _LOSS / 2 if rig.out_of_step or not rig.static else loss),
             )
         elif rig.mount == "unknown":
             self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
@@ -149,7 +150,7 @@ class Housing(Term):
 
     def _standing(self, fitted: Fitted, share: str) -> Conditions:
         """Of accelerometers on a housing on springs; `share`: words for the inertia."""
-        (xx, yy, xy, loss), error = fitted.value, fitted.deviation
+        (xx, yy, xy, *losses), error = fitted.value, fitted.deviation
         faults = []
         if min(xx + _CLEAR * error[0], yy + _CLEAR * error[1]) < 0:
             faults.append("they move with the cells' force, and not against it")
@@ -169,7 +170,9 @@ class Housing(Term):
         if weak + _CLEAR * max(error[:2]) < _ALIKE * strong:
             text = f"they differ {strong / weak:.0f} times per force: one sensitivity may be off; {share}"
             return (Condition("accelerometers-doubtful", text),)
-        return _out_of_step(loss, error[3], "cells", self._omega)
+        k = int(np.argmax(np.abs(losses) / error[3:]))
+        both = abs(losses[0] - losses[1]) < _LOSS + 3 * float(np.hypot(*error[3:]))
+        return _out_of_step(losses[k], error[3 + k], "cells" if both else f"cells along {'XY'[k]}", self._omega)
 
     def standing_on(self, fitted: Fitted) -> ComplexArray | None:
         """Compliance of the springs under the housing (2, 2) [m/N]; None where no accelerometer shows it."""
@@ -186,15 +189,17 @@ class Housing(Term):
         is_stated = any(sensor.delay_uncertainty for sensor in rig.channels)
         if is_stated or rig.mount == "unknown" or not rig.has_acceleration:
             return None
-        lag, error = float(fitted.value[-1]), float(fitted.deviation[-1])
-        if not lag < -2 * error or self.is_on_foundation(fitted):
+        first = 3 if rig.mount == "cells" else len(fitted.value) - 1
+        late = fitted.value[first:] < -2 * fitted.deviation[first:]
+        if not late.any() or self.is_on_foundation(fitted):
             return None
+        lag = float(fitted.value[first:][late].min())
         if rig.mount == "cells":
             compared, sound = "force", all(condition == OUT_OF_STEP for condition in self.conditions(fitted))
         else:
             compared, sound = "displacement", not (self._is_unexplained(fitted) or _otherwise(fitted, _GROSS))
-        late = {compared: -lag / self._omega}
-        sensors = tuple(replace(s, delay_uncertainty=late.get(s.quantity, 0.0)) for s in rig.channels)
+        uncertain = {compared: -lag / self._omega}
+        sensors = tuple(replace(s, delay_uncertainty=uncertain.get(s.quantity, 0.0)) for s in rig.channels)
         return replace(rig, channels=sensors, out_of_step=sound)
 
 
@@ -235,8 +240,9 @@ def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
 
 def _compliance(value: FloatArray) -> ComplexArray:
     """Of the cells, (2, 2) [m/N]."""
-    xx, yy, xy, loss = (float(v) for v in value)
-    return np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * loss), complex)
+    xx, yy, xy, *losses = value.tolist()
+    lag = np.add.outer(losses, losses) / 2  # across the axes, the mean of both
+    return np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * lag), complex)
 
 
 def _kappa(value: FloatArray) -> tuple[ComplexArray, ComplexArray]:
