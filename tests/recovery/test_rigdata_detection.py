@@ -102,7 +102,7 @@ def test_fault_in_one_run(check, name):
     hits = [p for p in found if p.severity == severity and p.place.startswith(place) and says in p.what]
     assert [p.run for p in hits] == [fault.run], [str(p) for p in found]
     # Nothing is said of other runs.
-    assert {p.run for p in found} == {fault.run}
+    assert {p.run for p in found} == {fault.run}, [str(p) for p in found]
 
 
 @pytest.mark.parametrize(("run", "named"), [("p-2-up", 3), ("p-4-up", 1), ("p-1-up", 5)])

@@ -8,10 +8,21 @@ import pytest
 import rigdata
 from rigdata.campaign import load_campaign
 from rigdata.operating_point import OperatingPoint
-from rigdata.virtual_rig import Fault, Noise
+from rigdata.virtual_rig import ClearanceSweep, Fault, Noise
 from rigdata.virtual_rig.truth import load_vector
 from tests.command_line import tpjb
-from tests.good_campaigns import DAMPING, PLAN, RUN, SMALL_PLAN, STIFFNESS, directions, rocker_rig, stiff_rig
+from tests.good_campaigns import (
+    DAMPING,
+    PLAN,
+    ROCKER_DAMPING,
+    ROCKER_STIFFNESS,
+    RUN,
+    SMALL_PLAN,
+    STIFFNESS,
+    directions,
+    rocker_rig,
+    stiff_rig,
+)  # fmt: skip
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.clearance.measure import measure_run
 from tpjb_ident.clearance.polygon import gain_ratio
@@ -21,6 +32,20 @@ from tpjb_ident.identification.settings import IdentifySettings
 CLEARANCE = 80e-6
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 SWEEP = replace(SMALL_PLAN, dynamic=(), locus=(), dry=())
+
+
+#: Static loads in six directions, dry tests of all pads and a sweep: what tells of single sensors.
+ALL_ROUND = replace(PLAN, directions=directions(4), clearance=(ClearanceSweep(seconds=30.0),))
+
+
+def described(source, name, **changes):
+    """The campaign with another description of one channel."""
+
+    def changed(channels):
+        return {n: replace(c, **changes) if n == name else c for n, c in channels.items()}
+
+    runs = tuple(replace(run, channels=changed(run.channels)) for run in source.runs)
+    return replace(source, channels=changed(source.channels), runs=runs)
 
 
 def gain(channel, value):
@@ -150,3 +175,42 @@ def test_identify_names_the_run_and_the_channel(campaign_of, fault, says):
         assert told == []
     else:
         assert [text.startswith(RUN) and says in text for text in told] == [True]
+
+
+def errors(frame):
+    """Errors of K and C over half their intervals, (8,)."""
+    ratios = []
+    for kind, unit, truth in (("k", "N_per_m", ROCKER_STIFFNESS), ("c", "Ns_per_m", ROCKER_DAMPING)):
+        for entry, true in zip(("xx", "xy", "yx", "yy"), truth.ravel(), strict=True):
+            name = f"{kind}{entry}_{unit}"
+            low, high = frame[f"{name}_lo"].iloc[0], frame[f"{name}_hi"].iloc[0]
+            ratios.append(abs(frame[name].iloc[0] - true) / ((high - low) / 2))
+    return np.array(ratios)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "changes", "trusted", "says"),
+    [
+        ("X1B", {"axis": np.radians(150.0)}, True, "X1B stands -15"),
+        ("X1A", {"axis": np.radians(37.0)}, True, "X1A stands +8"),
+        ("X1A", {"gain": 1 / 1.3}, True, "X1A reads -2"),
+        ("X1B", {"axis": np.radians(170.0)}, False, "X1B"),
+        ("X1A", {"gain": 0.5}, False, "X1A reads -5"),
+        ("L1H", {"gain": 2.0}, False, "L1H reads +10"),
+        ("L1V", {"axis": np.radians(80.0)}, True, "L1V stands +10"),
+        ("L1V", {"axis": np.radians(60.0)}, False, "L1V stands +30"),
+        ("L1V", {"axis": np.radians(90.0)}, True, ""),
+    ],
+)
+def test_a_sensor_that_other_runs_contradict_widens_the_intervals_or_forbids_trust(
+    campaign_of, name, changes, trusted, says
+):
+    source = load_campaign(campaign_of(rocker_rig(3, plan=ALL_ROUND)))
+    changes = {k: v * source.channels[name].gain if k == "gain" else v for k, v in changes.items()}
+    result = identify(described(source, name, **changes))
+    quality = result.points[0].quality
+    assert says in " ".join(condition.detail for condition in quality)
+    assert all(condition.severity != "error" for condition in quality) == trusted
+    assert not trusted or errors(result.to_frame()).max() < 1.3
+    assert says or "records-doubtful" not in quality

@@ -26,7 +26,8 @@ def test_a_drift_and_a_delay_are_said_with_their_figures_and_named_beyond_what_w
     late = Case(late={"force": 6e-4}, hertz=(30.0, 90.0), stated={"force": {"delay_uncertainty": 1e-4}})
     term, fitted = term_of(solved(*made(late)), "delay")
     first, second = term.words(fitted)
-    assert first.startswith("F1 late by 0.") and second.startswith("F2 late by 0.")
+    assert first.startswith("F1 late by 0.")
+    assert second.startswith("F2 late by 0.")
     assert term.conditions(fitted) == ("cells-and-accelerometers-out-of-phase",)
 
 

@@ -18,6 +18,7 @@ from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.rig_fit import rig_fit
 from tpjb_ident.check.run_gain import check_agreement, check_film, check_positions, check_shaft_lines, point_runs
+from tpjb_ident.check.sensor_axes import check_cells, check_probes
 from tpjb_ident.check.set_points import check_excitation, check_rotation, check_speed, check_static_loads
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
 from tpjb_ident.conditions import SEVERITIES, Conditions
@@ -83,6 +84,8 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     for observation in observations:
         check_speed(observation)
     static = check_static_loads(observations)
+    if static:
+        check_cells(observations)
     check_positions(dynamic)
     check_magnitudes(observations)
     check_excitation(sines)
@@ -96,6 +99,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     check_rotation(sines)
     check_shaft_lines(sines)
     check_sweeps(of_kind("clearance"))
+    check_probes(of_kind("clearance"), of_kind("dry_pivot"))
     check_locus(of_kind("locus"))
     _check_duplicates(observations)
     _check_lengths(observations)

@@ -77,10 +77,13 @@ class Reporter:
     run: Run
     findings: list[Finding] = field(default_factory=list)
     cells_doubted: bool = False  #: what they show is held against nothing any more
+    doubted: dict[str, tuple[float, float]] = field(
+        default_factory=dict
+    )  #: by channel: deviations of gain and axis [rad]
 
     def copy(self) -> Reporter:
         """A reporter that has found the same so far."""
-        return replace(self, findings=list(self.findings))
+        return replace(self, findings=list(self.findings), doubted=dict(self.doubted))
 
     @property
     def keys(self) -> list[str]:
@@ -160,6 +163,7 @@ class Verdicts:
     shared: dict[str, list[Problem]] = field(default_factory=dict)
     doubtful: dict[str, list[Problem]] = field(default_factory=dict)
     run_gains: dict[str, list[Problem]] = field(default_factory=dict)
+    doubted: dict[str, tuple[float, float]] = field(default_factory=dict)  #: as of `Reporter`
     swept: dict[tuple[str, str], float] = field(default_factory=dict)  #: m: half a probe's travel, by sweep and probe
 
 

@@ -116,7 +116,7 @@ def _check_sweep(observation: Observation) -> None:
     answer = np.array([1.0, 1.0j]) @ np.linalg.lstsq(design, readings, rcond=None)[0][:2]
     axes = np.array([channel.axis or 0.0 for channel in observation.of("displacement")])
     turns = np.degrees(np.angle(answer * np.exp(-1j * axes)))
-    common, names = np.median(turns), observation.names("displacement")
+    common, names = np.median([*turns, 0.0]), observation.names("displacement")  # the cells have a say too
     if abs(common) > _TURNED:
         observation.report.ask("turned", abs(common), *names, angle=common)
         return

@@ -41,7 +41,7 @@ from tpjb_ident.pivot.curve import PivotCurve
 
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
 _DEVIATES = 2.0  # such widths from which a pad stands off clearly
-_TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
+TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
 _SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
 _SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
 _CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the deflection, where no curve says it
@@ -204,7 +204,7 @@ def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, cur
         late_carried = _pivot_deflection(curves, late.pad, late.load)
         columns, precision, mean = _pivot_terms(late, of_pad, late_carried, full, unknown)
         design = np.hstack([of_pad, -of_pad * place[:, None], columns])
-        prior = np.r_[np.zeros(r), np.full(r, _TILT_SPREAD**-2), precision]
+        prior = np.r_[np.zeros(r), np.full(r, TILT_SPREAD**-2), precision]
         fits.append(_least_squares(whitener, used.along, design, prior, np.r_[np.zeros(2 * r), mean]))
     beta, covariance, misfit = _mixed(fits)
     distance, tilt, pivots = np.split(beta, [r, 2 * r])

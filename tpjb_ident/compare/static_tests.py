@@ -12,6 +12,7 @@ from model.bearing import Bearing
 from rigdata.campaign import Campaign
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
+from tpjb_ident.check.sensor_axes import SIDES
 from tpjb_ident.clearance.locus import Locus, measure_locus
 from tpjb_ident.clearance.measure import ClearancePolygon, measure_run, measure_sweeps
 from tpjb_ident.conditions import Condition
@@ -58,11 +59,11 @@ def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Prob
             problems.append(Problem("error", run.file, "pad", fault, "Correct pad in the manifest", run.id))
     refused = {problem.run for problem in former if problem.severity == "error"}
     for run in campaign.of_kind("clearance"):
-        problems += [] if run.id in refused else _of_sweep(run, bearing)
+        problems += [] if run.id in refused else _of_sweep(run, bearing, not any(SIDES in p.what for p in former))
     return problems
 
 
-def _of_sweep(run: Run, bearing: Bearing) -> list[Problem]:
+def _of_sweep(run: Run, bearing: Bearing, tells_gains: bool) -> list[Problem]:
     try:
         polygon = measure_run(run, [pad.pivot_angle for pad in bearing.pads])
     except RigDataError as error:
@@ -72,7 +73,7 @@ def _of_sweep(run: Run, bearing: Bearing) -> list[Problem]:
     measured = np.nanmean(polygon.clearance)
     problems = []
     for condition in polygon.status:
-        if condition == "probe-gains-differ":
+        if condition == "probe-gains-differ" and tells_gains:
             cure = "Check the sensitivities of both probes"
             problems.append(Problem("warning", run.file, f"channels {names}", condition.detail, cure, run.id))
     negative = polygon.negative_preloads([pad.pad_clearance for pad in bearing.pads])

@@ -98,6 +98,10 @@ class Rig(Directed):
         """Unit vectors of the sensors' axes, (m, 2)."""
         return directions([sensor.axis or 0.0 for sensor in self.channels])
 
+    def doubting(self, doubted: Mapping[str, tuple[float, float]]) -> Rig:
+        """The rig, gains and axes [rad] of some sensors, by their names, known no better than this."""
+        return replace(self, channels=tuple(s.doubted(*doubted.get(s.name, (0.0, 0.0))) for s in self.channels))
+
     def __len__(self) -> int:
         return len(self.channels)
 

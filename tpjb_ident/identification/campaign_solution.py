@@ -23,9 +23,7 @@ from tpjb_ident.estimate.arrowhead import complex_matrix
 from tpjb_ident.estimate.equation import (
     Blocks,
     Rig,
-    RigStiffness,
     axes_of,
-    campaign_rig,
     film_force,
     mounted,
     sensors_of,
@@ -268,8 +266,7 @@ def solve_campaign(
     points: Sequence[PointData],
     digests: Sequence[RunDigest],
     workers: Workers,
-    correct: bool,
-    bare: RigStiffness,
+    rig: Rig,
 ) -> CampaignSolution:
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
     loads = static_loads(campaign, points)
@@ -280,16 +277,16 @@ def solve_campaign(
         bent = np.array([change.share for change in film])
         blocks = campaign_blocks(points, means, loads.misses, bent)
         rig = mounted(loads.doubted(rig), blocks, campaign.mount, loads.common)
-        start = np.array([point.start for point in means]) - bare.at(np.array([data.omega for data in points]))
+        start = np.array([point.start for point in means]) - rig.bare.at(np.array([data.omega for data in points]))
         solution = solved_as_learnt(rig, lambda rig: solve(rig, blocks, start))
         return CampaignSolution(means, loads, film, solution)
 
     rate = min((digest.sample_rate for digest in digests if digest.sample_rate > 0), default=np.inf)
-    last = solved_with_clocks(campaign_rig(campaign, bare=bare, to_set_point=correct), rate, solved)
+    last = solved_with_clocks(rig, rate, solved)
     solution, blocks = last.solution, last.solution.blocks
     force = force_pickup([digest.mains_force for digest in digests])
     on_line = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE) and p in blocks.point]
-    fits = _mains(on_line, digests, solution, force) if correct and on_line else {}
+    fits = _mains(on_line, digests, solution, force) if rig.to_set_point and on_line else {}
     if fits:
         shift, probes = np.zeros_like(blocks.z), solution.rig.pick("displacement")
         for p, fit in fits.items():

@@ -157,7 +157,8 @@ def assemble(
     dry = dry or DryTest()
     gathered = gather(digests)
     report("estimating", 0, len(gathered))
-    solved = solve_campaign(campaign, gathered, digests, workers, settings.correct, dry.stiffness)
+    rig = campaign_rig(campaign, bare=dry.stiffness, to_set_point=settings.correct).doubting(checked.doubted)
+    solved = solve_campaign(campaign, gathered, digests, workers, rig)
     jobs = []
     for p, data in enumerate(gathered):
         jobs.append((point_share(solved, data, p, dry, check_conditions(checked, data.names)),))
@@ -213,7 +214,7 @@ def identify_bands(
         data = band_blocks(points, rig, loads, settings.clearance)
         return solve_bands(mounted(loads.doubted(rig), data.blocks, campaign.mount, loads.common), data)
 
-    rig = campaign_rig(campaign, bare=bare, to_set_point=settings.correct)
+    rig = campaign_rig(campaign, bare=bare, to_set_point=settings.correct).doubting(checked.doubted)
     solved = solved_with_clocks(rig, min(run.sample_rate for run in runs), solve)
     results, numbers = [], []
     points = solved.points

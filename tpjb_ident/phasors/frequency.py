@@ -49,7 +49,7 @@ def shaft_speed(run: Run) -> tuple[float, Conditions]:
     values = record.values[np.isfinite(record.values)]
     measured = values.mean() / (2 * np.pi) if len(values) else np.nan
     if abs(measured - nominal) <= MAX_DEPARTURE * max(nominal, 1.0):
-        return measured, ()
+        return (measured if nominal else 0.0), ()  # at standstill a tachometer shows noise
     return nominal, (
         Condition("tach off set point", f"tachometer says {measured:.4g} Hz, set point {nominal:g} Hz; set point used"),
     )

@@ -334,6 +334,8 @@ def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -
     reports = [observation.report for observation in judged(campaign, [*observations, *static])[0]]
     reach(reports)
     result = verdicts([report for report in reports if report.run.kind == "dynamic"])
+    for report in reports:
+        result.doubted.update(report.doubted)
     for observation in static:
         for i in observation.pick("displacement") if observation.run.kind == "clearance" else ():
             result.swept[observation.run.id, observation.channels[i].name] = np.ptp(observation.spread[:, i]) / 2

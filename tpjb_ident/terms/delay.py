@@ -1,7 +1,8 @@
 """Delays of devices against one another, as far as the manifest states them: one number a device.
 
-Sensors of one clock share a device; where no clock is stated, each has a delay of its own, as behind a multiplexer. The housing's equations tell
-cells from accelerometers (a spring knows no phase); probes against cells only a film of known form would tell.
+Sensors of one clock share a device; without a clock each has a delay of its own, as behind a multiplexer. The housing's
+equations tell cells from accelerometers (a spring knows no phase); probes against cells only a film of known form would
+tell.
 """
 
 import numpy as np

@@ -56,7 +56,7 @@ def _of_model(comparison: Comparison, sure: frozenset[str], held: HeldOut, drift
     elif model.faults and all(fault.is_term for fault in model.faults):
         reason = "what describes it is a term that no effect of the library stands for"
     else:
-        return _named(held, drift)
+        return _named(held, drift, _places(comparison, model))
     return Judgement("unexplained", held, (reason,))
 
 
@@ -89,6 +89,22 @@ def _family(comparison: Comparison, sure: frozenset[str]) -> tuple[str, ...]:
     return ()
 
 
+def _places(comparison: Comparison, model: Fit) -> tuple[str, ...]:
+    """Labels of a model's effects on whichever pad, where which one it is has not the probability that a name takes."""
+    places: dict[tuple[str, ...], float] = {}
+    for fit, probability in comparison.probabilities.items():
+        if fit.names == model.names and fit in comparison.tenable:
+            # of a direction every start leads to the same
+            labels = tuple(sorted(fault.label if fault.candidate.fixed else fault.name for fault in fit.faults))
+            places[labels] = places.get(labels, 0.0) + probability
+    likeliest = sorted(places, key=lambda labels: -places[labels])
+    if places[likeliest[0]] >= Deciding.included * sum(places.values()):
+        return ()
+    shared = set(likeliest[0]).intersection(*likeliest)
+    listed = dict.fromkeys(label for labels in likeliest for label in labels if label not in shared)
+    return tuple(listed)[: Deciding.family]
+
+
 def look_alikes(held: HeldOut, family: tuple[str, ...]) -> Judgement:
     """The most probable model with what a campaign cannot tell from it, which sentences count from the second on."""
     if not family or held.fit.has_terms:
@@ -98,11 +114,11 @@ def look_alikes(held: HeldOut, family: tuple[str, ...]) -> Judgement:
     return Judgement("ambiguous", held, (_shrunk(held),), listed_first)
 
 
-def _named(held: HeldOut, drift: Sequence[Drift]) -> Judgement:
+def _named(held: HeldOut, drift: Sequence[Drift], places: tuple[str, ...]) -> Judgement:
     """Named where each effect halves the gap along what it moves, and no effect changes over the operating range."""
     terms = held.fit.has_terms
     if held.is_shrunk and not (drift or terms):
-        return Judgement("named", held, (_shrunk(held),))
+        return Judgement("ambiguous" if places else "named", held, (_shrunk(held),), places)
     reason = f"{_shrunk(held)}: a name leaves half of the first above noise at the most, and the second no larger"
     if drift:
         reason = f"the size of {drift[0].effect} {drift[0].words}, so its name is not the whole story"

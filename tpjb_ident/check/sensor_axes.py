@@ -1,0 +1,162 @@
+"""Gains and axes of single sensors, by vectors whose directions are known: static loads, and the pads in a sweep.
+
+A cell that reads (1 + g) times the truth along an axis turned by t shows W (1 + g) cos(phi - axis - t) of a load W
+towards phi: loads in two directions tell both numbers. Two probes are told by the sides of the clearance polygon, which
+stand across the pads wherever these are. Where all but one agree, that one is off; set points and pads have a say too.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from rigdata.problem import RigDataError
+from rigdata.run import Run
+from rigdata.vector import directions, wrapped
+from tpjb_ident.check.observation import Observation
+from tpjb_ident.clearance.measure import coldest_first, measure_run
+from tpjb_ident.clearance.polygon import TILT_SPREAD
+from tpjb_ident.estimate.statistics import huber_weight, reweighted
+from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
+
+#: What tells of probes, in words.
+SIDES = "the sides of the clearance polygon"
+#: Condition of the loads' directions up to which they tell cells apart, and runs.
+_TELLING, _MIN_RUNS = 30.0, 4
+#: Directions that are one, and share of a load by which a run is another than its set point.
+_ALIKE, _UNUSUAL = 0.01, 0.05
+#: Deviations from which a run loses weight, and standard errors from which a sensor is off.
+_BEND, _CLEAR = 1.5, 4.0
+#: Pads from which the sides tell gains and axes; by how much pads stand elsewhere than stated [rad]; what is plausible
+#: of gains and turns, one deviation; steps to their most probable values.
+_MIN_PADS, _PADS, _PLAUSIBLE, _STEPS = 4, 0.01, 0.3, 8
+
+
+def check_cells(observations: Sequence[Observation]) -> None:
+    """Cells against the static loads of dynamic and locus runs."""
+    groups: dict[tuple[str, ...], list[Observation]] = {}
+    for observation in observations:
+        if observation.run.kind in {"dynamic", "locus"} and observation.run.point.static_load > 0:
+            groups.setdefault(tuple(observation.names("force")), []).append(observation)
+    for names, group in groups.items():
+        axes = np.array([channel.axis or 0.0 for channel in group[0].of("force")])
+        readings = np.array([observation.lines.mean[observation.pick("force")] for observation in group])
+        loads = np.array([_load(observation.run) for observation in group])
+        shown = np.isfinite(readings).all(axis=1)
+        loads, readings = loads[shown], readings[shown]
+        usual = _is_usual(loads, readings)
+        if len(names) > 1 and usual.sum() >= _MIN_RUNS:
+            _ask(group, names, _logarithms(loads[usual], readings[usual], axes), "the static loads in all directions")
+
+
+def _load(run: Run) -> list[float]:
+    """Set point (2,) [N]."""
+    load, angle = run.point.static_load, run.point.static_load_direction
+    return [load * np.cos(angle), load * np.sin(angle)]
+
+
+def _is_usual(loads: FloatArray, readings: FloatArray) -> BoolArray:
+    """Which runs show of their loads what the others in their direction do, (n,)."""
+    size = np.linalg.norm(loads, axis=1, keepdims=True)
+    shares, usual = readings / size, np.ones(len(loads), dtype=bool)
+    for direction in np.unique(np.round(loads / size, 3), axis=0):
+        alike = np.linalg.norm(loads / size - direction, axis=1) < _ALIKE
+        off = np.linalg.norm(shares - np.median(shares[alike], axis=0), axis=1)
+        usual &= ~(alike & (off > _UNUSUAL))
+    return usual
+
+
+def _logarithms(loads: FloatArray, readings: FloatArray, axes: FloatArray) -> ComplexArray:
+    """Logarithm of the gain + i turn [rad] of every sensor (m,), NaN where loads (n, 2) tell it no better than a few %.
+
+    With a zero besides: loads in two directions of one size do not tell that.
+    """
+    size = np.linalg.norm(loads, axis=1, keepdims=True)
+    design = np.column_stack([loads, np.full(len(loads), float(size.mean()))]) / size
+    if np.linalg.cond(design) > _TELLING:
+        return np.full(len(axes), np.nan + 0j)
+    off = np.zeros(len(axes), complex)
+    for j, reading in enumerate((readings / size).T):
+        values, weights, _, _ = reweighted(design, reading, lambda u: huber_weight(u, _BEND))
+        scatter = np.sum(weights * (reading - design @ values) ** 2) / max(weights.sum() - 3, 1.0)
+        covariance = scatter * np.linalg.inv((design * weights[:, None]).T @ design)
+        ratio = complex(values[0], values[1]) * np.exp(-1j * axes[j])
+        if abs(np.log(ratio)) > _CLEAR * np.sqrt(covariance[0, 0] + covariance[1, 1]):
+            off[j] = np.log(ratio)
+    return off
+
+
+def check_probes(sweeps: Sequence[Observation], dry: Sequence[Observation]) -> None:
+    """Two probes against the pads' directions, as the dry runs state them, in the coldest sweep."""
+    angles = _pad_directions(dry)
+    usable = {observation.run.id: observation for observation in sweeps if not observation.report.cells_doubted}
+    first = coldest_first([observation.run for observation in usable.values()])[:1]
+    if len(angles) < _MIN_PADS or not first:
+        return
+    observation = usable[first[0].id]
+    probes = observation.of("displacement")
+    try:
+        polygon = measure_run(first[0], angles)
+    except RigDataError:  # said by its own check
+        return
+    if len(probes) == 2:
+        fitted = polygon.as_read[1] if polygon.as_read else polygon.fitted_angle
+        # without the sides' prior, which takes machined ones for granted
+        precision = np.maximum(polygon.fitted_angle_se**-2 - TILT_SPREAD**-2, 1e-3 * TILT_SPREAD**-2)
+        tilt = (fitted - polygon.angles) * (1 + TILT_SPREAD**-2 / precision)
+        gain, *turns = _of_sides(polygon.angles, tilt, precision**-0.5, [p.axis or 0.0 for p in probes])
+        # which of two gains is off the sides do not tell: each may be by all of it
+        logarithms = np.array([gain, -gain]) + 1j * np.array(turns)
+        _ask([observation], observation.names("displacement"), logarithms, SIDES)
+
+
+def _of_sides(angles: FloatArray, tilt: FloatArray, error: FloatArray, axes: Sequence[float]) -> list[float]:
+    """Gain of the first of two probes over the second's, and the turns of both [rad], of which sides are turned alike.
+
+    Positions come out as D^-1 R p, with D of the stated axes, R of the true ones and their gains; a side's normal turns
+    as its inverse transpose does. `angles`, `tilt`, `error` (n,) [rad] of the pads and of their sides beside them.
+    """
+    told = np.isfinite(tilt)
+    weight, normals, stated = 1 / np.hypot(error[told], _PADS), directions(angles[told]), np.asarray(axes)
+
+    def left(numbers: FloatArray) -> FloatArray:
+        true = directions(stated + numbers[1:]) * [[1 + numbers[0]], [1.0]]
+        turned = normals @ np.linalg.inv(np.linalg.solve(directions(stated), true))
+        off = wrapped(angles[told] + tilt[told] - np.arctan2(turned[:, 1], turned[:, 0]))
+        return np.append(weight * off, numbers / _PLAUSIBLE)
+
+    numbers = np.zeros(3)
+    for _ in range(_STEPS):
+        slopes = np.stack([(left(numbers + step) - left(numbers - step)) / 2e-6 for step in 1e-6 * np.eye(3)], axis=1)
+        numbers = np.clip(numbers - np.linalg.lstsq(slopes, left(numbers), rcond=None)[0], -0.7, 0.7)
+    clear = np.abs(numbers) > _CLEAR * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    return [float(np.log1p(numbers[0])) * clear[0], *(numbers * clear)[1:].tolist()]
+
+
+def _pad_directions(runs: Sequence[Observation]) -> list[float]:
+    """Directions [rad] of all pads as dry runs state them; none where a pad lacks."""
+    stated = {
+        observation.run.pad: observation.run.point.static_load_direction
+        for observation in runs
+        if observation.run.pad and "static_load_direction" in observation.run.stated
+    }
+    angles = [stated[pad] for pad in sorted(stated)]
+    gaps = np.diff(np.sort(np.mod(angles, 2 * np.pi)))
+    is_whole = sorted(stated) == list(range(1, len(stated) + 1)) and np.all(gaps > np.pi / max(len(stated), 1))
+    return angles if is_whole else []
+
+
+def _ask(observations: Sequence[Observation], names: Sequence[str], logarithms: ComplexArray, witness: str) -> None:
+    """Report sensors (m,) that are off against the others and the witness, each of which counts as one."""
+    if not np.isfinite(logarithms).all():
+        return
+    usual = [np.median([*numbers, 0.0]) for numbers in (logarithms.real, logarithms.imag)]
+    for name, gain, turn in zip(names, logarithms.real - usual[0], logarithms.imag - usual[1]):
+        angle = float(np.degrees(turn))
+        for observation in observations:
+            report = observation.report
+            of_gain = report.ask("sensor gain", abs(gain), name, share=float(np.expm1(gain)), witness=witness)
+            of_axis = report.ask("sensor axis", abs(angle), name, angle=angle, witness=witness)
+            if of_gain or of_axis:
+                sizes = abs(gain) if of_gain else 0.0, abs(turn) if of_axis else 0.0
+                report.doubted[name] = CHANGE_AS_DEVIATION * sizes[0], CHANGE_AS_DEVIATION * sizes[1]
