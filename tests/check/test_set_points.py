@@ -65,7 +65,7 @@ def test_a_probe_whose_range_changed_is_told_by_what_turns_with_the_shaft(freque
         for _ in range(4):
             run = observation(place[0], 1000.0, frequency=place[1])
             size = 4e-6 * (1 + 0.003 * rng.standard_normal()) * (place[0] / 5000.0) ** -0.2
-            run.shaft_line = np.array([size * (gain if place == (load, frequency) else 1.0), 3e-6])
+            run.shaft_lines = np.array([[size * (gain if place == (load, frequency) else 1.0), 3e-6], [np.nan, np.nan]])
             run.channels, run.pick = [SimpleNamespace(name="X1A"), SimpleNamespace(name="X1B")], lambda quantity: [0, 1]
             runs.append(run)
     check_shaft_lines(runs)

@@ -77,13 +77,13 @@ class Reporter:
     run: Run
     findings: list[Finding] = field(default_factory=list)
     cells_doubted: bool = False  #: what they show is held against nothing any more
-    doubted: dict[str, tuple[float, float]] = field(
-        default_factory=dict
-    )  #: by channel: deviations of gain and axis [rad]
+    #: by channel: deviations of its gain and its axis [rad]; of its gain in this run
+    doubted: dict[str, tuple[float, float]] = field(default_factory=dict)
+    off: dict[str, float] = field(default_factory=dict)
 
     def copy(self) -> Reporter:
         """A reporter that has found the same so far."""
-        return replace(self, findings=list(self.findings), doubted=dict(self.doubted))
+        return replace(self, findings=list(self.findings), doubted=dict(self.doubted), off=dict(self.off))
 
     @property
     def keys(self) -> list[str]:
@@ -164,6 +164,7 @@ class Verdicts:
     doubtful: dict[str, list[Problem]] = field(default_factory=dict)
     run_gains: dict[str, list[Problem]] = field(default_factory=dict)
     doubted: dict[str, tuple[float, float]] = field(default_factory=dict)  #: as of `Reporter`
+    off: dict[tuple[str, str], float] = field(default_factory=dict)  #: the same, by run and channel
     swept: dict[tuple[str, str], float] = field(default_factory=dict)  #: m: half a probe's travel, by sweep and probe
 
 

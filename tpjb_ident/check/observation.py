@@ -69,15 +69,17 @@ def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel])
 
 
 def shaft_line(phasors: RunPhasors, channels: Sequence[Channel]) -> tuple[FloatArray, float]:
-    """Size of what turns with the shaft in every channel (m,), and the sense of its force, see `_sense`.
+    """Sizes of 1X and 2X in every channel (2, m), and the sense of the force at 1X, see `_sense`.
 
-    NaN where it is not told from the excitation.
+    NaN where they are not told from the excitation.
     """
-    place = phasors.lines.place("1X")
-    if place is None:
-        return np.full(len(channels), np.nan), math.nan
-    z = phasors.z[:, place]
-    return by_channel(window_median(np.abs(z)), phasors.channels, channels), _sense(phasors.plane("force", z))
+    sizes, sense = np.full((2, len(channels)), np.nan), math.nan
+    for k, place in enumerate(map(phasors.lines.place, ("1X", "2X"))):
+        if place is not None:
+            z = phasors.z[:, place]
+            sizes[k] = by_channel(window_median(np.abs(z)), phasors.channels, channels)
+            sense = sense if k else _sense(phasors.plane("force", z))
+    return sizes, sense
 
 
 def _sense(force: ComplexArray) -> float:
@@ -164,8 +166,8 @@ class Observation(Directed):
     digest: str = ""
     speed: float = math.nan
     seconds: float = math.nan  #: how long the record is
-    #: (m,): size of what turns with the shaft, SI; empty where nothing tells it
-    shaft_line: FloatArray = field(default_factory=lambda: np.empty(0))
+    #: (2, m): sizes of 1X and 2X, SI; empty where nothing tells them
+    shaft_lines: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     shaft_force: float = math.nan  #: sense of the 1X force, see `_sense`
     conditions: Conditions = ()  #: of its phasors
 
@@ -243,7 +245,7 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
     shown, stated = phasors.lines.excitation[line].frequency, run.point.excitation_hz
     report.ask("other frequency", abs(shown / stated - 1), shown=shown, stated=stated)
     turning, sense = shaft_line(phasors, live)
-    return replace(observation, shaft_line=turning, shaft_force=sense, conditions=phasors.conditions)
+    return replace(observation, shaft_lines=turning, shaft_force=sense, conditions=phasors.conditions)
 
 
 def _is_timed(report: Reporter, run: Run, length: int) -> bool:

@@ -29,6 +29,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from tpjb_ident.check.findings import explanation, far, indefiniteness, plane_of, repairs
 from tpjb_ident.check.observation import NO_NOISE, Observation
+from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.phasors.frequency import shaft_order
 
 #: Smaller over larger extent of displacements that move along one line.
@@ -122,7 +123,7 @@ def _readings(runs: Sequence[Observation]) -> PointRuns:
     """Readings of all runs of a point, by channel."""
     probes, cells = runs[0].of("displacement"), runs[0].of("force")
     places = [[*run.pick("displacement"), *run.pick("force")] for run in runs]
-    rows = [(run.lines.phasor[k], run.lines.mean[k], run.shaft_line[k]) for run, k in zip(runs, places)]
+    rows = [(run.lines.phasor[k], run.lines.mean[k], run.shaft_lines[0, k]) for run, k in zip(runs, places)]
     phasors, loads, turning = map(np.array, zip(*rows))
     loads[:, : len(probes)] = np.nan
     inertia = np.array([run.inertia for run in runs])
@@ -400,12 +401,19 @@ def _outlying(
 def check_shaft_lines(runs: Sequence[Observation]) -> None:
     """What turns with the shaft, run against run: nearly the same at all loads, the same whatever the excitation.
 
-    Whole operating points are told so in which a channel has another gain: their runs have no fellow without it.
+    Whole operating points are told so in which a channel has another gain: their runs have no fellow without it. At 1X
+    the shaft answers its unbalance, through another film at another load; at 2X probes show run-out, as a rule.
     """
     # what computed records without noise show beside their lines is rounding
-    shown = [run for run in runs if len(run.shaft_line) and NO_NOISE not in run.report.keys]
-    sizes = [np.log(np.maximum(np.nan_to_num(run.shaft_line), _NOTHING)) for run in shown]
-    for alike, least in (("run.point.static_key", _SAME_LINE), ("run.point.spin", _LIKE_LINE)):
+    shown = [run for run in runs if len(run.shaft_lines) and NO_NOISE not in run.report.keys]
+    limits = (
+        (0, "run.point.static_key", _SAME_LINE),
+        (0, "run.point.spin", _LIKE_LINE),
+        (1, "run.point.spin", _SAME_LINE),
+    )
+    for order, alike, least in limits:
+        sizes = [np.log(np.maximum(np.nan_to_num(run.shaft_lines[order]), _NOTHING)) for run in shown]
         for name, observation, off in _outlying(shown, sizes, alike, least, _MANY_LINES, _MIN_LINES):
             if f"shaft line {name}" not in observation.report.keys:
-                observation.report.ask("shaft line", math.exp(off), name)
+                observation.report.ask("shaft line", math.exp(off), name, speed=("", "twice ")[order])
+                observation.report.off[name] = CHANGE_AS_DEVIATION * abs(off)

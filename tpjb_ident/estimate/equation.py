@@ -80,6 +80,8 @@ class Rig(Directed):
     mount: str = "cells"  #: "cells", "floating", or "unknown": no accelerometer tells
     #: by term: what its test said of sensors that are since taken as uncertain as it showed them
     contradicted: Mapping[str, Conditions] = field(default_factory=dict)
+    #: by run and sensor: deviation of a gain that is another one there
+    off: Mapping[tuple[str, str], float] = field(default_factory=dict)
     bare: RigStiffness = field(default_factory=RigStiffness)
     static: bool = True  #: whether the cells show the static load
     to_set_point: bool = True  #: whether H is that at the set points, not at the runs' own loads

@@ -157,7 +157,8 @@ def assemble(
     dry = dry or DryTest()
     gathered = gather(digests)
     report("estimating", 0, len(gathered))
-    rig = campaign_rig(campaign, bare=dry.stiffness, to_set_point=settings.correct).doubting(checked.doubted)
+    rig = campaign_rig(campaign, bare=dry.stiffness, to_set_point=settings.correct, off=checked.off)
+    rig = rig.doubting(checked.doubted)
     solved = solve_campaign(campaign, gathered, digests, workers, rig)
     jobs = []
     for p, data in enumerate(gathered):
@@ -214,7 +215,8 @@ def identify_bands(
         data = band_blocks(points, rig, loads, settings.clearance)
         return solve_bands(mounted(loads.doubted(rig), data.blocks, campaign.mount, loads.common), data)
 
-    rig = campaign_rig(campaign, bare=bare, to_set_point=settings.correct).doubting(checked.doubted)
+    rig = campaign_rig(campaign, bare=bare, to_set_point=settings.correct, off=checked.off)
+    rig = rig.doubting(checked.doubted)
     solved = solved_with_clocks(rig, min(run.sample_rate for run in runs), solve)
     results, numbers = [], []
     points = solved.points

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray
+from rigdata.arrays import ComplexArray, IntArray
 from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
@@ -22,23 +22,38 @@ class Gain(Factor):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        self._places: list[tuple[int, int]] = []
+        self._places: list[tuple[int, int, int]] = []
         parameters = []
         for j, sensor in enumerate(rig.channels):
-            if not sensor.uncertainty:
-                continue
             calibrations = np.unique(blocks.calibration[:, j]).tolist() or [0]
             for k in calibrations:
                 name = sensor.name if len(calibrations) == 1 else f"{sensor.name}, calibration {k + 1}"
-                self._places.append((j, k))
-                parameters.append(Parameter(name, "1", sensor.uncertainty))
+                for point, off in self._off(blocks, j).items():
+                    if sensor.uncertainty or off:
+                        self._places.append((j, k, point))
+                        words = name if point < 0 else f"{name}, at {blocks.points[point]}"
+                        parameters.append(Parameter(words, "1", float(np.hypot(sensor.uncertainty or 0.0, off))))
         self.parameters = tuple(parameters)
+
+    def _point(self, blocks: Blocks, j: int) -> IntArray:
+        """Of every block the point, if a sensor's gain is another one in its run; -1: it is not, (n,)."""
+        off = np.array([(run, self.rig.channels[j].name) in self.rig.off for run in blocks.runs], dtype=bool)
+        return np.where(off[blocks.run], blocks.point, -1) if len(blocks) else blocks.point
+
+    def _off(self, blocks: Blocks, j: int) -> dict[int, float]:
+        """Deviation of a sensor's gain at points where it is another one; at all others (-1) it is that of all."""
+        points, largest = self._point(blocks, j), {-1: 0.0}
+        for point, run in zip(points.tolist(), blocks.run.tolist()):
+            if point >= 0:
+                deviation = self.rig.off[blocks.runs[run], self.rig.channels[j].name]
+                largest[point] = max(largest.get(point, 0.0), deviation)
+        return largest
 
     def exponent(self, blocks: Blocks) -> ComplexArray:
         """One in the sensor's own row, in the runs of that calibration."""
         exponent = np.zeros((*blocks.z.shape, len(self._places)), complex)
-        for q, (j, k) in enumerate(self._places):
-            exponent[:, j, q] = blocks.calibration[:, j] == k
+        for q, (j, k, point) in enumerate(self._places):
+            exponent[:, j, q] = (blocks.calibration[:, j] == k) & (self._point(blocks, j) == point)
         return exponent
 
     def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
@@ -51,7 +66,7 @@ class Gain(Factor):
 
     def _differing(self, fitted: Fitted) -> dict[str, list[float]]:
         """Gains by quantity, of those whose channels differ beyond what is stated."""
-        quantities = [self.rig.channels[j].quantity for j, _ in self._places]
+        quantities = [self.rig.channels[j].quantity for j, *_ in self._places]
         differing = {quantities[k] for k in exceeding(fitted, self.parameters)}
         return {name: [float(v) for v, q in zip(fitted.value, quantities) if q == name] for name in differing}
 
