@@ -81,13 +81,14 @@ def _is_held(statistics: ChannelStatistics) -> bool:
 def check_clock(report: Reporter, time: FloatArray) -> None:
     """Judge the times at which a run begins; `time` (n,)."""
     rate, samples, excitation = report.run.sample_rate, len(time), report.run.point.excitation_hz
+    cycles = getattr(report.run.reader, "whole_length", report.run.length) * excitation / rate
     if samples < 3:
         report.ask("short", samples=samples)
         return
     if report.run.kind == "dynamic" and rate < 2.2 * excitation:
         report.ask("nyquist", rate=rate, excitation=excitation)
-    elif report.run.kind == "dynamic" and report.run.length * excitation < _MIN_CYCLES * rate:
-        report.ask("short of cycles", float(excitation > 0), cycles=report.run.length * excitation / rate)
+    elif report.run.kind == "dynamic" and cycles < _MIN_CYCLES:
+        report.ask("short of cycles", float(excitation > 0), cycles=cycles)
     steps = np.diff(time) * rate
     gaps = np.flatnonzero(steps > 1.9)  # a late sample of a jittering clock is no gap: there the next step is short
     if len(gaps):

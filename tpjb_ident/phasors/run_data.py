@@ -290,7 +290,8 @@ class _Beginning:
     """A run's reader that ends after the first samples."""
 
     def __init__(self, reader: Any, samples: int) -> None:
-        self._reader, self._length = reader, min(samples, getattr(reader, "samples", reader.length()))
+        self._reader, self.whole_length = reader, reader.length()
+        self._length = min(samples, getattr(reader, "samples", self.whole_length))
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._reader, name)
