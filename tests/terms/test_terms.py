@@ -170,6 +170,20 @@ def test_one_cell_that_comes_late_is_told_by_its_own_axis(seed, late):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("wrong", [{"late": {"D1": 5e-4}}, {"turned": {"D1": 0.06}}], ids=["late", "turned"])
+def test_one_probe_of_three_that_no_gain_explains_stands_in_the_interval(seed, wrong):
+    """A lag and an axis leave probes contradicting one another, and gains would answer for them."""
+    sure = {f"D{k}": {"uncertainty": 2e-3} for k in (1, 2, 3)}
+    rig, blocks, truth = made(Case(probes=3, hertz=(25.0, 41.0), noise=2e-4, stated=sure, **wrong), seed)
+    first = solved(rig, blocks, truth)
+    assert not held(first, truth)
+    solution = solved(learnt_rig(rig, first), blocks, truth)
+    assert held(solution, truth)
+    assert "probe-gains-differ" in solution.conditions()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("wrong", [[-1.0, -1.0], [-1.0, 1.0]])
 @pytest.mark.parametrize(
     "leads", [{"late": {"force": 5e-4}}, {"corner": 1e-9, "input_corner": 1.0}], ids=["late", "corner"]

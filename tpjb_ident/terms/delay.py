@@ -5,14 +5,24 @@ equations tell cells from accelerometers (a spring knows no phase); probes again
 tell.
 """
 
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Conditions, holding
-from tpjb_ident.estimate.equation import Blocks, Rig
+from tpjb_ident.conditions import Condition, Conditions, holding
+from tpjb_ident.estimate.equation import Blocks, Rig, vector
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, exceeding
 
+if TYPE_CHECKING:
+    from tpjb_ident.estimate.solve import Solution
+
 _MILLISECOND = 1e-3
+#: Share of the motion by which probes contradict one another that gains leave, and times the noise, for them to do so.
+_LEAST, _MANY = 0.005, 9.0
 #: Standard errors and phase [rad] from which cells come late, and not the accelerometers early.
 _CLEAR, _NOTABLE = 2.0, 0.02
 
@@ -37,10 +47,42 @@ class Delay(Factor):
         """-i omega, per ms."""
         return np.asarray(-1j * _MILLISECOND * blocks.omega)
 
+    def learnt(self, rig: Rig, solution: Solution) -> Rig:
+        """Probes beyond two as uncertain, in time and size, as gains alone leave them contradicting one another."""
+        off = _contradiction(solution)
+        if off < _LEAST or any(sensor.delay_uncertainty for sensor in rig.channels):
+            return super().learnt(rig, solution)
+        sensors = []
+        for sensor in rig.channels:
+            is_probe = sensor.quantity == "displacement"
+            late = replace(sensor.doubted(off), delay_uncertainty=off / self._omega)
+            sensors.append(late if is_probe else sensor)
+        text = f"probes contradict one another by {100 * off:.1f} % of the motion, which gains do not explain"
+        said = {self.name: (Condition("probe-gains-differ", text),)}
+        return replace(rig, channels=tuple(sensors), contradicted={**rig.contradicted, **said})
+
     def conditions(self, fitted: Fitted) -> Conditions:
         """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""
         if self.rig.out_of_step:
             late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)
             contradictions = [condition for conditions in self.rig.contradicted.values() for condition in conditions]
             return tuple(condition for condition in contradictions if condition == OUT_OF_STEP and late.any())
-        return holding((exceeding(fitted, self.parameters), OUT_OF_STEP, "; ".join(self.words(fitted))))
+        probes = {sensor.name for sensor in self.rig.channels if sensor.quantity == "displacement"}
+        named = {self.parameters[k].name for k in exceeding(fitted, self.parameters)} - probes
+        known = self.rig.contradicted.get(self.name, ())
+        return (*known, *holding((named, OUT_OF_STEP, "; ".join(self.words(fitted)))))
+
+
+def _contradiction(solution: Solution) -> float:
+    """What probes beyond two show beside a motion of the shaft, as a share of it, root mean square; 0 if noise does."""
+    probes = solution.rig.pick("displacement")
+    if len(probes) < 3:
+        return 0.0
+    blocks = replace(solution.blocks, z=(solution.blocks.z - solution.shift) / solution.factor)
+    motion = vector(solution.rig, blocks, "displacement")
+    beside = blocks.z[:, probes] - np.einsum("nja,na->nj", blocks.along[:, probes], motion)
+    beside = np.where(blocks.present[:, probes] & np.isfinite(beside), beside, 0.0)
+    size, noise = np.sum(np.abs(beside) ** 2, axis=1), blocks.noise_power(probes)
+    if not np.sum(size) > _MANY * np.sum(noise):
+        return 0.0
+    return float(np.sqrt(np.median(size / np.maximum(np.sum(np.abs(motion) ** 2, axis=1), 1e-300))))

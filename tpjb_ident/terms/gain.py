@@ -61,7 +61,8 @@ class Gain(Factor):
         spread = {}
         for quantity, values in self._differing(fitted).items():
             spread[quantity] = float(np.sqrt(np.sum(np.square(values)) / max(len(values) - 1, 1)))
-        sensors = tuple(sensor.doubted(spread.get(sensor.quantity, 0.0)) for sensor in rig.channels)
+        # what contradicts so may as well be an axis or crosstalk
+        sensors = tuple(sensor.doubted(*[spread.get(sensor.quantity, 0.0)] * 2) for sensor in rig.channels)
         return replace(rig, channels=sensors) if spread else None
 
     def _differing(self, fitted: Fitted) -> dict[str, list[float]]:
