@@ -16,7 +16,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 
 _LOG = logging.getLogger(__name__)
-_KEEP = 40  # files of 3 to 4 MB each
+_MOST = 200_000_000  # bytes of all files
 _SOURCES = ("line", "mesh", "operators", "block_cholesky")
 
 
@@ -98,5 +98,8 @@ def _prune(folder: Path) -> None:
     latest = time.time() + 60.0  # what is later was stored while the clock was ahead: it must not outlive all others
     changed = {path: path.stat().st_mtime for path in folder.glob("pad-*.npz")}
     files = sorted(changed, key=lambda path: changed[path] if changed[path] < latest else 0.0, reverse=True)
-    for path in files[_KEEP:]:
-        path.unlink(missing_ok=True)
+    size = 0
+    for path in files:
+        size += path.stat().st_size
+        if size > _MOST:
+            path.unlink(missing_ok=True)

@@ -1,6 +1,7 @@
 """Excitation over a band: exact where nothing disturbs, unbiased where displacements are noisy, honest where not."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -21,6 +22,7 @@ from tpjb_ident.bands.responses import classic_line, line_response, one_phase_se
 from tpjb_ident.bands.run_spectra import RunSpectra, find_period, resampled
 from tpjb_ident.bands.samples import Samples
 from tpjb_ident.conditions import untrusted
+from tpjb_ident.identification.band_blocks import _one_sided
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.results.identification import frf_frame, models_frame
@@ -461,6 +463,20 @@ def test_lines_are_driven_where_the_command_is_or_else_what_moves():
 )  # fmt: skip
 def test_what_a_band_s_motion_may_do_to_the_film_is_stated(kind, rms, peak, one_sided, share):
     assert band_change(kind, rms, peak, one_sided) == pytest.approx(share)
+
+
+@pytest.mark.parametrize(
+    ("sides", "share"),
+    [
+        ([((1, 0), 1.0), ((0, 1), 1.0)], 1.0),
+        ([((1, 0), 1.0), ((1, 0), -1.0), ((0, 1), 0.5), ((0, -1), 0.5)], 0.0),
+        ([((0.8, 0.6), 1.0), ((-0.8, -0.6), -1.0)], 1.0),  # an axis has no sign
+        ([((1, 0), 0.2), ((1, 0), -0.2), ((0, 1), -0.3)], 0.3),
+    ],
+)
+def test_blows_the_other_way_in_another_run_take_back_what_those_do(sides, share):
+    runs = [SimpleNamespace(sides=np.array([axis, skew * np.array(axis)])) for axis, skew in sides]
+    assert _one_sided(runs) == pytest.approx(share)
 
 
 @pytest.mark.slow

@@ -151,7 +151,7 @@ def test_the_first_screen_says_what_was_tested_and_each_value_with_its_interval(
     assert "Shaft: 22 Hz (1320 rpm) clockwise, 22 Hz (1320 rpm) Excitation: 25 Hz" in words
     assert "At 5 kN, 25 Hz, shaft at 22 Hz (1320 rpm) clockwise; 95 % intervals" in words
     assert "cyy, kN s/m 700 ± 14 350 ± 14 −350" in words
-    assert "Flags on 2 points, none forbids trust: large-amplitude (2)." in words
+    assert "Flags, none of which forbids trust: large-amplitude (2)." in words
     assert "operating point: load in kN, excitation in Hz" in words
     table = " ".join(re.sub(r"<[^>]+>", " ", page[page.index('id="s1"') :]).split())
     assert "5 kN, 25 Hz, ccw" in table

@@ -15,7 +15,17 @@ from tpjb_ident.diagnosis.verdict.behaviour import _words
 from tpjb_ident.diagnosis.verdict.decide import parameters_of
 from tpjb_ident.diagnosis.verdict.held_out import HeldOut, Touched, held_out_gap
 from tpjb_ident.diagnosis.verdict.interval import errors_each_way
-from tpjb_ident.diagnosis.verdict.rules import _named, look_alikes
+from tpjb_ident.diagnosis.verdict.rules import _named, _places, look_alikes
+
+
+class Ordered:
+    """Pairs as a mapping has them, of what has no hash."""
+
+    def __init__(self, pairs):
+        self.pairs = list(pairs)
+
+    def items(self):
+        return self.pairs
 
 
 def fit(values, amplitudes, errors, names, basis=()):
@@ -116,7 +126,7 @@ def test_an_effect_by_which_the_gap_grows_is_no_part_of_a_story(along, verdict):
     touched = sorted((Touched("x", *ends, True) for ends in along), key=lambda one: -one.remaining)
     held = HeldOut(held.fit, np.full(2, 2.0), tuple(touched))
     vars(held)["free"] = 0.3  # with tolerances free all of it is closed
-    assert _named(held, ()).name == verdict
+    assert _named(held, (), ()).name == verdict
 
 
 def bent_case(contradicted, jump=0.0):
@@ -246,3 +256,32 @@ def test_a_group_of_look_alikes_begins_with_the_effect_that_is_listed():
     judgement = look_alikes(held, ("supply_temperature", "oil_viscosity", "viscosity_law"))
     assert judgement.name == "ambiguous"
     assert judgement.family == ("oil_viscosity", "supply_temperature", "viscosity_law")
+
+
+@pytest.mark.parametrize(
+    ("probabilities", "listed"),
+    [
+        ((0.5, 0.3, 0.1, 0.06), ("soft_pivot pad 1", "soft_pivot pad 2", "soft_pivot pad 3")),
+        ((0.93, 0.01, 0.01, 0.01), ()),
+        ((0.6, 0.0, 0.0, 0.38), ()),  # the other name is no place
+    ],
+)
+def test_a_pad_is_named_where_it_is_as_sure_as_a_name(probabilities, listed):
+    names = ("soft_pivot", "soft_pivot", "soft_pivot", "pad_bore")
+    fits = []
+    for pad, name in enumerate(names, start=1):
+        fault = SimpleNamespace(name=name, label=f"{name} pad {pad}", candidate=SimpleNamespace(fixed={"pad": pad}))
+        fits.append(SimpleNamespace(names=frozenset({name}), faults=(fault,)))
+    comparison = SimpleNamespace(probabilities=Ordered(zip(fits, probabilities, strict=True)), tenable=fits)
+    assert _places(comparison, fits[0]) == listed
+
+
+def test_a_direction_is_no_place():
+    """Every start of the grid leads to the same direction, which is free beside it."""
+    fits = []
+    for angle in (0.0, 0.785):
+        candidate = SimpleNamespace(fixed={})
+        fault = SimpleNamespace(name="misalignment", label=f"misalignment direction {angle}", candidate=candidate)
+        fits.append(SimpleNamespace(names=frozenset({"misalignment"}), faults=(fault,)))
+    comparison = SimpleNamespace(probabilities=Ordered(zip(fits, (0.6, 0.4), strict=True)), tenable=fits)
+    assert _places(comparison, fits[0]) == ()

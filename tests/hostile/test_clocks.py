@@ -23,14 +23,16 @@ def jumping(monkeypatch):
 
 def test_solutions_stored_while_the_clock_was_ahead_do_not_push_out_new_ones(tmp_path, monkeypatch):
     monkeypatch.setenv("TPJB_CACHE", str(tmp_path))
-    for number in range(store._KEEP):
+    assert store.save_arrays("ahead0", {"a": np.ones(1)})
+    monkeypatch.setattr(store, "_MOST", 5 * next(tmp_path.iterdir()).stat().st_size)
+    for number in range(1, 5):
         assert store.save_arrays(f"ahead{number}", {"a": np.ones(1)})
     for path in tmp_path.iterdir():
         os.utime(path, (time.time() + 1e6,) * 2)
     for number in range(3):
         assert store.save_arrays(f"new{number}", {"a": np.full(1, float(number))})
     assert [store.load_arrays(f"new{number}", {"a": (1,)})["a"][0] for number in range(3)] == [0.0, 1.0, 2.0]
-    assert len(list(tmp_path.iterdir())) == store._KEEP
+    assert len(list(tmp_path.iterdir())) == 5
 
 
 @pytest.mark.slow

@@ -231,8 +231,10 @@ class TestStore:
 
     def test_old_files_are_pruned(self, tmp_path, monkeypatch) -> None:
         monkeypatch.setenv("TPJB_CACHE", str(tmp_path))
-        monkeypatch.setattr(pad_store, "_KEEP", 3)
-        for i in range(6):
+        assert pad_store.save_arrays("0" * 32, {"a": np.zeros(2)})
+        (size,) = (path.stat().st_size for path in tmp_path.iterdir())
+        monkeypatch.setattr(pad_store, "_MOST", 3 * size)
+        for i in range(1, 6):
             assert pad_store.save_arrays(f"{i:032d}", {"a": np.zeros(2)})
         assert len(list(tmp_path.iterdir())) == 3
 

@@ -206,7 +206,8 @@ class RunSpectra(RunPhasors):
     period: float | None
     clean_rms: float = 0.0  #: m: of the motion without disturbing lines
     peak: float = 0.0  #: m: largest motion
-    one_sided: float = 0.0  #: 1 where what drives goes to one side only, 0 where to both alike
+    #: (2, 2): unit vector of the drive, and how far it goes to its side: as long where to that only, 0 where to both
+    sides: FloatArray = field(default_factory=lambda: np.zeros((2, 2)))
     by_time: RunSpectra | None = None  #: of the record times the time from its middle [s]
     wide: RunSpectra | None = None  #: of a period, and beyond the band, where the film answers
     #: by order n the phasors (1, n_bins, ..) of the record turned n times as fast as the shaft: at f, what is at f - nX
@@ -294,7 +295,7 @@ def run_spectra(
             period=None if period is None else seconds,
             clean_rms=motion[0],
             peak=motion[1],
-            one_sided=motion[2],
+            sides=motion[2],
         )
         return compensated(spectra, run, slower, settings.delays)
 
@@ -319,14 +320,15 @@ def _turned(spectra: RunSpectra, samples: Samples, places: IntArray) -> RunSpect
     return replace(spectra, turned=turned)
 
 
-def _motion(samples: Samples) -> tuple[float, float, float]:
-    """Rms and peak of the motion [m], and how far the drive goes to one side."""
+def _motion(samples: Samples) -> tuple[float, float, FloatArray]:
+    """Rms and peak of the motion [m], and the sides to which the drive goes, as of `RunSpectra`."""
     motion = samples.plane("displacement", samples.rows.T).real.T
     size = np.linalg.norm(motion, axis=0)
     drive = motion if samples.command is None else samples.command
-    along = np.linalg.eigh(drive @ drive.T)[1][:, -1] @ drive
-    one_sided = abs(np.mean(along**3)) / max(np.mean(np.abs(along) ** 3), 1e-300)
-    return float(np.sqrt(np.mean(size**2))), float(size.max()), one_sided
+    axis = np.linalg.eigh(drive @ drive.T)[1][:, -1]
+    along = axis @ drive
+    skew = np.mean(along**3) / max(np.mean(np.abs(along) ** 3), 1e-300)
+    return float(np.sqrt(np.mean(size**2))), float(size.max()), np.array([axis, skew * axis])
 
 
 def _period(

@@ -15,12 +15,10 @@ from rigdata.run import Run
 from rigdata.vector import directions, wrapped
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.clearance.measure import coldest_first, measure_run
-from tpjb_ident.clearance.polygon import TILT_SPREAD
+from tpjb_ident.clearance.polygon import SIDES, TILT_SPREAD
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 
-#: What tells of probes, in words.
-SIDES = "the sides of the clearance polygon"
 #: Condition of the loads' directions up to which they tell cells apart, and runs.
 _TELLING, _MIN_RUNS = 30.0, 4
 #: Directions that are one, and share of a load by which a run is another than its set point.

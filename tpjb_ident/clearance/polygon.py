@@ -39,6 +39,7 @@ from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.pivot.curve import PivotCurve
 
+SIDES = "the sides of the clearance polygon"  # what tells of probes, in words
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
 _DEVIATES = 2.0  # such widths from which a pad stands off clearly
 TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed

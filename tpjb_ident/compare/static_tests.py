@@ -12,9 +12,9 @@ from model.bearing import Bearing
 from rigdata.campaign import Campaign
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.check.sensor_axes import SIDES
 from tpjb_ident.clearance.locus import Locus, measure_locus
 from tpjb_ident.clearance.measure import ClearancePolygon, measure_run, measure_sweeps
+from tpjb_ident.clearance.polygon import SIDES
 from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.fit import fit_pivots

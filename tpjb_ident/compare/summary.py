@@ -144,7 +144,7 @@ def _pivot_sentence(comparison: Comparison) -> list[str]:
     load = 0.8 * comparison.curves[0].valid_to
     return [
         f"At {amount(load, 'load', '.3g')} the measured pivots have {100 * low:.0f} % (pad #{soft}) to "
-        f"{100 * high:.0f} % (pad #{stiff}) of the stiffness that the printed formula gives."
+        f"{100 * high:.0f} % (pad #{stiff}) of the tangent stiffness by Kirk's formula."
     ]
 
 

@@ -118,12 +118,18 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
         change, scatter = 0.0, np.zeros_like(scatter)
     elif not film.seen:
         rms, peak = (max(getattr(s, name) for s in point.runs) / clearance for name in ("rms", "peak"))
-        one_sided = max(s.one_sided for s in point.runs)
-        stated = band_change("pair" if pair else point.kind, rms, peak, one_sided)
+        stated = band_change("pair" if pair else point.kind, rms, peak, _one_sided(point.runs))
         scatter = np.fmin(scatter, (line_scatter(rms) if film.even else stated) / np.sqrt(2))
         change = np.fmin(change, stated)
     uneven = np.hypot(repeats * scatter, film.turning / np.sqrt(2))
     return worth_stating(change + film.orbit), uneven, film.turning
+
+
+def _one_sided(runs: Sequence[RunSpectra]) -> float:
+    """How far runs together drive to one side, along X or Y: what one of them does the other way takes back."""
+    sides = np.array([run.sides for run in runs])
+    along, side = np.abs(sides[:, 0]).sum(axis=0), np.abs(sides[:, 1].sum(axis=0))
+    return float(np.max(side / np.maximum(along, 0.1 * along.max())))
 
 
 def _places(spectra: RunSpectra, sensors: Sequence[Sensor]) -> IntArray:

@@ -92,7 +92,7 @@ def identify(
     --------
     >>> result = ti.identify(demo)
     >>> print(result.points[0])
-    2.5 kN, 25 Hz: kxx 53.07 ± 0.49 MN/m, cxx 581.6 ± 5.0 kN s/m, kyy 90.68 ± 0.81 MN/m, cyy 689.0 ± 6.1 kN s/m
+    2.5 kN, 25 Hz: kxx 53.07 ± 0.49 MN/m, cxx 581.6 ± 5.0 kN s/m, kyy 90.68 ± 0.81 MN/m, cyy 689.1 ± 6.1 kN s/m
     """
     chosen = settings or IdentifySettings()
     runs = campaign.of_kind("dynamic")

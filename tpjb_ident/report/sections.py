@@ -133,7 +133,7 @@ def flags_line(flags: Iterable[Iterable[Condition]], points: int) -> str:
     gravest_first = sorted(counts, key=lambda flag: SEVERITIES.index(flag.severity))
     texts = [f"{flag} ({counts[flag]})" if counts[flag] > 1 else flag for flag in gravest_first]
     bad = sum(counts[flag] for flag in untrusted(counts))
-    head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"
+    head = f"{counted(bad, 'flag')} against trust" if bad else "Flags, none of which forbids trust"
     none = f"No flags on {counted(points, 'point')}." if points else ""
     return f"{head}: {', '.join(texts)}." if texts else none
 
