@@ -279,6 +279,11 @@ def test_runs_are_grouped_by_their_set_points_in_order():
     ]  # fmt: skip
     assert [p.names for p in points] == [(4,), (1, 2), (2,), (0, 3)]
     assert [p.lines for p in points] == [(0,), (0, 0), (1,), (0, 0)]
+    # a drive that missed its set point is found by every run for itself
+    missed = [(at(), (24.299,)), (at(), (24.3,)), (at(), (24.301,)), (at(), (24.4,)), (at(6e3), (24.3,))]
+    for k, (run, (point, driven)) in enumerate(zip(runs, missed, strict=True)):
+        run.run, run.point, run.lines = k, point, SimpleNamespace(driven=driven)
+    assert [p.names for p in gather(runs)] == [(0, 1, 2), (3,), (4,)]
     # within a fiftieth a line is that of the set point; beyond, one of its own, to the millihertz
     for frequency, own in ((25.49, 25.0), (25.51, 25.51), (24.51, 25.0), (24.48915, 24.489)):
         assert point_of(at(), frequency).excitation_hz == pytest.approx(own, abs=1e-9)

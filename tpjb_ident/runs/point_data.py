@@ -25,6 +25,8 @@ from tpjb_ident.rounding import listed
 
 #: Runs named one by one; more are counted.
 _LISTED = 6
+#: Share of a frequency within which lines of several runs are one.
+_ONE_LINE = 5e-4
 
 
 @dataclass(frozen=True, repr=False)
@@ -202,8 +204,15 @@ def gather(runs: Sequence[RunPhasors]) -> list[PointData]:
     for run in runs:
         for i, frequency in enumerate(run.lines.driven):
             point = point_of(run.point, frequency)
+            known = (other for other, _ in groups.values() if other.static_key == point.static_key)
+            # of one set point that the drive missed, runs find the frequency each by itself
+            point = next((other for other in known if _is_line(other, point)), point)
             groups.setdefault(point.key, (point, []))[1].append((run, i))
     return [point_data(*groups[key]) for key in sorted(groups)]
+
+
+def _is_line(first: OperatingPoint, second: OperatingPoint) -> bool:
+    return abs(first.excitation - second.excitation) <= _ONE_LINE * first.excitation
 
 
 def point_of(point: OperatingPoint, frequency: float) -> OperatingPoint:
