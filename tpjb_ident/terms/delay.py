@@ -16,6 +16,7 @@ from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition, Conditions, holding
 from tpjb_ident.estimate.equation import Blocks, Rig, vector
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, exceeding
+from tpjb_ident.terms.gain import NO_GAIN
 
 if TYPE_CHECKING:
     from tpjb_ident.estimate.solve import Solution
@@ -58,7 +59,7 @@ class Delay(Factor):
             late = replace(sensor.doubted(off), delay_uncertainty=off / self._omega)
             sensors.append(late if is_probe else sensor)
         text = f"probes contradict one another by {100 * off:.1f} % of the motion, which gains do not explain"
-        said = {self.name: (Condition("probe-gains-differ", text),)}
+        said = {self.name: (Condition("records-contradicted" if off > NO_GAIN else "probe-gains-differ", text),)}
         return replace(rig, channels=tuple(sensors), contradicted={**rig.contradicted, **said})
 
     def conditions(self, fitted: Fitted) -> Conditions:

@@ -10,7 +10,7 @@ from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
 
 #: Difference of gains beyond any calibration: an axis, a sign or a cable is wrong.
-_NO_GAIN = 0.3
+NO_GAIN = 0.2
 
 
 class Gain(Factor):
@@ -78,4 +78,4 @@ class Gain(Factor):
             return self.rig.contradicted.get(self.name, ())
         text = f"{'; '.join(self.words(fitted))}: beyond the uncertainty stated of {', '.join(outliers)}"
         difference = max(np.ptp(values) for values in self._differing(fitted).values())
-        return (Condition("records-contradicted" if difference > _NO_GAIN else "probe-gains-differ", text),)
+        return (Condition("records-contradicted" if difference > NO_GAIN else "probe-gains-differ", text),)

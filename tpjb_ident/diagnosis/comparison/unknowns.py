@@ -5,6 +5,7 @@ width of its prior. All are counted from their priors' means.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -74,6 +75,12 @@ class Unknowns:
 def prediction(forward: Forward, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray) -> FloatArray | None:
     """Job: the prediction at a point."""
     return Unknowns(problem, faults).predict(forward, theta)
+
+
+def patient_prediction(forward: Forward, *asked: Any) -> FloatArray | None:
+    """Job: the same, whatever it takes to find an equilibrium."""
+    forward.cache.patient = True
+    return prediction(forward, *asked)
 
 
 def derivatives(

@@ -62,6 +62,7 @@ class ModelCache:
     solved: dict[Setup, dict[Key, SolvedPoint]] = field(default_factory=dict, repr=False)
     start: dict[StaticPoint, Equilibrium] = field(default_factory=dict, repr=False)
     near: bool = False  #: whether all that is asked lies a small step from `start`: for derivatives
+    patient: bool = False  #: whether an equilibrium is worth raising load and heat for
     _last: tuple[Setup, Setup, dict[Key, SolvedPoint]] | None = field(default=None, repr=False)
 
     def copy(self, near: bool = False) -> ModelCache:
@@ -90,7 +91,9 @@ class ModelCache:
         force = load * np.array([math.cos(direction), math.sin(direction)])
         start = self.start.get(point)
         # what no solved neighbour and no curve of a pad leads to is too far away: a step is shortened sooner
-        running, equilibrium = solve_as_it_runs(setup, force, speed, start, patient=start is None, near=self.near)
+        running, equilibrium = solve_as_it_runs(
+            setup, force, speed, start, patient=self.patient or start is None, near=self.near
+        )
         if not equilibrium.converged:
             raise NoEquilibriumError(f"no equilibrium at {load:.0f} N ({', '.join(equilibrium.status)})")
         self.start[point] = equilibrium

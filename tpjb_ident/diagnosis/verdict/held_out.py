@@ -10,7 +10,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Fault
-from tpjb_ident.diagnosis.comparison.unknowns import prediction
+from tpjb_ident.diagnosis.comparison.unknowns import patient_prediction, prediction
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap, noise_floor
@@ -129,6 +129,8 @@ def as_stated(run: Map, fit: Fit, theta: FloatArray) -> FloatArray | None:
     """What the faults of a fit predict alone, every tolerance as stated, SI, (n,); None: no equilibrium."""
     there = _neutral(_without_terms(fit, theta)[0], fit.unknowns.tolerances)
     (stated,) = run(prediction, [(fit.faults, there)])
+    if stated is None:  # a verdict hangs on it
+        (stated,) = run(patient_prediction, [(fit.faults, there)])
     return None if stated is None else np.asarray(stated * fit.problem.sigma)
 
 
