@@ -16,7 +16,7 @@ from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition, Conditions, holding
 from tpjb_ident.estimate.equation import Blocks, Rig, vector
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, exceeding
-from tpjb_ident.terms.gain import NO_GAIN, Gain
+from tpjb_ident.terms.gain import NO_GAIN
 
 if TYPE_CHECKING:
     from tpjb_ident.estimate.solve import Solution
@@ -60,7 +60,8 @@ class Delay(Factor):
             sensors.append(late if is_probe else sensor)
         text = f"probes contradict one another by {100 * off:.1f} % of the motion, which gains do not explain"
         name = "records-contradicted" if off > NO_GAIN else "probe-gains-differ"
-        said = () if name in rig.contradicted.get(Gain.name, ()) else (Condition(name, text),)
+        known = [condition for conditions in rig.contradicted.values() for condition in conditions]
+        said = () if name in known else (Condition(name, text),)
         return replace(rig, channels=tuple(sensors), contradicted={**rig.contradicted, self.name: said})
 
     def conditions(self, fitted: Fitted) -> Conditions:
