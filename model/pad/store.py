@@ -96,10 +96,10 @@ def save_arrays(key: str, arrays: Mapping[str, FloatArray]) -> bool:
 def _prune(folder: Path) -> None:
     """Remove all but the newest files: a sweep over geometries must not fill a disk."""
     latest = time.time() + 60.0  # what is later was stored while the clock was ahead: it must not outlive all others
-    changed = {path: path.stat().st_mtime for path in folder.glob("pad-*.npz")}
-    files = sorted(changed, key=lambda path: changed[path] if changed[path] < latest else 0.0, reverse=True)
+    found = [(path.stat(), path) for path in folder.glob("pad-*.npz")]
+    found.sort(key=lambda pair: pair[0].st_mtime if pair[0].st_mtime < latest else 0.0, reverse=True)
     size = 0
-    for path in files:
-        size += path.stat().st_size
+    for state, path in found:
+        size += state.st_size
         if size > _MOST:
             path.unlink(missing_ok=True)

@@ -68,18 +68,17 @@ def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel])
     return RecordLines(mean, floor, scatter, np.array([omega]), row[None])
 
 
-def shaft_line(phasors: RunPhasors, channels: Sequence[Channel]) -> tuple[FloatArray, float]:
+def shaft_lines(phasors: RunPhasors, channels: Sequence[Channel]) -> tuple[FloatArray, float]:
     """Sizes of 1X and 2X in every channel (2, m), and the sense of the force at 1X, see `_sense`.
 
     NaN where they are not told from the excitation.
     """
-    sizes, sense = np.full((2, len(channels)), np.nan), math.nan
+    sizes = np.full((2, len(channels)), np.nan)
     for k, place in enumerate(map(phasors.lines.place, ("1X", "2X"))):
         if place is not None:
-            z = phasors.z[:, place]
-            sizes[k] = by_channel(window_median(np.abs(z)), phasors.channels, channels)
-            sense = sense if k else _sense(phasors.plane("force", z))
-    return sizes, sense
+            sizes[k] = by_channel(window_median(np.abs(phasors.z[:, place])), phasors.channels, channels)
+    first = phasors.lines.place("1X")
+    return sizes, math.nan if first is None else _sense(phasors.plane("force", phasors.z[:, first]))
 
 
 def _sense(force: ComplexArray) -> float:
@@ -244,7 +243,7 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
         return observation
     shown, stated = phasors.lines.excitation[line].frequency, run.point.excitation_hz
     report.ask("other frequency", abs(shown / stated - 1), shown=shown, stated=stated)
-    turning, sense = shaft_line(phasors, live)
+    turning, sense = shaft_lines(phasors, live)
     return replace(observation, shaft_lines=turning, shaft_force=sense, conditions=phasors.conditions)
 
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.problem import RigDataError
-from rigdata.run import Run
 from rigdata.vector import directions, wrapped
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.clearance.measure import coldest_first, measure_run
@@ -39,18 +38,14 @@ def check_cells(observations: Sequence[Observation]) -> None:
     for names, group in groups.items():
         axes = np.array([channel.axis or 0.0 for channel in group[0].of("force")])
         readings = np.array([observation.lines.mean[observation.pick("force")] for observation in group])
-        loads = np.array([_load(observation.run) for observation in group])
+        points = [observation.run.point for observation in group]
+        size = np.array([point.static_load for point in points])
+        loads = size[:, None] * directions([point.static_load_direction for point in points])
         shown = np.isfinite(readings).all(axis=1)
         loads, readings = loads[shown], readings[shown]
         usual = _is_usual(loads, readings)
         if len(names) > 1 and usual.sum() >= _MIN_RUNS:
             _ask(group, names, _logarithms(loads[usual], readings[usual], axes), "the static loads in all directions")
-
-
-def _load(run: Run) -> list[float]:
-    """Set point (2,) [N]."""
-    load, angle = run.point.static_load, run.point.static_load_direction
-    return [load * np.cos(angle), load * np.sin(angle)]
 
 
 def _is_usual(loads: FloatArray, readings: FloatArray) -> BoolArray:

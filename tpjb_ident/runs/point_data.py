@@ -201,12 +201,15 @@ def finite_mean(rows: FloatArray) -> FloatArray:
 def gather(runs: Sequence[RunPhasors]) -> list[PointData]:
     """Group runs by operating point; a record with several excitation lines feeds several points."""
     groups: dict[tuple[object, ...], tuple[OperatingPoint, list[tuple[RunPhasors, int]]]] = {}
+    known: dict[tuple[object, ...], list[OperatingPoint]] = {}
     for run in runs:
         for i, frequency in enumerate(run.lines.driven):
             point = point_of(run.point, frequency)
-            known = (other for other, _ in groups.values() if other.static_key == point.static_key)
+            others = known.setdefault(point.static_key, [])
             # of one set point that the drive missed, runs find the frequency each by itself
-            point = next((other for other in known if _is_line(other, point)), point)
+            point = next((other for other in others if _is_line(other, point)), point)
+            if point.key not in groups:
+                others.append(point)
             groups.setdefault(point.key, (point, []))[1].append((run, i))
     return [point_data(*groups[key]) for key in sorted(groups)]
 

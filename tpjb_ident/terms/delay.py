@@ -50,33 +50,35 @@ class Delay(Factor):
 
     def learnt(self, rig: Rig, solution: Solution) -> Rig:
         """Probes beyond two as uncertain, in time and size, as gains alone leave them contradicting one another."""
-        off = _contradiction(solution)
+        off = _beside_motion(solution)
         if off < _LEAST or any(sensor.delay_uncertainty for sensor in rig.channels):
             return super().learnt(rig, solution)
-        sensors = []
-        for sensor in rig.channels:
-            is_probe = sensor.quantity == "displacement"
-            late = replace(sensor.doubted(off), delay_uncertainty=off / self._omega)
-            sensors.append(late if is_probe else sensor)
+        sensors = list(rig.channels)
+        for j in rig.pick("displacement"):
+            sensors[j] = replace(sensors[j].doubted(off), delay_uncertainty=off / self._omega)
         text = f"probes contradict one another by {100 * off:.1f} % of the motion, which gains do not explain"
         name = "records-contradicted" if off > NO_GAIN else "probe-gains-differ"
-        known = [condition for conditions in rig.contradicted.values() for condition in conditions]
-        said = () if name in known else (Condition(name, text),)
+        said = () if name in _contradictions(rig) else (Condition(name, text),)
         return replace(rig, channels=tuple(sensors), contradicted={**rig.contradicted, self.name: said})
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""
+        known = self.rig.contradicted.get(self.name, ())
         if self.rig.out_of_step:
             late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)
-            contradictions = [condition for conditions in self.rig.contradicted.values() for condition in conditions]
-            return tuple(condition for condition in contradictions if condition == OUT_OF_STEP and late.any())
+            out_of_step = (condition for condition in _contradictions(self.rig) if condition == OUT_OF_STEP)
+            return (*known, *(out_of_step if late.any() else ()))
         probes = {sensor.name for sensor in self.rig.channels if sensor.quantity == "displacement"}
         named = {self.parameters[k].name for k in exceeding(fitted, self.parameters)} - probes
-        known = self.rig.contradicted.get(self.name, ())
         return (*known, *holding((named, OUT_OF_STEP, "; ".join(self.words(fitted)))))
 
 
-def _contradiction(solution: Solution) -> float:
+def _contradictions(rig: Rig) -> list[Condition]:
+    """What all terms' tests have said of a rig."""
+    return [condition for conditions in rig.contradicted.values() for condition in conditions]
+
+
+def _beside_motion(solution: Solution) -> float:
     """What probes beyond two show beside a motion of the shaft, as a share of it, root mean square; 0 if noise does."""
     probes = solution.rig.pick("displacement")
     if len(probes) < 3:

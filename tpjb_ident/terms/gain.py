@@ -22,32 +22,28 @@ class Gain(Factor):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
+        table = [[rig.off.get((run, sensor.name), 0.0) for sensor in rig.channels] for run in blocks.runs]
+        #: (runs, m): deviation of a gain that is another one in a run
+        self._off = np.reshape(table, (len(blocks.runs), len(rig)))
         self._places: list[tuple[int, int, int]] = []
         parameters = []
         for j, sensor in enumerate(rig.channels):
             calibrations = np.unique(blocks.calibration[:, j]).tolist() or [0]
+            points, off = self._point(blocks, j), self._off[blocks.run, j]
+            deviations = {-1: 0.0} | {p: float(off[points == p].max()) for p in dict.fromkeys(points.tolist())}
             for k in calibrations:
                 name = sensor.name if len(calibrations) == 1 else f"{sensor.name}, calibration {k + 1}"
-                for point, off in self._off(blocks, j).items():
-                    if sensor.uncertainty or off:
+                for point, deviation in deviations.items():
+                    if sensor.uncertainty or deviation:
                         self._places.append((j, k, point))
                         words = name if point < 0 else f"{name}, at {blocks.points[point]}"
-                        parameters.append(Parameter(words, "1", float(np.hypot(sensor.uncertainty or 0.0, off))))
+                        size = float(np.hypot(sensor.uncertainty or 0.0, deviation))
+                        parameters.append(Parameter(words, "1", size))
         self.parameters = tuple(parameters)
 
     def _point(self, blocks: Blocks, j: int) -> IntArray:
         """Of every block the point, if a sensor's gain is another one in its run; -1: it is not, (n,)."""
-        off = np.array([(run, self.rig.channels[j].name) in self.rig.off for run in blocks.runs], dtype=bool)
-        return np.where(off[blocks.run], blocks.point, -1) if len(blocks) else blocks.point
-
-    def _off(self, blocks: Blocks, j: int) -> dict[int, float]:
-        """Deviation of a sensor's gain at points where it is another one; at all others (-1) it is that of all."""
-        points, largest = self._point(blocks, j), {-1: 0.0}
-        for point, run in zip(points.tolist(), blocks.run.tolist()):
-            if point >= 0:
-                deviation = self.rig.off[blocks.runs[run], self.rig.channels[j].name]
-                largest[point] = max(largest.get(point, 0.0), deviation)
-        return largest
+        return np.where(self._off[blocks.run, j] > 0, blocks.point, -1)
 
     def exponent(self, blocks: Blocks) -> ComplexArray:
         """One in the sensor's own row, in the runs of that calibration."""
@@ -61,9 +57,11 @@ class Gain(Factor):
         spread = {}
         for quantity, values in self._differing(fitted).items():
             spread[quantity] = float(np.sqrt(np.sum(np.square(values)) / max(len(values) - 1, 1)))
-        # what contradicts so may as well be an axis or crosstalk
-        sensors = tuple(sensor.doubted(*[spread.get(sensor.quantity, 0.0)] * 2) for sensor in rig.channels)
-        return replace(rig, channels=sensors) if spread else None
+        sensors = []
+        for sensor in rig.channels:
+            size = spread.get(sensor.quantity, 0.0)
+            sensors.append(sensor.doubted(size, size))  # what contradicts so may as well be an axis or crosstalk
+        return replace(rig, channels=tuple(sensors)) if spread else None
 
     def _differing(self, fitted: Fitted) -> dict[str, list[float]]:
         """Gains by quantity, of those whose channels differ beyond what is stated."""

@@ -60,15 +60,16 @@ class Housing(Term):
         usual, across, loss = _CELLS
         if not rig.has_acceleration:
             usual = 0.0  # the inertia stays in F, as is said of the point
+        if rig.out_of_step or not rig.static:
+            loss = _LOSS / 2  # what is beyond a mount's is then a delay's or a corner's
         if rig.mount == "cells":
             self.sentence = "{p.name} of the cells {value:.3g} {p.unit} (standard error {error:.2g})"
             self.parameters = (
                 Parameter("c_xx", "nm/N", SOFT, usual),
                 Parameter("c_yy", "nm/N", SOFT, usual),
                 Parameter("c_xy", "nm/N", across),
-                # what is beyond a mount's loss is then a delay's or a corner's
-                Parameter("loss_x", "1", _LOSS / 2 if rig.out_of_step or not rig.static else loss),
-                Parameter("loss_y", "1", _LOSS / 2 if rig.out_of_step or not rig.static else loss),
+                Parameter("loss_x", "1", loss),
+                Parameter("loss_y", "1", loss),
             )
         elif rig.mount == "unknown":
             self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
