@@ -19,7 +19,7 @@ import numpy as np
 from model.bearing import Bearing, Pad
 from model.film.mesh import FilmGrid
 from model.pad.line import Line, gauss_rule
-from model.pad.mesh import PadGeometry
+from model.pad.mesh import FINE, MeshDensity, PadGeometry
 from rigdata.arrays import FloatArray
 
 #: Stations on the dry arc ahead of a film that starts late.
@@ -50,14 +50,18 @@ class PadDeformation:
     response: FloatArray  #: (m, unknowns): Amplitudes by the pressure at the film's unknown nodes.
 
 
-def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = False) -> PadDeformation:
+def pad_deformation(
+    pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = False, density: MeshDensity = FINE
+) -> PadDeformation:
     """Matrices of a pad for its film's mesh; the same object for pads of the same shape."""
     geometry = PadGeometry.of(pad, bearing)
-    return _pad_deformation(geometry, grid.angle.tobytes(), grid.z.tobytes(), grid.area.tobytes(), cooled)
+    return _pad_deformation(geometry, grid.angle.tobytes(), grid.z.tobytes(), grid.area.tobytes(), cooled, density)
 
 
 @lru_cache(maxsize=16)
-def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes, cooled: bool) -> PadDeformation:
+def _pad_deformation(
+    geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes, cooled: bool, density: MeshDensity
+) -> PadDeformation:
     # rigid pads need no solid, and need not wait for its algebra
     from model.pad.operators import pad_operators
 
@@ -70,7 +74,7 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
     first = 0 if half else 1
     compliance, by_load, by_heat, coarser, flux = np.zeros(()), np.zeros(()), np.zeros(()), [], []
     for even in (True,) if half else (True, False):
-        solid = pad_operators(geometry, even=even, cooled=cooled)
+        solid = pad_operators(geometry, density, even, cooled)
         gather, spread, corners = axis_maps(solid.theta, Line(angle, 1), None)
         gather, spread, corners = gather[:, ahead:], spread[ahead:], corners[:, ahead:]
         across = axis_maps(solid.z, Line(z, 1), None if half else even)

@@ -154,6 +154,10 @@ class MeshDensity:
     edge: float = 0.16
 
 
+#: Half as fine takes a twentieth of the time: pads of the paper deform by 1 to 5 % less, K and C change by 0.1 %.
+FINE, COARSE = MeshDensity(), MeshDensity(arc=8, face=2, half_length=4, backing=3)
+
+
 def sector_mesh(geometry: PadGeometry, density: MeshDensity) -> SectorMesh:
     """Mesh half a pad.
 

@@ -13,13 +13,12 @@ import numpy as np
 from model.interpolation import lagrange
 from model.pad.block_cholesky import SlabMatrix, factor, forward, solve
 from model.pad.line import Line
-from model.pad.mesh import MeshDensity, PadGeometry, SectorMesh, sector_mesh
+from model.pad.mesh import COARSE, FINE, MeshDensity, PadGeometry, SectorMesh, sector_mesh
 from model.pad.store import load_arrays, save_arrays, storage_key
 from rigdata.arrays import BoolArray, FloatArray
 
 #: Eight nodes: expansion to 2e-6, heat into the pad to 3e-4 (`tests/model/test_convection.py`).
 _NODES = 8
-_DENSITY = MeshDensity()
 #: Largest convection between the nodes [W/m^2/K]; above it a pad is solved for its own.
 LARGEST = 1e4
 
@@ -220,7 +219,7 @@ class PadOperators:
 
 
 def pad_operators(
-    geometry: PadGeometry, density: MeshDensity = _DENSITY, even: bool = True, cooled: bool = False
+    geometry: PadGeometry, density: MeshDensity = FINE, even: bool = True, cooled: bool = False
 ) -> PadOperators:
     """Operators of one pad geometry: from memory, from the cache folder, or by solving (a few seconds).
 
@@ -254,10 +253,12 @@ def operators_at(
     """Operators at several convections of the free faces, the first axis of `expansion` and `flux`."""
     mesh = sector_mesh(geometry, density)
     key = storage_key((geometry, density, even, convections))
-    arrays = load_arrays(key, ("compliance", "expansion", "flux"))
+    is_stored = density != COARSE  # those are sooner solved, and many
+    arrays = load_arrays(key, ("compliance", "expansion", "flux")) if is_stored else None
     if arrays is None:
         arrays = _solve(geometry, mesh, even, convections)
-        save_arrays(key, arrays)
+        if is_stored:
+            save_arrays(key, arrays)
     arrays["compliance"].setflags(write=False)
     return PadOperators(mesh.theta, mesh.z, **arrays)
 

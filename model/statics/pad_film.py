@@ -12,6 +12,7 @@ from model.film.mesh import FilmGrid, FilmWork, OilConstants, Wedge, film_grid, 
 from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces
 from model.pad.bending import PadDeformation, pad_deformation
+from model.pad.mesh import COARSE, FINE
 from model.setup import Setup
 from model.statics.compiled.stack import stacked_grids
 from rigdata.arrays import FloatArray
@@ -69,6 +70,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFil
     angle, toward = setup.misalignment
     across, symmetric = setup.thermal == "thd", angle == 0.0
     solid = setup.flexible_pads or setup.options.conduction or across
+    density = FINE if setup.mesh.fine_solid else COARSE
     films = []
     spans = tuple((p.leading_edge + setup.starvation * p.arc, p.leading_edge + p.arc) for p in bearing.pads)
     shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))
@@ -91,7 +93,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFil
                 grid=grid,
                 work=work,
                 inlet=setup.inlet_temperature,
-                deformation=pad_deformation(pad, bearing, grid, setup.options.conduction) if solid else None,
+                deformation=pad_deformation(pad, bearing, grid, setup.options.conduction, density) if solid else None,
                 rupture=rupture_of(setup),
                 cross=None if crosses is None else CrossFilm(crosses.edges, *(values[k] for values in crosses[1:])),
             )

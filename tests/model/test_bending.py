@@ -45,6 +45,14 @@ def test_deformation_is_what_pressure_and_heat_ask_for(bearing, load):
 
 
 @pytest.mark.slow
+def test_half_as_fine_a_solid_is_enough_for_coefficients(bearing):
+    assert Mesh() != Mesh().coarser() == Mesh(40, 4, fine_solid=False)
+    fine, coarse = (run(bearing, thermal="tehd", mesh=Mesh(fine_solid=chosen)) for chosen in (True, False))
+    change = np.array([coarse.h[i, i] / fine.h[i, i] - 1.0 for i in range(2)])
+    assert 0.0 < np.abs(change).max() < 2e-3
+
+
+@pytest.mark.slow
 def test_the_matrices_of_a_search_stand_in_one_order(bearing):
     """Another one of any of them is another signature, for which a process compiles the search for half a minute."""
     setup = Setup(bearing, pivot_laws("kirk", bearing), "tehd")

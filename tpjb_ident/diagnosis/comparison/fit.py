@@ -15,7 +15,7 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, Posterior, posterior
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Strain
-from tpjb_ident.diagnosis.comparison.unknowns import SLOW, Unknowns, derivatives, prediction
+from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, derivatives, prediction
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.schema import HALF_INTERVAL
@@ -218,11 +218,11 @@ def _past_jumps(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
 
 def refined(run: Map, fit: Fit) -> Fit:
     """The same with derivatives of its own, moved on by them; as it is, where they would say the same."""
-    unknowns, exact = fit.unknowns, fit.posterior.scale <= Deciding.right
-    if exact and _foretells(run, fit):
+    unknowns = fit.unknowns
+    if fit.posterior.scale <= Deciding.right and _foretells(run, fit):
         return fit
     asked = [i for i, reading in enumerate(unknowns.is_reading) if not reading]
-    return _settled(run, unknowns, _renewed(run, unknowns, fit.linear, asked, exact))
+    return _settled(run, unknowns, _renewed(run, unknowns, fit.linear, asked))
 
 
 def _foretells(run: Map, fit: Fit) -> bool:
@@ -270,22 +270,11 @@ def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:
     return Fit(unknowns, moved, posterior(unknowns.problem.errors, moved))
 
 
-def _renewed(run: Map, unknowns: Unknowns, linear: Linear, asked: Sequence[int], exact: bool = False) -> Linear:
-    """A model with derivatives of its own by some numbers; what acts on readings has them already.
-
-    Not `exact`: as they are without effects of which one prediction takes seconds, whose own stay.
-    """
-    faults = tuple(fault for fault in unknowns.faults if exact or fault.name not in SLOW)
-    present = np.ones(len(linear.theta), dtype=bool)
-    for fault, at in zip(unknowns.faults, unknowns.slices, strict=True):
-        present[at] = fault in faults
-    asked = [i for i in asked if present[i]]
-    if not asked:
-        return linear
-    places = np.cumsum(present) - 1
+def _renewed(run: Map, unknowns: Unknowns, linear: Linear, asked: Sequence[int]) -> Linear:
+    """A model with derivatives of its own by some numbers; what acts on readings has them already."""
     parts = [asked[k :: run.opened.count] for k in range(run.opened.count)]
     jacobian = linear.jacobian.copy()
-    jobs = [(faults, linear.theta[present], places[part].tolist()) for part in parts]
+    jobs = [(unknowns.faults, linear.theta, part) for part in parts]
     for part, columns in zip(parts, run(derivatives, jobs), strict=True):
         for index, column in zip(part, columns, strict=True):
             if column is not None:

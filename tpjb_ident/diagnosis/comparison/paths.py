@@ -10,7 +10,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
-from tpjb_ident.diagnosis.comparison.unknowns import SLOW, Place, derivatives, path_changes
+from tpjb_ident.diagnosis.comparison.unknowns import Place, derivatives, path_changes
 from tpjb_ident.diagnosis.forward.workers import Map
 
 #: A typical size in widths of the prior.
@@ -79,7 +79,7 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
     Those without an equilibrium anywhere are left out.
     """
     stated = np.zeros(len(problem.nuisances))
-    curved = [f for f in problem.faults if len(f.width) == 1 and f.name not in SLOW]
+    curved = [f for f in problem.faults if len(f.width) == 1]
     straight = [f for f in problem.faults if f not in curved]
     columns = problem.scaled(problem.columns)
     towards = np.sign(columns.T @ (problem.measured - problem.scaled(problem.base)))

@@ -18,7 +18,7 @@ from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Score, scores
-from tpjb_ident.diagnosis.comparison.unknowns import SLOW, Unknowns
+from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 
@@ -138,8 +138,7 @@ class _Search:
         """Whether a proposal may change the answer: as a rival of a leader, or by a fault beside a right one."""
         total, near, mistaken = self._log_probability(leader), Deciding.near, Deciding.mistaken
         if leader.posterior.scale > Deciding.right:
-            slow = any(fault.name in SLOW for fault in proposal.faults)  # only where they promise to lead
-            return proposal.coarse or proposal.estimate > (total if slow else total - near - mistaken)
+            return proposal.coarse or proposal.estimate > total - near - mistaken
         plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
         if proposal.coarse:
             return plain
@@ -179,8 +178,7 @@ class _Search:
             return
         promised = max(fit.posterior.promised, proposal.estimate - self._log_prior(fit.faults))
         stopped = promised > fit.posterior.total + Deciding.mistaken and self._near(fit, promised, 0.0)
-        # of slow effects a coarse start takes half a minute
-        if stopped and fit.faults and proposal.labels not in self.begun and fit.names.isdisjoint(SLOW):
+        if stopped and fit.faults and proposal.labels not in self.begun:
             self.begun[proposal.labels] = -math.inf
             coarse = self._reached(replace(proposal, coarse=True))  # its end lies astray
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)

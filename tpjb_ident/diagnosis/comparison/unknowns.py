@@ -19,8 +19,6 @@ from tpjb_ident.errors import TpjbError
 
 #: Steps of derivatives: share of a fault's prior width, stated deviations of a tolerance.
 _SHARE, _DEVIATIONS = 1.0 / 30.0, 0.3
-#: Effects of which one prediction takes seconds: a derivative has to do in place of a path.
-SLOW = frozenset({"pad_bending", "pad_conduction"})
 #: Where an explanation is: its faults and free numbers.
 Place = tuple[tuple[Fault, ...], FloatArray]
 

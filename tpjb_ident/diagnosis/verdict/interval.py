@@ -10,7 +10,6 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.fit import Fit, rise
-from tpjb_ident.diagnosis.comparison.unknowns import SLOW
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.schema import HALF_INTERVAL
@@ -20,7 +19,7 @@ def errors_each_way(run: Map, fit: Fit) -> list[FloatArray]:
     """Standard errors of every fault's numbers below and above, (2, k); a tolerance's own scatter besides."""
     out = []
     for fault, at, errors in zip(fit.faults, fit.unknowns.slices, fit.errors, strict=True):
-        asked = [] if fault.is_term or fault.name in SLOW else range(at.start, at.stop)
+        asked = [] if fault.is_term else range(at.start, at.stop)
         times = np.array([_stretched(run, fit, i) for i in asked]).T if asked else np.ones((2, 1))
         own = 1.0 if fault.own >= 0 else 0.0
         out.append(np.hypot(times * np.sqrt(errors**2 - own**2), own))
