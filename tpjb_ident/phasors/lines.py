@@ -1,7 +1,7 @@
 """The spectral lines that a dynamic record is known to contain, and windows long enough to tell them apart.
 
 A record at running speed holds the excitation and what an actuator or a film that is not linear makes of it (2f, 3f),
-what turns with the shaft (1X to 4X: runout, unbalance), what the film makes of both (2X - f, 2f - X), and the mains.
+what turns with the shaft (1X to 10X: runout, unbalance), what the film makes of both (2X - f, 2f - X), and the mains.
 What is strong is fitted together in every window, so that none leaks into the excitation line, however short the
 window; what is faint in the whole record alone, unless it stands out there.
 
@@ -32,8 +32,8 @@ _NAMED = tuple(f"{n}X" for n in range(1, NAMED_HARMONICS + 1))
 _EXACT = 1e-6
 #: Lines closer than this are one [1 / record length].
 ONE_LINE = 0.6
-#: Harmonics of the shaft that are fitted in every window, and that are looked at in the whole record.
-_STRONG_SHAFT, _FAINT_SHAFT = 2, 4
+#: Harmonics of the shaft that are fitted in every window, and that are looked at in the whole record: run-out has them.
+_STRONG_SHAFT, _FAINT_SHAFT = 2, 10
 
 
 @dataclass(frozen=True)
