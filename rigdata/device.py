@@ -57,6 +57,10 @@ class Grid:
     channels: list[str] = field(default_factory=list)
 
 
+#: Steps this many times longer than nearly all are gaps.
+_GAP = 3.0
+
+
 def rate_of_time(time: FloatArray) -> float:
     """Nominal sample rate of a time column (n,) [Hz].
 
@@ -64,6 +68,10 @@ def rate_of_time(time: FloatArray) -> float:
     (0.000, 0.001, 0.001, 0.002 at 2 kHz); NaN where no two times are finite or time does not advance.
     """
     finite = time[np.isfinite(time)]
+    steps = np.diff(finite)
+    gaps = steps > _GAP * np.quantile(steps[steps > 0], 0.9) if np.any(steps > 0) else steps > 0
+    if gaps.any():  # in a short record most spans hold one
+        finite[1:] -= np.cumsum(np.where(gaps, steps - steps[~gaps].mean(), 0.0))
     span = min(1000, len(finite) // 4) or len(finite) - 1
     if span < 1:
         return np.nan

@@ -126,12 +126,16 @@ def test_time_column_wins_over_the_stated_rate_and_without_one_the_stated_counts
     assert run.record("X1A").time[:3] == pytest.approx([0.0, 0.1, 0.2])
 
 
-def test_jitter_and_gaps_are_used_as_they_are(tmp_path):
+def test_jitter_is_used_as_it_is_and_rows_left_out_are_readings_without_a_value(tmp_path):
     times = np.cumsum(np.r_[0.0, np.tile([0.49, 0.51, 0.5], 9), 4.0, 0.5])
     run = make(tmp_path, table(rows=[(float(t), *r[1:]) for t, r in zip(times, ROWS, strict=True)]))
-    assert run.record("X1A").time == pytest.approx(times, abs=1e-4)
+    record = run.record("X1A")
+    lost = np.s_[28:35]
+    assert np.isnan(record.values[lost]).all()
+    assert np.delete(record.time, lost) == pytest.approx(times, abs=1e-4)
+    np.testing.assert_allclose(np.delete(record.values, lost), 1e-6 * np.array([r[1] for r in ROWS]), rtol=1e-9)
     assert run.sample_rate == pytest.approx(2.0, rel=0.02)
-    assert any("1 gaps, about 7 samples lost" in p.what for p in check_campaign(tmp_path))
+    assert any("7 of 37 samples have no value" in p.what for p in check_campaign(tmp_path))
 
 
 def test_rounded_time_column_gives_the_true_rate_and_missing_times_are_filled_in(tmp_path):

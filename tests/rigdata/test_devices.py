@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rigdata import RigDataError, Run, load_campaign
+from rigdata.device import rate_of_time
 from tests.foreign_files import Columns, write_columns, write_groups
 from tests.manifests import PROBES, SET_POINT, manifest, write_files, write_hdf5
 
@@ -209,9 +210,19 @@ def test_a_time_column_with_gaps(tmp_path):
     gappy[120] = np.nan  # one time lost
     columns, channels = two_times("r.csv", gappy)
     force = recorded(tmp_path / "r.csv", {**columns, "L1H": lost, "L1V": -lost}, channels).record("L1H")
-    assert len(force) == 490
-    np.testing.assert_allclose(force.time, np.delete(T2, np.s_[10:20]), atol=1e-9)
-    np.testing.assert_allclose(force.values, np.delete(F, np.s_[10:20]), atol=1e-9)
+    assert len(force) == 500  # rows that are left out are readings without a value
+    np.testing.assert_allclose(force.time, T2, atol=1e-9)
+    assert np.isnan(force.values[10:20]).all()
+    np.testing.assert_allclose(np.delete(force.values, np.s_[10:20]), np.delete(F, np.s_[10:20]), atol=1e-9)
+
+
+def test_gaps_in_a_short_record_leave_its_rate_as_it_is():
+    rows = np.ones(5500, dtype=bool)
+    for first, count in ((900, 30), (2500, 55), (4400, 80)):  # every span of a quarter of it holds one
+        rows[first : first + count] = False
+    time = np.arange(len(rows)) / 2000.0
+    assert rate_of_time(time[rows]) == rate_of_time(time) == 2000.0
+    assert rate_of_time(np.round(time, 3)[rows]) == pytest.approx(2000.0, rel=2e-3)
 
 
 def test_a_time_dataset_of_another_length(tmp_path):
