@@ -23,7 +23,7 @@ STIFFNESS = np.array([[1.5e8, 2.0e7], [-1.6e7, 2.6e8]])
 DAMPING = np.array([[3.0e5, 2.0e4], [1.5e4, 4.5e5]])
 EXPONENTS = np.array([[0.6, -0.4], [0.5, 0.8]]), np.array([[0.3, 0.5], [-0.3, 0.4]])
 COMPLIANCE = np.array([[2.2e-9, 0.1e-9], [0.1e-9, 1.7e-9]]) * (1 - 0.01j)
-PROBES = (45.0, 135.0, 90.0)
+PROBES = (45.0, 135.0, 90.0, 20.0)
 DRIVE = 500.0
 #: Share of the noise's variance that all sensors have in common, as of a foundation that moves.
 SHARED = 0.3

@@ -417,3 +417,23 @@ def test_a_shaft_that_tilts_between_two_planes_of_probes_does_no_harm(seed):
     assert held(solved(rig, tilted, truth), truth)
     ignored = replace(rig, channels=tuple(replace(sensor, plane=0.0) for sensor in rig.channels))
     assert np.abs(solved(ignored, tilted, truth).h / truth - 1).max() > 0.02
+
+
+def test_a_tilt_that_goes_with_the_motion_is_no_contradiction_of_probes():
+    planes = dict(zip(("D1", "D2", "D3", "D4"), (0.04, 0.04, -0.025, -0.025), strict=True))
+    rig, blocks, truth = made(Case(probes=4, **stated(**{name: {"plane": plane} for name, plane in planes.items()})))
+    z = blocks.z.copy()
+    for j, plane in enumerate(planes.values()):
+        z[:, j] *= 1.0 + 5.0 * np.exp(0.4j) * plane
+    tilted = replace(blocks, z=z)
+    assert learnt_rig(rig, solved(rig, tilted, truth)) is rig
+    ignored = replace(rig, channels=tuple(replace(sensor, plane=0.0) for sensor in rig.channels))
+    assert learnt_rig(ignored, solved(ignored, tilted, truth)).contradicted
+
+
+def test_one_plane_of_probes_is_information_only():
+    rig, blocks, truth = made(Case())
+    beside = replace(rig, channels=tuple(replace(sensor, plane=0.06) for sensor in rig.channels))
+    near, far = (solved(described, blocks, truth) for described in (rig, beside))
+    np.testing.assert_array_equal(near.h, far.h)
+    np.testing.assert_array_equal(deviations(near), deviations(far))

@@ -100,6 +100,13 @@ class Rig(Directed):
         """Unit vectors of the sensors' axes, (m, 2)."""
         return directions([sensor.axis or 0.0 for sensor in self.channels])
 
+    @property
+    def levers(self) -> FloatArray:
+        """Distance of the probes from the film's mid-plane, (m,) [m]; 0 of those that all stand in one plane."""
+        probes = self.pick("displacement")
+        planes = {self.channels[j].plane for j in probes}
+        return np.array([s.plane * (j in probes and len(planes) > 1) for j, s in enumerate(self.channels)])
+
     def doubting(self, doubted: Mapping[str, tuple[float, float]]) -> Rig:
         """The rig, gains and axes [rad] of some sensors, by their names, known no better than this."""
         return replace(self, channels=tuple(s.doubted(*doubted.get(s.name, (0.0, 0.0))) for s in self.channels))

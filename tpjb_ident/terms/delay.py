@@ -14,7 +14,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition, Conditions, holding
-from tpjb_ident.estimate.equation import Blocks, Rig, vector
+from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, exceeding
 from tpjb_ident.terms.gain import NO_GAIN
 
@@ -79,14 +79,16 @@ def _contradictions(rig: Rig) -> list[Condition]:
 
 
 def _beside_motion(solution: Solution) -> float:
-    """What probes beyond two show beside a motion of the shaft, as a share of it, root mean square; 0 if noise does."""
-    probes = solution.rig.pick("displacement")
-    if len(probes) < 3:
+    """What probes show beside motion and tilt of the shaft, as a share of it, root mean square; 0 if noise does."""
+    probes, blocks = solution.rig.pick("displacement"), solution.blocks
+    along, levers = np.nan_to_num(blocks.along[:, probes]), solution.rig.levers[probes]
+    design = np.concatenate([along, levers[:, None] * along], axis=2) if levers.any() else along  # and tilt
+    if len(probes) <= design.shape[2]:
         return 0.0
-    blocks = replace(solution.blocks, z=(solution.blocks.z - solution.shift) / solution.factor)
-    motion = vector(solution.rig, blocks, "displacement")
-    beside = blocks.z[:, probes] - np.einsum("nja,na->nj", blocks.along[:, probes], motion)
-    beside = np.where(blocks.present[:, probes] & np.isfinite(beside), beside, 0.0)
+    shown = np.nan_to_num((blocks.z - solution.shift) / solution.factor)[:, probes, None]
+    design, shown = (np.where(blocks.present[:, probes, None], rows, 0.0) for rows in (design, shown))
+    motion = np.linalg.pinv(design) @ shown
+    beside, motion = (shown - design @ motion)[:, :, 0], motion[:, :2, 0]
     size, noise = np.sum(np.abs(beside) ** 2, axis=1), blocks.noise_power(probes)
     if not np.sum(size) > _MANY * np.sum(noise):
         return 0.0

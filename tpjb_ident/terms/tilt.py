@@ -14,14 +14,13 @@ _USUAL = 3.0
 
 
 class Tilt(Term):
-    """Two complex numbers a block, where the manifest states `plane` of probes."""
+    """Two complex numbers a block, where the manifest states two planes of probes."""
 
     name = "tilt"
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        planes = [sensor.plane if sensor.quantity == "displacement" else 0.0 for sensor in rig.channels]
-        self._plane = np.array(planes)
+        self._plane = rig.levers
 
     def random_effects(self, blocks: Blocks, state: State) -> ComplexArray | None:
         """Plane times axis, in the probes."""
