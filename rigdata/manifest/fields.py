@@ -258,6 +258,6 @@ def _spell(path: Path) -> str:
     for at, number in enumerate(path):
         if isinstance(number, int):
             keys = "".join(f" {p}" for p in path[at + 1 :])
-            return f"[[{'.'.join(str(p) for p in path[:at])}]] no. {number + 1}{keys}"
-    table = ".".join(str(p) for p in path[:-1])
+            return f"[[{'.'.join(map(str, path[:at]))}]] no. {number + 1}{keys}"
+    table = ".".join(map(str, path[:-1]))
     return f"[channels.{path[-1]}]" if table == "channels" else f"[{table}] {path[-1]}"

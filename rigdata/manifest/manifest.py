@@ -4,7 +4,6 @@ import codecs
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from rigdata.calibration import Channels
 from rigdata.manifest.channels import channels_by_run, read_channels
@@ -160,7 +159,12 @@ class Manifest(Description):
 
 def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:
     """Read and check the text of a manifest."""
-    data = _load_toml(text, file)
+    if len(text) > MAX_MANIFEST:
+        raise refuse(file, "", f"the manifest is larger than {MAX_MANIFEST >> 20} MB", "Is it the right file?")
+    try:
+        data = parse_toml(text)
+    except ValueError as error:
+        raise refuse(file, "", f"not valid TOML: {error}", "Repair the TOML at this place") from error
     schema = str(data.get("schema"))
     if schema.startswith("tpjb-") and not schema.startswith("tpjb-rig/"):
         fault = f"is of the schema {shown(schema)}, not the manifest of a campaign"
@@ -183,15 +187,6 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     if findings.errors:
         raise RigDataError(findings.problems)
     return manifest
-
-
-def _load_toml(text: str, file: str) -> dict[str, Any]:
-    if len(text) > MAX_MANIFEST:
-        raise refuse(file, "", f"the manifest is larger than {MAX_MANIFEST >> 20} MB", "Is it the right file?")
-    try:
-        return parse_toml(text)
-    except ValueError as error:
-        raise refuse(file, "", f"not valid TOML: {error}", "Repair the TOML at this place") from error
 
 
 def _read_csv(table: Table) -> CsvSpec:

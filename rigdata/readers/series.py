@@ -154,21 +154,15 @@ def time_columns(names: Sequence[str], channels: Channels) -> list[int]:
 
 def serving(names: Sequence[str], clocks: Sequence[int], channels: Channels) -> list[int | None]:
     """Place of every column's time column: of the clock that it states, else the nearest without one to its left."""
-    stated = {name: channel.clock for name, channel in channels.items()}
-    letters = {}
-    plain = []
-    for i in clocks:
-        letter = stated.get(names[i])
-        if letter:
-            letters[letter] = i
-        else:
-            plain.append(i)
+    letters = [channels[name].clock if name in channels else "" for name in names]
+    lettered = {letters[i]: i for i in clocks if letters[i]}
+    plain = [i for i in clocks if not letters[i]]
     nearest = plain[0] if plain else None
-    served = []
-    for i, name in enumerate(names):
+    places = []
+    for i, letter in enumerate(letters):
         nearest = i if i in plain else nearest
-        served.append(letters.get(stated.get(name, ""), nearest))
-    return served
+        places.append(lettered.get(letter, nearest))
+    return places
 
 
 def table(contents: Contents, record: RecordFile) -> Contents:
