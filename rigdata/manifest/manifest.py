@@ -56,7 +56,7 @@ class RunEntry(RunDescription):
 
 
 def _read_runs(top: Table, rotation: str) -> tuple[RunEntry, ...]:
-    """Read every run, of this rotation if it states none; what is wrong is noted, and that run left out."""
+    """Read every run, of this rotation if it states none; what is wrong is noted."""
     data, findings = top.data.get("runs"), top.findings
     if not isinstance(data, list) or not data:
         findings.error(("runs",), "no runs are listed", "Add a [[runs]] table per record")
@@ -67,15 +67,13 @@ def _read_runs(top: Table, rotation: str) -> tuple[RunEntry, ...]:
     runs = []
     first: dict[str, int] = {}
     for index, entry in enumerate(data):
-        errors = findings.errors
         run = _read_run(Table(entry, ("runs", index), findings), index, rotation)
         if run is None:
             continue
         if run.id in first:
             message = f"run id {shown(run.id)} is used twice, also by run no. {first[run.id] + 1}"
             findings.error(("runs", index, "id"), message, "Give every run its own id", run.id)
-        if findings.errors == errors:
-            runs.append(run)
+        runs.append(run)
         first.setdefault(run.id, index)
     return tuple(runs)
 
@@ -157,7 +155,11 @@ class Manifest(Description):
     described: Mapping[str, Channels]  #: by run, if other
 
 
-def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:
+def _no_files(name: str, place: str) -> str:
+    raise UnitError("a table cannot be read here")
+
+
+def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile = _no_files) -> Manifest:
     """Read and check the text of a manifest."""
     if len(text) > MAX_MANIFEST:
         raise refuse(file, "", f"the manifest is larger than {MAX_MANIFEST >> 20} MB", "Is it the right file?")

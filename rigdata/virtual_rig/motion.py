@@ -243,9 +243,8 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     """
     pads = _sides(truth)
     angles = np.array(truth.pivot_angles)[pads]
-    following = [*pads[1:], pads[0]]
     shares, places = [], []
-    for pad, after in zip(pads, following, strict=True):
+    for pad, after in zip(pads, [*pads[1:], pads[0]], strict=True):
         angle, next_angle = truth.pivot_angles[pad], truth.pivot_angles[after]
         gap = (next_angle - angle) % (2 * np.pi)
         passed, remaining = wrapped(direction - angle - lag), wrapped(next_angle + lag - direction)

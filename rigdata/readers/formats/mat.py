@@ -121,14 +121,13 @@ def _cell_texts(item: Any) -> list[str]:
     if item.size > _MOST_NAMES or not _is_inside(item):
         return []
     texts = []
-    for reference in np.asarray(item[()]).T.reshape(-1):
+    for reference in np.ravel(item[()], "F"):
         text = item.file[reference] if reference else None
         if text is None or not hasattr(text, "dtype") or text.dtype.kind != "u" or text.size > _LONGEST:
             return []
         if not (_is_text(text) and _is_inside(text)):
             return []
-        codes = np.asarray(text[()]).T.reshape(-1)
-        texts.append("".join(chr(int(code)) for code in codes))
+        texts.append("".join(map(chr, np.ravel(text[()], "F").tolist())))
     return texts
 
 

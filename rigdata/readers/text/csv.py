@@ -46,7 +46,7 @@ def read_text(record: RecordFile) -> Contents:
     places = [i for i, name in enumerate(names) if i in clocks or (name in used and i not in head.dates)]
     columns, problems = read_table(head, places)
     length = len(columns[places[0]])
-    timing = clocks if {*serving(names, clocks, channels)} == {*clocks} else places
+    timing = places if None in serving(names, clocks, channels) else clocks
     # spreadsheets write lines at the end that hold no time, blank or of means and extremes
     while clocks and length > 1 and all(np.isnan(columns[i][length - 1]) for i in timing):
         length -= 1
@@ -152,7 +152,8 @@ def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, 
                         continue
                     if not numbers:
                         column, is_sound = _to_numbers(column, head.decimal)
-                        bad |= set() if is_sound else {i}
+                        if not is_sound:
+                            bad.add(i)
                     filled = pc.fill_null(column.cast(pa.float64()), np.nan)
                     # `to_numpy` would import pandas in every worker
                     values = np.frombuffer(filled.buffers()[1], np.float64, len(filled), 8 * filled.offset)
@@ -165,7 +166,8 @@ def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, 
         columns = {i: channel.values() for i, channel in numeric.items()}
     for i, cells in stamps.items():
         columns[i], count = stamp_seconds([None if cell is None or cell in MISSING else cell for cell in cells])
-        bad |= {i} if count else set()
+        if count:
+            bad.add(i)
     if bad:
         _judged(head, sorted(bad), odd_lines)
     return columns, odd_lines
