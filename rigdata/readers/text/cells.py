@@ -179,8 +179,7 @@ def _seconds(match: re.Match[str], days: dict[str, float]) -> float:
                     days[text] = _DAY * datetime.date(year, *month_and_day).toordinal()
         # counted from the first day: seconds since 1970 would cost the digits below a microsecond
         start = days[text] - next(iter(days.values()))
-    fraction_seconds = float(f"0.{fraction}") if fraction else 0.0
-    return start + 3600.0 * hours + 60.0 * int(minute) + int(second) + fraction_seconds
+    return start + 3600.0 * hours + 60.0 * int(minute) + float(f"{second}.{fraction or 0}")
 
 
 def _spread(time: FloatArray) -> FloatArray:

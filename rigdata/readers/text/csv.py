@@ -227,9 +227,10 @@ def _is_cut_inside_last_cell(head: Head) -> bool:
     if not tail or tail.endswith((b"\n", b"\r")):
         return False
     decimals = []
-    for line in [line for line in tail.decode(head.encoding, "replace").splitlines() if line.strip()][-6:]:
+    for line in tail.decode(head.encoding, "replace").splitlines():
         cells = split_line(line, head.delimiter)
-        _, mark, digits = cells[-1].partition(head.decimal)
-        decimals.append(len(digits) if mark else -1)
-    *usual, last = decimals or [0]
+        if cells:
+            _, mark, digits = cells[-1].partition(head.decimal)
+            decimals.append(len(digits) if mark else -1)
+    *usual, last = decimals[-6:] or [0]
     return len(usual) >= 2 and len(set(usual)) == 1 and last < usual[0]
