@@ -341,7 +341,9 @@ def _run(run: PlannedRun, suffix: str, rate: float, rotation: str) -> dict[str, 
 
 def _as_noted(run: PlannedRun, rig: VirtualRig) -> PlannedRun:
     """Give the run as somebody noted it, with that person's mistakes."""
-    for fault in filter(lambda fault: fault.affects(run.id), rig.faults):
+    for fault in rig.faults:
+        if not fault.affects(run.id):
+            continue
         point, value = run.point, fault.size(0.0)
         if fault.kind == "wrong_pad" and isinstance(run.test, DryTest):
             run = replace(run, test=replace(run.test, pad=int(value)))

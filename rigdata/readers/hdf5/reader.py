@@ -251,12 +251,12 @@ class Hdf5Reader(RunReader):
 
     def problems(self) -> tuple[Problem, ...]:
         """Tell which datasets nobody describes, and which state another unit than the manifest."""
-        members, units = self._layout().members, {}
+        units = {}
         with self._group() as group:
-            for name in filter(members.__contains__, self.channels):
+            for name in self.channels:
                 with suppress(RigDataError):  # raised when that channel is asked for
                     units[name] = self._unit(group, name)
-        return self._notes("datasets", members, units)
+        return self._notes("datasets", self._layout().members, units)
 
     def _unit(self, group: Any, name: str) -> str:
         attributes = self._dataset(group, name).attrs

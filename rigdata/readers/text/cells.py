@@ -150,7 +150,7 @@ def stamp_seconds(cells: Sequence[str | None]) -> tuple[FloatArray, int]:
     through them is nearer to the truth than the steps. Midnight between stamps without a date is a day.
     """
     matches = [_STAMP.fullmatch(cell) if cell else None for cell in cells]
-    bad = sum(match is None and bool(cell) for match, cell in zip(matches, cells, strict=True))
+    bad = sum(map(bool, cells)) - sum(map(bool, matches))
     days: dict[str, float] = {}
     seconds = np.array([np.nan if match is None else _seconds(match, days) for match in matches])
     good = np.isfinite(seconds)

@@ -198,9 +198,9 @@ def _judged(head: Head, places: Sequence[int], odd_lines: int) -> tuple[Problem,
             if not is_good and cell not in MISSING:
                 texts[i].append((last, cell[:40]))
     problems = []
-    for i, found in texts.items():
-        number, cell = found[0] if found else (head.data_line, "?")
-        more = f", and in {len(found) - 1} more lines" if len(found) > 1 else ""
+    for i, cells_of_text in texts.items():
+        number, cell = cells_of_text[0] if cells_of_text else (head.data_line, "?")
+        more = f", and in {len(cells_of_text) - 1} more lines" if len(cells_of_text) > 1 else ""
         fault = f"{cell!r} is not a {'time stamp' if i in head.stamps else 'number'}{more}"
         remedy = "Delete or repair these cells; an empty cell counts as missing"
         problems.append(record.problem("error", f"line {number}, column {i + 1} ({head.names[i]})", fault, remedy))
