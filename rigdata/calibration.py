@@ -232,6 +232,8 @@ class Channel:
 
 #: Channels by name.
 Channels = Mapping[str, Channel]
+#: Stands for a column that nobody describes.
+UNDESCRIBED = Channel("", "ignore")
 
 
 def reading_gain(
@@ -245,17 +247,17 @@ def reading_gain(
         raise UnitError(f"a reading in {unit} needs a sensitivity")
     if not (isinstance(sensitivity, str) and is_bridge_ratio(split_quantity(sensitivity, "ratio")[1])):
         return sensitivity_gain(sensitivity, unit, dimension)
-    ratio, supply, dividend = parse_quantity(sensitivity, "ratio"), 1.0, parse_unit(unit).factor
+    ratio, supply, signal = parse_quantity(sensitivity, "ratio"), 1.0, "ratio"
     if full_scale is None:
         raise UnitError(f"a sensitivity in V/V ({sensitivity!r}) needs full_scale")
     scale = parse_quantity(full_scale, dimension)
     if not is_bridge_ratio(unit):
         if excitation is None:
             raise UnitError(f"a sensitivity in V/V ({sensitivity!r}) needs excitation, the bridge supply")
-        supply, dividend = parse_quantity(excitation, "voltage"), unit_factor(unit, "voltage")
+        supply, signal = parse_quantity(excitation, "voltage"), "voltage"
     if min(ratio, scale, supply) <= 0:
         raise UnitError("sensitivity, full_scale and excitation must be above zero; a falling reading is polarity = -1")
-    return dividend / (ratio * supply) * scale
+    return unit_factor(unit, signal) / (ratio * supply) * scale
 
 
 def reading_zero(quantity: str, unit: str, zero: object) -> float:

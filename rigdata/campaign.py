@@ -284,10 +284,7 @@ def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
     from rigdata.readers.file_reader import FileReader
 
     old = run.reader
-    if isinstance(old, FileReader):
-        reader = replace(old, path=path, file=file, run=run_id)
-    else:
-        reader = FileReader(path, file, run_id, old.channels, old.stated_rate)
+    reader = FileReader(path, file, run_id, old.channels, old.stated_rate, old.spec, old.cache)
     return replace(run, id=run_id, reader=reader)
 
 

@@ -30,9 +30,10 @@ class ChannelStatistics:
         """Take the next block, (n,) readings as the file holds them."""
         if len(readings) == 0:
             return
-        valid = np.isfinite(readings) & (np.abs(np.nan_to_num(readings)) < OVERFLOW)
-        self.missing += int(len(readings) - np.count_nonzero(valid))
+        with np.errstate(invalid="ignore"):  # a signalling NaN is a missing value as well
+            valid = np.abs(readings) < OVERFLOW
         values = readings if valid.all() else readings[valid]
+        self.missing += len(readings) - len(values)
         if len(values):
             self.low = min(self.low, float(values.min()))
             self.high = max(self.high, float(values.max()))
@@ -41,8 +42,7 @@ class ChannelStatistics:
         present = np.where(valid, readings, np.nan)
         repeated = present == np.concatenate([[self._last], present[:-1]])
         self.repeats += int(np.count_nonzero(repeated))
-        breaks = np.flatnonzero(~repeated)
-        starts = np.concatenate([[-self._flat], breaks]) if repeated[0] else breaks
+        starts = np.append(-self._flat, np.flatnonzero(~repeated))
         lengths = np.diff(starts, append=len(present))
         best = np.argmax(lengths)
         if len(values) and lengths[best] > self.longest_flat:
@@ -78,7 +78,7 @@ class ChannelStatistics:
         level, much more of them than in the levels next to it; a sine has about 2.4 times as many in
         its last level as in the one before.
         """
-        if self.high <= self.low or not self.blocks:
+        if self.high <= self.low:
             return 0.0
         readings = np.concatenate(self.blocks)
         width = (self.high - self.low) / _LEVELS

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import Channels
+from rigdata.calibration import UNDESCRIBED, Channels
 
 #: Share by which a stated rate may miss that of the samples.
 RATE_MISS = 0.01
@@ -99,13 +99,13 @@ def planned(
     rates = {}
     faults = {}
     for name, timing in timings.items():
-        channel = channels.get(name)
+        channel = channels.get(name, UNDESCRIBED)
         if timing.clock:
             grid = grids.setdefault((timing.length, timing.clock), timing)
             grid.channels.append(name)
-            if grid not in shared and (channel is None or not channel.clock or run_rate is None):
+            if grid not in shared and (not channel.clock or run_rate is None):
                 shared.append(grid)
-        elif channel is not None and channel.sample_rate:
+        elif channel.sample_rate:
             rates[name] = channel.sample_rate
         else:
             untimed[name] = timing

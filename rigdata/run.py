@@ -87,7 +87,7 @@ class Run(RunDescription):
             return False
         devices = {name: device for device in self.devices for name in device.channels}
         rates = {(devices[name].rate, devices[name].length) for name in names if name in devices}
-        if len({name in apart for name in names}) > 1 or len(rates) > 1:
+        if not apart.issuperset(names) or len(rates) > 1:
             listed = ", ".join(f"{name} ({devices[name].rate:.6g} Hz)" for name in names if name in devices)
             fault = f"are not sampled at the same times: {listed}"
             raise self._refuse("channels", fault, "Read them device by device, see Run.devices")

@@ -38,7 +38,7 @@ _MOST_PLANES = 2
 
 
 def read_channels(table: Table) -> dict[str, Channel]:
-    """Read every channel; what is wrong is noted, and that channel left out."""
+    """Read every channel; what is wrong is noted."""
     findings = table.findings
     channels: dict[str, Channel] = {}
     if not table.data:
@@ -51,9 +51,8 @@ def read_channels(table: Table) -> dict[str, Channel]:
         entry = tables[name]
         if "like" in entry.data and not _complete(entry, name, tables, channels):
             continue
-        errors = findings.errors
         channel = read_channel(name, entry)
-        if channel is not None and findings.errors == errors:
+        if channel is not None:
             channels[name] = channel
     return {name: channels[name] for name in tables if name in channels}
 
@@ -100,14 +99,12 @@ def read_channel(name: str, table: Table) -> Channel | None:
 
 def _response(table: Table, values: dict[str, Any]) -> ChannelResponse:
     """Filter and delay; what is wrong is noted and left out."""
-    responses, text_of = list[Any](), table.findings.files
+    responses = list[Any]()
     if values["filter"] is not None:
         with table.noted("filter", "Or give filter_table, a measured response"):
             responses.append(parse_filter(values["filter"]))
-    file = values["filter_table"]
-    if file is not None and text_of is None:
-        table.error("filter_table", "a table cannot be read here", "Give filter, or a campaign in a folder")
-    elif text_of is not None and file is not None:
+    file, text_of = values["filter_table"], table.findings.files
+    if file is not None:
         with table.noted("filter_table", f"Give lines of frequency_Hz, gain, phase_deg in {shown(file)}"):
             responses.append(parse_response_table(text_of(file, ".".join(map(str, table.path)))))
     return ChannelResponse(tuple(responses), values["delay"])

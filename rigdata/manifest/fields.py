@@ -68,8 +68,8 @@ class Field:
             is_good = isinstance(value, str) and len(value) <= _MAX_TEXT and "\0" not in value
             fault = "is not text that can be used: too long, a NUL in it, or without quotes"
         elif self.kind == "list":
-            is_good = isinstance(value, list) and bool(value)
-            is_good = is_good and all(isinstance(text, str) and text.strip() for text in value)
+            texts = value if isinstance(value, list) else []
+            is_good = bool(texts) and all(isinstance(text, str) and text.strip() for text in texts)
             fault = "is no list of texts"
         else:
             number = value
@@ -135,7 +135,7 @@ def nearest(name: str, choices: Collection[str]) -> str:
 class Findings:
     """The problems of one manifest, with their lines."""
 
-    def __init__(self, file: str, lines: dict[Path, int], files: TextFile | None = None) -> None:
+    def __init__(self, file: str, lines: dict[Path, int], files: TextFile) -> None:
         self.file, self.lines, self.files = file, lines, files
         self.problems: list[Problem] = []
         self.errors = 0
@@ -229,20 +229,17 @@ class Table:
 def key_lines(text: str) -> dict[Path, int]:
     """Line (1-based) of every table and key, by path."""
     lines: dict[Path, int] = {}
-    counts: dict[str, int] = {}
-    table = ()
+    counts = Counter[Path]()
+    table: Path = ()
     for number, line in enumerate(text.splitlines(), start=1):
         if len(line) > _LONGEST:
             continue
         header = _TABLE.match(line)
         if header is not None:
-            name = tuple(a or b or c for a, b, c in _PART.findall(header[2]))
+            table = tuple(a or b or c for a, b, c in _PART.findall(header[2]))
             if header[1] == "[[":
-                index = counts.get(header[2].strip(), 0)
-                counts[header[2].strip()] = index + 1
-                table = (*name, index)
-            else:
-                table = name
+                counts[table] += 1
+                table = (*table, counts[table] - 1)
             lines.setdefault(table, number)
             continue
         key = _KEY.match(line)
@@ -258,6 +255,6 @@ def _spell(path: Path) -> str:
     for at, number in enumerate(path):
         if isinstance(number, int):
             keys = "".join(f" {p}" for p in path[at + 1 :])
-            return f"[[{'.'.join(str(p) for p in path[:at])}]] no. {number + 1}{keys}"
-    table = ".".join(str(p) for p in path[:-1])
+            return f"[[{'.'.join(map(str, path[:at]))}]] no. {number + 1}{keys}"
+    table = ".".join(map(str, path[:-1]))
     return f"[channels.{path[-1]}]" if table == "channels" else f"[{table}] {path[-1]}"

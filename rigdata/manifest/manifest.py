@@ -4,7 +4,6 @@ import codecs
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from rigdata.calibration import Channels
 from rigdata.manifest.channels import channels_by_run, read_channels
@@ -57,7 +56,7 @@ class RunEntry(RunDescription):
 
 
 def _read_runs(top: Table, rotation: str) -> tuple[RunEntry, ...]:
-    """Read every run, of this rotation if it states none; what is wrong is noted, and that run left out."""
+    """Read every run, of this rotation if it states none; what is wrong is noted."""
     data, findings = top.data.get("runs"), top.findings
     if not isinstance(data, list) or not data:
         findings.error(("runs",), "no runs are listed", "Add a [[runs]] table per record")
@@ -68,15 +67,13 @@ def _read_runs(top: Table, rotation: str) -> tuple[RunEntry, ...]:
     runs = []
     first: dict[str, int] = {}
     for index, entry in enumerate(data):
-        errors = findings.errors
         run = _read_run(Table(entry, ("runs", index), findings), index, rotation)
         if run is None:
             continue
         if run.id in first:
             message = f"run id {shown(run.id)} is used twice, also by run no. {first[run.id] + 1}"
             findings.error(("runs", index, "id"), message, "Give every run its own id", run.id)
-        if findings.errors == errors:
-            runs.append(run)
+        runs.append(run)
         first.setdefault(run.id, index)
     return tuple(runs)
 
@@ -158,9 +155,18 @@ class Manifest(Description):
     described: Mapping[str, Channels]  #: by run, if other
 
 
-def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:
+def _no_files(name: str, place: str) -> str:
+    raise UnitError("a table cannot be read here")
+
+
+def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile = _no_files) -> Manifest:
     """Read and check the text of a manifest."""
-    data = _load_toml(text, file)
+    if len(text) > MAX_MANIFEST:
+        raise refuse(file, "", f"the manifest is larger than {MAX_MANIFEST >> 20} MB", "Is it the right file?")
+    try:
+        data = parse_toml(text)
+    except ValueError as error:
+        raise refuse(file, "", f"not valid TOML: {error}", "Repair the TOML at this place") from error
     schema = str(data.get("schema"))
     if schema.startswith("tpjb-") and not schema.startswith("tpjb-rig/"):
         fault = f"is of the schema {shown(schema)}, not the manifest of a campaign"
@@ -183,15 +189,6 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     if findings.errors:
         raise RigDataError(findings.problems)
     return manifest
-
-
-def _load_toml(text: str, file: str) -> dict[str, Any]:
-    if len(text) > MAX_MANIFEST:
-        raise refuse(file, "", f"the manifest is larger than {MAX_MANIFEST >> 20} MB", "Is it the right file?")
-    try:
-        return parse_toml(text)
-    except ValueError as error:
-        raise refuse(file, "", f"not valid TOML: {error}", "Repair the TOML at this place") from error
 
 
 def _read_csv(table: Table) -> CsvSpec:

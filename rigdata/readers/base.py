@@ -130,8 +130,8 @@ class RunReader(RecordFile):
         """Raw readings of channels of one device, (stop - start,) each."""
         raise NotImplementedError
 
-    def _grid(self, name: str) -> Grid:
-        """Channels at the times of `name`."""
+    def _grid(self, name: str = "") -> Grid:
+        """Channels at the times of `name`; without one those of the run's own device."""
         grids = self._layout().grids
         return next((grid for grid in grids if name in grid.channels), grids[0])
 
@@ -153,11 +153,11 @@ class RunReader(RecordFile):
 
     def length(self) -> int:
         """Count the samples per channel of the run's own device."""
-        return self._layout().grids[0].length
+        return self._grid().length
 
     def rate(self) -> float:
         """Give the sample rate [Hz]: of the file's times, else what the file or the manifest states."""
-        rate = self._layout().grids[0].rate
+        rate = self._grid().rate
         if LEAST_RATE <= rate <= MOST_RATE:
             return rate
         if rate > 0:
@@ -184,13 +184,11 @@ class RunReader(RecordFile):
     def time(self, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,): the file's, else counted from the rate."""
         self.rate()  # rejects one that times cannot be counted from
-        return self._times(self._layout().grids[0], start, stop)
+        return self.device_time("", start, stop)
 
     def device_time(self, name: str, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,) of a channel's samples: the file's, else counted from its device's rate."""
-        return self._times(self._grid(name), start, stop)
-
-    def _times(self, grid: Grid, start: int, stop: int) -> FloatArray:
+        grid = self._grid(name)
         if grid.clock:
             return self._clock_times(grid.clock, start, stop)
         return grid.begin + np.arange(start, stop) / grid.rate

@@ -87,22 +87,25 @@ class FileReader(RunReader):
         timings = {}
         times: dict[str, FloatArray] = {}
         for channel in series:
-            if channel.time is None:
-                timings[channel.name] = Grid(len(channel))
-            elif not np.isfinite(channel.time).all() or np.any(np.diff(channel.time) < 0):
-                back = np.append(np.flatnonzero(~(np.diff(channel.time) >= 0)), -1)
-                fault = f"its times have gaps or run backwards (sample {int(back[0]) + 2})"
+            name, time = channel.name, channel.time
+            if time is None:
+                timings[name] = Grid(len(channel))
+                continue
+            wrong = ~np.isfinite(time)
+            wrong[1:] |= np.diff(time) < 0
+            if wrong.any():
+                fault = f"its times have gaps or run backwards (sample {np.argmax(wrong) + 1})"
                 remedy = "Sort or split the run, or export without times"
-                faults[channel.name] = self.refuse(f"channel {channel.name}", fault, remedy)
-            else:
-                clock = next((key for key, time in times.items() if _alike(time, channel.time)), str(len(times) + 1))
-                times.setdefault(clock, channel.time)
-                if len(times) > _MOST_TIMES:
-                    raise self.refuse("", f"has more than {_MOST_TIMES} different times", "Split the run")
-                grid = timed_grid(len(channel), clock, times[clock], channel.group, self.stated_rate)
-                self._refuse_other_unit(contents.clocks, grid.rate)
-                label = grid.label if is_time(grid.label) else f"{grid.rate:.6g} Hz"
-                timings[channel.name] = replace(grid, label=label)
+                faults[name] = self.refuse(f"channel {name}", fault, remedy)
+                continue
+            clock = next((key for key, shared in times.items() if _alike(shared, time)), str(len(times) + 1))
+            times.setdefault(clock, time)
+            if len(times) > _MOST_TIMES:
+                raise self.refuse("", f"has more than {_MOST_TIMES} different times", "Split the run")
+            grid = timed_grid(len(channel), clock, times[clock], channel.group, self.stated_rate)
+            self._refuse_other_unit(contents.clocks, grid.rate)
+            label = grid.label if is_time(grid.label) else f"{grid.rate:.6g} Hz"
+            timings[name] = replace(grid, label=label)
         remedy = "Export it with its times, or correct sample_rate"
         grids, untimed = self._planned(timings, self.stated_rate, "channel", remedy)
         faults |= untimed

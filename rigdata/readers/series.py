@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
-from rigdata.calibration import OVERFLOW, Channels
+from rigdata.calibration import OVERFLOW, UNDESCRIBED, Channels
 from rigdata.device import RATE_MISS, rate_of_time
 from rigdata.problem import Problem
 from rigdata.readers.base import RecordFile
@@ -156,21 +156,15 @@ def time_columns(names: Sequence[str], channels: Channels) -> list[int]:
 
 def serving(names: Sequence[str], clocks: Sequence[int], channels: Channels) -> list[int | None]:
     """Place of every column's time column: of the clock that it states, else the nearest without one to its left."""
-    stated = {name: channel.clock for name, channel in channels.items()}
-    letters = {}
-    plain = []
-    for i in clocks:
-        letter = stated.get(names[i])
-        if letter:
-            letters[letter] = i
-        else:
-            plain.append(i)
+    letters = [channels.get(name, UNDESCRIBED).clock for name in names]
+    lettered = {letters[i]: i for i in clocks if letters[i]}
+    plain = [i for i in clocks if not letters[i]]
     nearest = plain[0] if plain else None
-    served = []
-    for i, name in enumerate(names):
+    places = []
+    for i, letter in enumerate(letters):
         nearest = i if i in plain else nearest
-        served.append(letters.get(stated.get(name, ""), nearest))
-    return served
+        places.append(lettered.get(letter, nearest))
+    return places
 
 
 def table(contents: Contents, record: RecordFile) -> Contents:
@@ -186,7 +180,8 @@ def table(contents: Contents, record: RecordFile) -> Contents:
         series[i] = replace(series[i], unit=time_unit(names[i], series[i].unit))
     for i, clock in enumerate(serving(names, clocks, channels)):
         if i in clocks:
-            groups[i] += [i] if names[i] in channels else []
+            if names[i] in channels:
+                groups[i].append(i)
             continue
         if clock is not None and len(series[clock]) != len(series[i]):
             clock = next((other for other in clocks if len(series[other]) == len(series[i])), None)
@@ -235,10 +230,10 @@ def _slow_columns(series: Sequence[Series], record: RecordFile) -> list[Series]:
     rows_rate = record.stated_rate
     slow = defaultdict(list)
     for i, column in enumerate(series):
-        known = record.channels.get(column.name)
+        channel = record.channels.get(column.name, UNDESCRIBED)
         rate = column.rate if column.time is not None else (rows_rate or np.nan)
-        if known is not None and known.sample_rate and not abs(known.sample_rate / rate - 1.0) <= RATE_MISS:
-            slow[known.clock, known.sample_rate, len(column)].append(i)
+        if channel.sample_rate and not abs(channel.sample_rate / rate - 1.0) <= RATE_MISS:
+            slow[channel.clock, channel.sample_rate, len(column)].append(i)
     placed = list(series)
     for (_, rate, length), members in slow.items():
         rows = _filled_rows([series[i].values for i in members])

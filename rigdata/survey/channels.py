@@ -176,7 +176,7 @@ def pairs(channels: Guesses, quantity: str) -> list[Pair]:
     for name, guess in channels.items():
         if guess.quantity.value == quantity:
             names[guess.unit].append(name)
-    return [pair for alike in names.values() for pair in zip(alike[::2], alike[1::2], strict=False)]
+    return [pair for alike in names.values() for pair in zip(alike[::2], alike[1::2])]
 
 
 def stated_frame(pair: Pair, channels: Guesses) -> Frame | None:

@@ -117,8 +117,7 @@ def _line(key: str, entry: Entry, fields: tuple[Field, ...] = ()) -> str:
 
 
 def _key(name: str) -> str:
-    bare = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
-    return name if bare else toml_value(name)
+    return name if re.fullmatch("[A-Za-z0-9_-]+", name) else toml_value(name)
 
 
 @dataclass

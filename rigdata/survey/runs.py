@@ -117,8 +117,6 @@ def _speed(export: Export, channels: Guesses, stem: str) -> Entry:
 
 def _by_movement(forces: list[Series], moves: list[Series], lines: Peaks) -> tuple[str, str]:
     pair = [s for s in forces if s.rate > 0][:2] or [s for s in moves if s.rate > 0][:2]
-    if not pair:
-        return "", ""
     total = sum(np.nanvar(s.values) for s in pair)
     if total <= 0:
         return "", ""

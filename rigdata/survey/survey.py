@@ -97,9 +97,9 @@ class _Folder:
     def _with(self, kinds: Sequence[str], *names: Pair) -> Iterator[tuple[RunGuess, list[list[Series]]]]:
         """Runs of some kinds that have these pairs of channels, with their records."""
         for run in self.runs:
-            found = [_pair(run, pair) for pair in names]
-            if run.kind.value in kinds and all(found):
-                yield run, found
+            records = [_pair(run, pair) for pair in names]
+            if run.kind.value in kinds and all(records):
+                yield run, records
 
     def _dry_tests(self, *names: Pair) -> tuple[FloatArray, FloatArray]:
         """Directions (n,) [rad] of the pads that dry tests load, NaN where these are not known.

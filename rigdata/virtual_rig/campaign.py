@@ -15,6 +15,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import ROTATIONS
 from rigdata.problem import toml_value
+from rigdata.vector import directions
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import answer
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig, converter_step, felt_direction
@@ -170,18 +171,17 @@ def _write_csv(folder: Path, rig: VirtualRig, records: _Records, layout: CsvLayo
 
 def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> str:
     columns, rate = _stored(record, rig, layout.time_name), record.readings.rate
-    names, units, forms = [], [], []
-    for name, _ in columns:
-        names.append(name)
-        if name == layout.time_name:
-            units.append("s")
-            forms.append("%.6f" if (1e6 / rate).is_integer() else "%.9f")
-            continue
-        sensor = rig.instruments.named(name)
-        units.append(sensor.unit)
-        # decimals that keep a hundredth of a converter step
-        decimals = ceil(-log10(converter_step(sensor, rig.noise.bits or _UNQUANTISED_BITS))) + 2
-        forms.append(f"%.{max(0, decimals)}f")
+    names = [name for name, _ in columns]
+    units, forms = [], []
+    for name in names:
+        unit, decimals = "s", 6 if (1e6 / rate).is_integer() else 9
+        if name != layout.time_name:
+            sensor = rig.instruments.named(name)
+            # decimals that keep a hundredth of a converter step
+            step = converter_step(sensor, rig.noise.bits or _UNQUANTISED_BITS)
+            unit, decimals = sensor.unit, max(0, ceil(-log10(step)) + 2)
+        units.append(unit)
+        forms.append(f"%.{decimals}f")
     table = np.stack([values for _, values in columns], axis=1)
     tail = layout.delimiter if layout.trailing_delimiter else ""
     head = [line.format(rate=f"{rate:g}", count=len(table)) for line in layout.preamble]
@@ -191,10 +191,11 @@ def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> st
     for written, wanted in (("nan", layout.missing), (".", layout.decimal), ("\0", layout.delimiter)):
         text = text.replace(written, wanted)
     body = [line + tail for line in text.split("\n")] if text else []
-    lines = [*head, *body, *[""] * (1 + layout.blank_last_lines)]
+    end = [""] * (1 + layout.blank_last_lines)
     if "truncated_line" in rig.fault_kinds(record.run.id) and body:
-        lines = [*head, *body[:-1], body[-1][: len(body[-1]) * 3 // 5]]
-    return layout.newline.join(lines)
+        body[-1] = body[-1][: len(body[-1]) * 3 // 5]
+        end = []
+    return layout.newline.join([*head, *body, *end])
 
 
 def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) -> CampaignTruth:
@@ -256,7 +257,7 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
         stated, sensed = [], []
         for sensor in instruments.of(quantity)[:2]:
             gain = sensor.error.gain * np.exp(-1j * frequency * sensor.error.delay)
-            stated.append(sensor.direction(stated=True))
+            stated.append(directions(sensor.axis or 0.0))
             sensed.append(gain * felt_direction(sensor, instruments))
         phasors = getattr(response, quantity).T
         readings[quantity] = np.linalg.solve(np.array(stated, dtype=complex), np.array(sensed)) @ phasors
@@ -269,16 +270,20 @@ def manifest_text(rig: VirtualRig, layout: CsvLayout | None = None) -> str:
     rates = [run.rate for run in rig.runs]
     rate, rotation = max(set(rates), key=rates.count), rig.runs[0].point.rotation
     header = {"schema": "tpjb-rig/1", "id": rig.campaign, "bearing": rig.truth.bearing_name}
-    tables: dict[str, dict[str, object]] = {
-        "": {**header, "description": rig.description},
+    tables: dict[str, dict[str, Any]] = {
+        "": header | {"description": rig.description},
         "[housing]": {"mass": f"{rig.instruments.housing_mass:.10g} kg"},
         "[acquisition]": {"sample_rate": _rate(rate)},
     }
     if layout is not None and layout.declared:
         line = len(layout.preamble) + 1
-        dialect = {key: getattr(layout, key) for key in ("delimiter", "decimal", "encoding")}
-        lines = {"header_line": line, "units_line": line + 1 if layout.units_line else None}
-        tables["[csv]"] = dialect | lines
+        tables["[csv]"] = {
+            "delimiter": layout.delimiter,
+            "decimal": layout.decimal,
+            "encoding": layout.encoding,
+            "header_line": line,
+            "units_line": line + 1 if layout.units_line else None,
+        }
     if layout is not None and layout.time_name:
         tables[f"[channels.{layout.time_name}]"] = {"quantity": "time", "unit": "s"}
     tables |= {f"[channels.{sensor.name}]": _channel(sensor) for sensor in rig.instruments.sensors}
@@ -336,7 +341,9 @@ def _run(run: PlannedRun, suffix: str, rate: float, rotation: str) -> dict[str, 
 
 def _as_noted(run: PlannedRun, rig: VirtualRig) -> PlannedRun:
     """Give the run as somebody noted it, with that person's mistakes."""
-    for fault in filter(lambda fault: fault.affects(run.id), rig.faults):
+    for fault in rig.faults:
+        if not fault.affects(run.id):
+            continue
         point, value = run.point, fault.size(0.0)
         if fault.kind == "wrong_pad" and isinstance(run.test, DryTest):
             run = replace(run, test=replace(run.test, pad=int(value)))

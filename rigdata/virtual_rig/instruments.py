@@ -64,9 +64,9 @@ class Sensor:
             error = replace(error, **{name: total})
         return replace(self, error=error)
 
-    def direction(self, stated: bool = False) -> np.ndarray:
-        """Unit vector (2,) along which it really reads, or is stated to read."""
-        return directions((self.axis or 0.0) + (0.0 if stated else self.error.angle))
+    def direction(self) -> np.ndarray:
+        """Unit vector (2,) along which it really reads."""
+        return directions((self.axis or 0.0) + self.error.angle)
 
 
 @dataclass(frozen=True)
@@ -88,19 +88,18 @@ class Instruments:
         rig = PAPER_RIG["rig"]
         sensors = [Sensor.of_type(kind, name, axis=radians(degrees)) for kind, name, degrees in rig["sensors"]]
         sensors += [Sensor.of_type("thermometer", f"T{number}", pad=number) for number in range(1, n_pads + 1)]
-        drawn = {s.name: rig["scatter"][s.quantity] for s in sensors if s.quantity != "force"}
-        share = 0.0 if seed is None else 1.0
-        zeros = share * np.random.default_rng([seed or 0, 0]).normal(0.0, [*drawn.values()]) + 0.0
-        drawn = dict(zip(drawn, zeros.tolist(), strict=True))
+        rng = np.random.default_rng([seed or 0, 0])
         full_scale = next((size for size in _CELL_SIZES if size >= 1.5 * load), 1.5 * load)
         stated = {"sensitivity": "2.0 mV/V", "full_scale": f"{full_scale / 1e3:g} kN", "excitation": "5 V"}
         for place, sensor in enumerate(sensors):
             if sensor.quantity == "force":
                 sensors[place] = replace(sensor, scale=10.0 / full_scale, calibration=stated)
-            elif sensor.quantity == "displacement":
-                sensors[place] = replace(sensor, zero=sensor.zero + drawn[sensor.name])
+                continue
+            zero = 0.0 if seed is None else rng.normal(0.0, rig["scatter"][sensor.quantity])
+            if sensor.quantity == "displacement":
+                sensors[place] = replace(sensor, zero=sensor.zero + zero)
             else:
-                sensors[place] = sensor.with_error(offset=drawn[sensor.name])
+                sensors[place] = sensor.with_error(offset=zero)
         return cls((*sensors, Sensor.of_type("tachometer", "K1")))
 
     @property

@@ -100,18 +100,18 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
     phases = stream(seed, "", "campaign").uniform(0, 2 * np.pi, len(runout))
     orders = np.arange(1, len(runout) + 1)
     steady = replace(actual, excitation=0.0)
-    lines, line_facts = [], []
+    lines = []
     for frequency, force in forces:
         h = truth.stiffness(replace(actual, excitation=frequency))
         lines.append(answer(frequency, force, h, instruments))
-        line_facts.append({"frequency_Hz": round(frequency / (2 * np.pi), 9)})
     position = truth.position(steady)
+    frequencies = [{"frequency_Hz": round(line.frequency / (2 * np.pi), 9)} for line in lines]
     return Motion(
         time=np.arange(round(run.seconds * run.rate)) / run.rate,
         position=position,
         load=load_vector(actual),
         temperature=truth.temperature(steady),
-        facts=point_facts(actual, position) | {"lines": line_facts},
+        facts=point_facts(actual, position) | {"lines": frequencies},
         lines=tuple(lines),
         speed=actual.spin,
         surface=runout * np.exp(1j * (phases + orders * shaft_angle)),
@@ -243,9 +243,8 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     """
     pads = _sides(truth)
     angles = np.array(truth.pivot_angles)[pads]
-    following = [*pads[1:], pads[0]]
     shares, places = [], []
-    for pad, after in zip(pads, following, strict=True):
+    for pad, after in zip(pads, [*pads[1:], pads[0]], strict=True):
         angle, next_angle = truth.pivot_angles[pad], truth.pivot_angles[after]
         gap = (next_angle - angle) % (2 * np.pi)
         passed, remaining = wrapped(direction - angle - lag), wrapped(next_angle + lag - direction)

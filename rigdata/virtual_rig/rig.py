@@ -6,7 +6,7 @@ From motion to readings: axes, gains, delays, runout, noise, glitches, zero, the
 from collections.abc import Iterable
 from dataclasses import asdict, astuple, dataclass, field, replace
 from fnmatch import fnmatchcase
-from functools import cached_property
+from functools import cache, cached_property
 from math import inf
 from typing import Any
 
@@ -94,7 +94,12 @@ def analogue_readings(
     """Readings of all sensors before the converter, each (n,) in its own unit."""
     time = motion.time
     disturbance = channel_noise(instruments.sensors, noise, time, seed, run)
-    vectors: dict[tuple[str, float], FloatArray] = {}
+
+    @cache
+    def vectors(quantity: str, delay: float) -> FloatArray:
+        # sampled at the delayed time instead of shifted: exact for any fraction of a sample
+        return motion.at(quantity, time - delay)
+
     columns = {}
     for sensor, added in zip(instruments.sensors, disturbance):
         error = sensor.error
@@ -102,14 +107,9 @@ def analogue_readings(
         if sensor.quantity == "temperature":
             value = motion.temperature[(sensor.pad or 1) - 1]
         elif sensor.axis is not None:
-            # sampled at the delayed time instead of shifted: exact for any fraction of a sample
-            late = time - error.delay
-            key = (sensor.quantity, error.delay)
-            if key not in vectors:
-                vectors[key] = motion.at(sensor.quantity, late)
-            value = vectors[key] @ felt_direction(sensor, instruments)
+            value = vectors(sensor.quantity, error.delay) @ felt_direction(sensor, instruments)
             if sensor.quantity == "displacement":
-                value = value + motion.runout(sensor.axis + error.angle, late)
+                value = value + motion.runout(sensor.axis + error.angle, time - error.delay)
         reading = error.gain * value + error.offset + added
         columns[sensor.name] = sensor.polarity * sensor.scale * reading + sensor.zero
     return columns
@@ -133,9 +133,8 @@ def draw_glitches(instruments: Instruments, noise: Noise, samples: int, seed: in
     glitches: list[Glitch] = []
     while channels and len(glitches) < 4 and rng.uniform() < rules.share:
         sensor = channels[rng.integers(len(channels))]
-        largest = rules.displacement if sensor.quantity == "displacement" else rules.force
         count = min(int(rng.integers(rules.shortest, rules.longest, endpoint=True)), samples)
-        size = largest * either_sign(rng, (0.4, 1.0))
+        size = getattr(rules, sensor.quantity) * either_sign(rng, (0.4, 1.0))
         glitches.append(Glitch(sensor.name, int(rng.integers(0, samples - count + 1)), count, size))
     return tuple(glitches)
 

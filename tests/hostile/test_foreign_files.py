@@ -68,8 +68,8 @@ def through_the_wall(folder, monkeypatch, read_in_sandbox):
     """What a reader of that kind gives, written and read back."""
     talks = SimpleNamespace(talks=read_in_sandbox)
     monkeypatch.setitem(sys.modules, "rigdata.readers.formats.loggers", talks)
-    monkeypatch.setattr(sandbox, "_limit_memory", lambda path: None)
-    sandbox.main("talks", folder, folder / "answer.npz")
+    monkeypatch.setattr(sandbox, "_limit", lambda path, seconds: None)
+    sandbox.main("talks", folder, 60, folder / "answer.npz")
     return sandbox._answered(folder / "answer.npz")
 
 

@@ -18,7 +18,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (116.64, 13_826),
     "model": (75.11, 10_149),
-    "rigdata": (59.27, 7_971),
+    "rigdata": (58.70, 7_946),
     "diagnosis": (38.38, 4_713),
     "cli": (22.12, 3_068),
     "report": (23.13, 3_022),

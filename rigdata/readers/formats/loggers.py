@@ -159,16 +159,16 @@ def read_parquet(path: Path) -> list[Series]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    columns, units = {}, {}
+    series = []
     with path.open("rb") as stream, pq.ParquetFile(stream) as table:
         schema, rows = table.schema_arrow, table.metadata.num_rows
         numeric = [c for c in schema if pa.types.is_integer(c.type) or pa.types.is_floating(c.type)]
         refuse_claim(SAMPLE * rows * (len(numeric) + 1), path)
+        rate, time = (schema.metadata or {}).get(b"sample_rate_hz"), None
+        if rate is not None and not any(is_time(column.name) for column in numeric):
+            time = equidistant(rows, 1.0 / float(rate))
         for column in numeric:
             values = table.read([column.name]).column(0).cast(pa.float64()).to_numpy()
-            columns[column.name] = to_temporary_file(values)
-            units[column.name] = (column.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
-    rate = (schema.metadata or {}).get(b"sample_rate_hz")
-    is_timed = any(map(is_time, columns))
-    time = equidistant(rows, 1.0 / float(rate)) if rate is not None and not is_timed else None
-    return [Series(name, units[name], values, time) for name, values in columns.items()]
+            unit = (column.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
+            series.append(Series(column.name, unit, to_temporary_file(values), time))
+    return series

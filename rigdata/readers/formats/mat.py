@@ -8,7 +8,7 @@ import re
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -50,28 +50,24 @@ def read_mat(path: Path) -> list[Series]:
     """
     variables = list(_flattened(_load(path), "", 0))
     texts = {name: value for name, value in variables if isinstance(value, list)}
-    vectors, scalars, units = {}, {}, {}
+    channels: dict[str, Series] = {}
+    rates = []
     for name, value in variables:
         if isinstance(value, list):
             continue
-        if value.size == 1:
-            scalars[name] = float(value.reshape(-1)[0])
+        if value.size == 1 and value.item() > 0 and _RATES.fullmatch(_last_part(name).lower()):
+            rates.append(value.item())
         elif value.size >= _SHORTEST:
-            columns, column_units = _columns(name, value, texts)
-            vectors.update(columns)
-            units.update(column_units)
-    if not vectors:
+            channels |= {channel.name: channel for channel in _columns(name, value, texts)}
+    if not channels:
         names = ", ".join(name for name, _ in variables[:6]) or "no numbers at all"
         fault = f"holds no vector of at least {_SHORTEST} numbers, only {names}"
         raise refuse(path.name, "", fault, "Save the channels as vectors, or as a matrix")
-    timed = {len(values) for name, values in vectors.items() if is_time(_last_part(name))}
-    rates = [value for name, value in scalars.items() if value > 0 and _RATES.fullmatch(_last_part(name).lower())]
-    series = []
-    for name, values in vectors.items():
-        is_counted = rates and len(values) not in timed
-        times = equidistant(len(values), 1.0 / rates[0]) if is_counted else None
-        series.append(Series(name, units.get(name, ""), values, times))
-    return series
+    timed = {len(channel) for name, channel in channels.items() if is_time(_last_part(name))}
+    for name, channel in channels.items():
+        if rates and len(channel) not in timed:
+            channels[name] = replace(channel, time=equidistant(len(channel), 1.0 / rates[0]))
+    return list(channels.values())
 
 
 def _last_part(name: str) -> str:
@@ -125,14 +121,13 @@ def _cell_texts(item: Any) -> list[str]:
     if item.size > _MOST_NAMES or not _is_inside(item):
         return []
     texts = []
-    for reference in np.asarray(item[()]).T.reshape(-1):
+    for reference in np.ravel(item[()], "F"):
         text = item.file[reference] if reference else None
         if text is None or not hasattr(text, "dtype") or text.dtype.kind != "u" or text.size > _LONGEST:
             return []
         if not (_is_text(text) and _is_inside(text)):
             return []
-        codes = np.asarray(text[()]).T.reshape(-1)
-        texts.append("".join(chr(int(code)) for code in codes))
+        texts.append("".join(map(chr, np.ravel(text[()], "F").tolist())))
     return texts
 
 
@@ -161,22 +156,20 @@ def _flattened(value: Any, name: str, depth: int) -> Iterator[tuple[str, np.ndar
             yield name, [cell.strip() for cell in cells]
 
 
-def _columns(name: str, value: np.ndarray, texts: dict[str, list[str]]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Channels of a variable, and units of those that a list next to it has."""
+def _columns(name: str, value: np.ndarray, texts: dict[str, list[str]]) -> Iterator[Series]:
+    """Channels of a variable, named and with units as lists next to it say."""
     if value.ndim == 1 or 1 in value.shape:
-        return {name: np.ascontiguousarray(value).reshape(-1)}, {}
+        yield Series(name, "", np.ravel(value))
+        return
     level = name.rpartition(".")[0]
     lists = {_last_part(key).lower(): cells for key, cells in texts.items() if key.rpartition(".")[0] == level}
     names = _listed(lists, _NAMES, value.shape) or [name] * value.shape[1]
     units = _listed(lists, _UNITS, (len(names),)) or [""] * len(names)
-    columns, column_units = {}, {}
-    for i, column in enumerate(value.T if len(names) == value.shape[1] else value):
-        label = names[i]
+    columns = value.T if len(names) == value.shape[1] else value
+    for i, label in enumerate(names):
         if not label or names.count(label) > 1:
             label = f"{label or name}_{i + 1}"
-        columns[label] = np.ascontiguousarray(column)
-        column_units[label] = units[i]
-    return columns, column_units
+        yield Series(label, units[i], np.ascontiguousarray(columns[i]))
 
 
 def _listed(lists: dict[str, list[str]], named: re.Pattern[str], lengths: tuple[int, ...]) -> list[str]:

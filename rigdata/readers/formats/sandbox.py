@@ -70,21 +70,22 @@ def _answered(answer: Path) -> list[Series]:
     return series
 
 
-def _limit_memory(path: Path) -> None:
-    """Allow some times the file's size beyond what is mapped by now (not on Windows)."""
+def _limit(path: Path, seconds: int) -> None:
+    """Allow so much processor time, and some times the file's size beyond what is mapped by now (not on Windows)."""
     with contextlib.suppress(ImportError):
         import resource
 
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.getrlimit(resource.RLIMIT_CPU)[1]))
         with contextlib.suppress(OSError):  # no /proc: macOS does not heed this limit either
             mapped = int(Path("/proc/self/statm").read_text("ascii").split()[0]) * resource.getpagesize()
             limit = mapped + MEMORY + MULTIPLES * path.stat().st_size
             resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
-def main(function: str, path: Path, answer: Path) -> None:
+def main(function: str, path: Path, seconds: int, answer: Path) -> None:
     """Read a file and write its channels to `answer` (.npz): texts, and the numbers of each; or what is wrong."""
     read = getattr(importlib.import_module("rigdata.readers.formats.loggers"), function)
-    _limit_memory(path)
+    _limit(path, seconds)
     try:
         series = read(path)
     except MemoryError:
@@ -99,8 +100,4 @@ def main(function: str, path: Path, answer: Path) -> None:
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(ImportError):  # no limits on Windows
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[3]), resource.getrlimit(resource.RLIMIT_CPU)[1]))
-    main(sys.argv[1], Path(sys.argv[2]), Path(sys.argv[4]))
+    main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]))

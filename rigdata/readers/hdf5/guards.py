@@ -143,13 +143,11 @@ def chunk_bytes(dataset: Any) -> int:
 
 def refuse_claims(handle: Any, path: Path, runs: Sequence[str], names: Sequence[str]) -> None:
     """Refuse a file whose runs claim more samples than it can hold; what cannot be opened is refused by its reader."""
-    import h5py
-
     claimed = 0
     for run in runs:
         with contextlib.suppress(*_BROKEN):
             group = resolve(handle, f"runs/{run}", "")
-            for name in names if isinstance(group, h5py.Group) else ():
+            for name in names:
                 with contextlib.suppress(*_BROKEN):
                     claimed += claimed_bytes(resolve(group, name, ""))
     refuse_claim(claimed, path)

@@ -162,46 +162,43 @@ class Hdf5Reader(RunReader):
         return dataset
 
     def _read_layout(self) -> _Members:
-        with self._group() as group:
-            return self._arranged(group)
-
-    def _arranged(self, group: Any) -> _Members:
         """What is sampled together: by time datasets, stated rates, and the length that most channels have."""
-        members = tuple(itertools.islice(group, _MAX_MEMBERS))
-        lengths = {}
-        problems: list[Problem] = []
-        largest = 0
-        for name in members:
-            try:
-                dataset = self._dataset(group, name)
-                lengths[name] = dataset.shape[0]
-                largest = max(largest, chunk_bytes(dataset))
-            except RigDataError as error:  # raised again when that channel is asked for
-                problems.extend(error.problems)
-        if not lengths:
-            fault = "the group holds no dataset of numbers"
-            empty = self.problem("error", "", fault, "Store one dataset per channel")
-            raise RigDataError(problems[:_LISTED] or empty)
-        stated = self._checked_rate(group.attrs)
-        run_rate = stated or self.stated_rate
-        names = [name for name in self.channels if name in lengths]
-        if run_rate is None:  # else nobody needs times that are not described
-            names += [name for name in lengths if name not in self.channels]
-        clocks = time_columns(names, self.channels)
-        timed = {}
-        for clock in [names[i] for i in clocks]:
-            time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
-            grid = timed_grid(lengths[clock], clock, time, clock, run_rate)
-            timed[clock] = grid if stated is None or self.channels[clock].clock else replace(grid, rate=stated)
-        timings = {name: Grid(length) for name, length in lengths.items() if name not in timed}
-        for name, i in zip(names, serving(names, clocks, self.channels), strict=True):
-            if i is not None and name in timings:
-                same = [clock for clock in (names[i], *timed) if lengths[clock] == lengths[name]]
-                timings[name] = timed[same[0]] if same else Grid(lengths[name], times=lengths[names[i]])
-        remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
-        grids, faults = self._planned(timings, run_rate, "dataset", remedy)
-        unserved = Grid(max(lengths.values()), "", run_rate or np.nan)
-        return _Members(grids or (unserved,), faults, members, largest)
+        with self._group() as group:
+            members = tuple(itertools.islice(group, _MAX_MEMBERS))
+            lengths = {}
+            problems: list[Problem] = []
+            largest = 0
+            for name in members:
+                try:
+                    dataset = self._dataset(group, name)
+                    lengths[name] = dataset.shape[0]
+                    largest = max(largest, chunk_bytes(dataset))
+                except RigDataError as error:  # raised again when that channel is asked for
+                    problems.extend(error.problems)
+            if not lengths:
+                fault = "the group holds no dataset of numbers"
+                empty = self.problem("error", "", fault, "Store one dataset per channel")
+                raise RigDataError(problems[:_LISTED] or empty)
+            stated = self._checked_rate(group.attrs)
+            run_rate = stated or self.stated_rate
+            names = [name for name in self.channels if name in lengths]
+            if run_rate is None:  # else nobody needs times that are not described
+                names += [name for name in lengths if name not in self.channels]
+            clocks = time_columns(names, self.channels)
+            timed = {}
+            for clock in [names[i] for i in clocks]:
+                time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
+                grid = timed_grid(lengths[clock], clock, time, clock, run_rate)
+                timed[clock] = grid if stated is None or self.channels[clock].clock else replace(grid, rate=stated)
+            timings = {name: Grid(length) for name, length in lengths.items() if name not in timed}
+            for name, i in zip(names, serving(names, clocks, self.channels), strict=True):
+                if i is not None and name in timings:
+                    same = [clock for clock in (names[i], *timed) if lengths[clock] == lengths[name]]
+                    timings[name] = timed[same[0]] if same else Grid(lengths[name], times=lengths[names[i]])
+            remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
+            grids, faults = self._planned(timings, run_rate, "dataset", remedy)
+            unserved = Grid(max(lengths.values()), "", run_rate or np.nan)
+            return _Members(grids or (unserved,), faults, members, largest)
 
     def _seconds(self, group: Any, clock: str, start: int, stop: int) -> FloatArray:
         """Some times of a time dataset [s]; one that is not described tells its unit itself."""
@@ -254,12 +251,12 @@ class Hdf5Reader(RunReader):
 
     def problems(self) -> tuple[Problem, ...]:
         """Tell which datasets nobody describes, and which state another unit than the manifest."""
-        members, units = self._layout().members, {}
+        units = {}
         with self._group() as group:
-            for name in filter(members.__contains__, self.channels):
+            for name in self.channels:
                 with suppress(RigDataError):  # raised when that channel is asked for
                     units[name] = self._unit(group, name)
-        return self._notes("datasets", members, units)
+        return self._notes("datasets", self._layout().members, units)
 
     def _unit(self, group: Any, name: str) -> str:
         attributes = self._dataset(group, name).attrs

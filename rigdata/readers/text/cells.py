@@ -150,7 +150,7 @@ def stamp_seconds(cells: Sequence[str | None]) -> tuple[FloatArray, int]:
     through them is nearer to the truth than the steps. Midnight between stamps without a date is a day.
     """
     matches = [_STAMP.fullmatch(cell) if cell else None for cell in cells]
-    bad = sum(match is None and bool(cell) for match, cell in zip(matches, cells, strict=True))
+    bad = sum(map(bool, cells)) - sum(map(bool, matches))
     days: dict[str, float] = {}
     seconds = np.array([np.nan if match is None else _seconds(match, days) for match in matches])
     good = np.isfinite(seconds)
@@ -179,8 +179,7 @@ def _seconds(match: re.Match[str], days: dict[str, float]) -> float:
                     days[text] = _DAY * datetime.date(year, *month_and_day).toordinal()
         # counted from the first day: seconds since 1970 would cost the digits below a microsecond
         start = days[text] - next(iter(days.values()))
-    fraction_seconds = float(f"0.{fraction}") if fraction else 0.0
-    return start + 3600.0 * hours + 60.0 * int(minute) + int(second) + fraction_seconds
+    return start + 3600.0 * hours + 60.0 * int(minute) + float(f"{second}.{fraction or 0}")
 
 
 def _spread(time: FloatArray) -> FloatArray:

@@ -46,7 +46,7 @@ def read_text(record: RecordFile) -> Contents:
     places = [i for i, name in enumerate(names) if i in clocks or (name in used and i not in head.dates)]
     columns, problems = read_table(head, places)
     length = len(columns[places[0]])
-    timing = clocks if {*serving(names, clocks, channels)} == {*clocks} else places
+    timing = places if None in serving(names, clocks, channels) else clocks
     # spreadsheets write lines at the end that hold no time, blank or of means and extremes
     while clocks and length > 1 and all(np.isnan(columns[i][length - 1]) for i in timing):
         length -= 1
@@ -152,7 +152,8 @@ def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, 
                         continue
                     if not numbers:
                         column, is_sound = _to_numbers(column, head.decimal)
-                        bad |= set() if is_sound else {i}
+                        if not is_sound:
+                            bad.add(i)
                     filled = pc.fill_null(column.cast(pa.float64()), np.nan)
                     # `to_numpy` would import pandas in every worker
                     values = np.frombuffer(filled.buffers()[1], np.float64, len(filled), 8 * filled.offset)
@@ -165,7 +166,8 @@ def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, 
         columns = {i: channel.values() for i, channel in numeric.items()}
     for i, cells in stamps.items():
         columns[i], count = stamp_seconds([None if cell is None or cell in MISSING else cell for cell in cells])
-        bad |= {i} if count else set()
+        if count:
+            bad.add(i)
     if bad:
         _judged(head, sorted(bad), odd_lines)
     return columns, odd_lines
@@ -196,9 +198,9 @@ def _judged(head: Head, places: Sequence[int], odd_lines: int) -> tuple[Problem,
             if not is_good and cell not in MISSING:
                 texts[i].append((last, cell[:40]))
     problems = []
-    for i, found in texts.items():
-        number, cell = found[0] if found else (head.data_line, "?")
-        more = f", and in {len(found) - 1} more lines" if len(found) > 1 else ""
+    for i, cells_of_text in texts.items():
+        number, cell = cells_of_text[0] if cells_of_text else (head.data_line, "?")
+        more = f", and in {len(cells_of_text) - 1} more lines" if len(cells_of_text) > 1 else ""
         fault = f"{cell!r} is not a {'time stamp' if i in head.stamps else 'number'}{more}"
         remedy = "Delete or repair these cells; an empty cell counts as missing"
         problems.append(record.problem("error", f"line {number}, column {i + 1} ({head.names[i]})", fault, remedy))
@@ -225,9 +227,10 @@ def _is_cut_inside_last_cell(head: Head) -> bool:
     if not tail or tail.endswith((b"\n", b"\r")):
         return False
     decimals = []
-    for line in [line for line in tail.decode(head.encoding, "replace").splitlines() if line.strip()][-6:]:
+    for line in tail.decode(head.encoding, "replace").splitlines():
         cells = split_line(line, head.delimiter)
-        _, mark, digits = cells[-1].partition(head.decimal)
-        decimals.append(len(digits) if mark else -1)
-    *usual, last = decimals or [0]
+        if cells:
+            _, mark, digits = cells[-1].partition(head.decimal)
+            decimals.append(len(digits) if mark else -1)
+    *usual, last = decimals[-6:] or [0]
     return len(usual) >= 2 and len(set(usual)) == 1 and last < usual[0]

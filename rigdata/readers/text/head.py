@@ -251,7 +251,7 @@ class _HeadFinder:
 def _columns_of(kind: Callable[[str], bool], sample: list[list[str]]) -> frozenset[int]:
     """Columns whose cells are all of a kind, missing ones apart."""
     columns = []
-    for index, column in enumerate(zip(*sample, strict=False)):
+    for index, column in enumerate(zip(*sample)):
         cells = [cell for cell in column if cell]
         if cells and all(map(kind, cells)):
             columns.append(index)

@@ -4,6 +4,7 @@ import io
 import itertools
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -132,12 +133,12 @@ class _LvmFile(io.TextIOBase):
 
 def _joined(parts: Sequence[Series]) -> Series:
     """Segments of one channel behind each other, by the times that they began, else without a gap."""
-    first = parts[0]
+    first = replace(parts[0], group="")
     if len(parts) == 1:
-        return Series(first.name, first.unit, first.values, first.time)
+        return first
     values = np.concatenate([part.values for part in parts])
     if any(part.time is None for part in parts):
-        return Series(first.name, first.unit, values, None)
+        return replace(first, values=values, time=None)
     began, bad = stamp_seconds([part.group or None for part in parts])
     times: list[FloatArray] = []
     for part, start in zip(parts, began, strict=True):
@@ -150,4 +151,4 @@ def _joined(parts: Sequence[Series]) -> Series:
             if time[0] < end - 1e-9:
                 time = time - time[0] + end
         times.append(time)
-    return Series(first.name, first.unit, values, np.concatenate(times))
+    return replace(first, values=values, time=np.concatenate(times))
