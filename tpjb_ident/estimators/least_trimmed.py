@@ -133,10 +133,8 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Init
 def evenly_chosen(direction: IntArray, most: int) -> IntArray:
     """Indices of at most about `most` windows, the same share of every direction, spread over its time."""
     n = len(direction)
-    if n <= most:
-        return np.arange(n)
     by_direction = np.argsort(direction, kind="stable")
-    return np.sort(by_direction[np.round(np.linspace(0, n - 1, most)).astype(int)])
+    return np.sort(by_direction[np.round(np.linspace(0, n - 1, min(n, most))).astype(int)])
 
 
 def _start_pairs(direction: IntArray, seed: int) -> IntArray:
@@ -249,8 +247,7 @@ def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1,
         text = f"{n} windows are too few for a robust fit; least squares was used"
         return _plain_fit(regression, np.ones(n), Condition("no-robust-start", text))
     subset = evenly_chosen(direction, MANY_WINDOWS)
-    first = regression if len(subset) == n else Regression(X[subset], Y[subset])
-    start = robust_start(first, direction[subset], seed)
+    start = robust_start(Regression(X[subset], Y[subset]), direction[subset], seed)
     if start.exact:
         size = np.linalg.norm(regression.residual(start.coefficients), axis=0)
         good = size <= 1e-9 * np.median(np.linalg.norm(Y, axis=1))
