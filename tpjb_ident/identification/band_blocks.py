@@ -65,7 +65,7 @@ def band_blocks(
 ) -> BandBlocks:
     """Responses of all runs."""
     rows: list[dict[str, object]] = []
-    calibrations: list[list[Hashable]] = [[] for _ in rig.channels]
+    calibrations: list[dict[Hashable, int]] = [{} for _ in rig.channels]
     operating: list[OperatingPoint] = []
     runs: list[str] = []
     films = [_film(point, clearance) for point in points]

@@ -168,7 +168,7 @@ def campaign_blocks(
     """Stack the runs of all points; `bent` (P,)."""
     noises, freedoms = _pooled_noise(means, [data.runs[0].length for data in points])
     names: list[str] = []
-    calibrations: list[list[Hashable]] = [[] for _ in means[0].channels[0]]
+    calibrations: list[dict[Hashable, int]] = [{} for _ in means[0].channels[0]]
     rows: list[dict[str, Any]] = []
     for p, (data, point, miss) in enumerate(zip(points, means, misses)):
         w = point.means
@@ -202,13 +202,11 @@ def campaign_blocks(
     return stacked([data.point for data in points], names, len(calibrations), rows, bent)
 
 
-def channel_columns(channels: Sequence[Channel | None], tables: list[list[Hashable]]) -> dict[str, Any]:
-    """What a block's channels (m,) are; `tables` holds the calibrations of each sensor, new ones join it."""
+def channel_columns(channels: Sequence[Channel | None], tables: list[dict[Hashable, int]]) -> dict[str, Any]:
+    """What a block's channels (m,) are; `tables` numbers the calibrations of each sensor, new ones join it."""
     numbers = []
-    for channel, calibrations in zip(channels, tables):
-        if channel is not None and channel.calibration not in calibrations:
-            calibrations.append(channel.calibration)
-        numbers.append(0 if channel is None else calibrations.index(channel.calibration))
+    for channel, table in zip(channels, tables):
+        numbers.append(0 if channel is None else table.setdefault(channel.calibration, len(table)))
     present = np.array([channel is not None for channel in channels])
     return {"present": present, "along": axes_of(channels), "calibration": numbers}
 
@@ -218,20 +216,19 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
 
     What points share is the noise's density: that of a window goes with one over its length [s].
     """
-    densities = [(p.means.spare, length * p.means.noise) for p, length in zip(means, lengths) if p.means is not None]
-    if sum(spare for spare, _ in densities) < _FREEDOM:
+    nothing = (0.0, np.zeros_like(means[0].residual[1]))
+    own = [nothing if p.means is None else (p.means.spare, n * p.means.noise) for p, n in zip(means, lengths)]
+    densities = own
+    if sum(spare for spare, _ in own) < _FREEDOM:
         # too few windows in all the campaign: what the lines leave of the records tells the noise
-        densities += [(spare, noise) for noise, spare in (p.residual for p in means)]
+        densities = own + [p.residual for p in means]
     total = sum(spare for spare, _ in densities)
-    density = np.asarray(sum(spare * noise for spare, noise in densities) / max(total, 1.0), complex)
-    noises: list[ComplexArray] = []
-    freedoms: list[float] = []
-    for p, length in zip(means, lengths):
-        spare, single = (0.0, density) if p.means is None else (p.means.spare, length * p.means.noise)
+    density = sum(spare * noise for spare, noise in densities) / max(total, 1.0)
+    noises, freedoms = [], []
+    for (spare, noise), length in zip(own, lengths):
         more = min(max(_FREEDOM - spare, 0.0), total - spare)
         freedom = max(spare + more, 1.0)
-        noise = np.asarray((spare * single + more * density) / freedom / length, complex)
-        noises.append(unbiased_noise(noise, freedom))
+        noises.append(unbiased_noise((spare * noise + more * density) / freedom / length, freedom))
         freedoms.append(freedom)
     return noises, np.array(freedoms)
 

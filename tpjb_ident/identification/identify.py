@@ -160,14 +160,14 @@ def assemble(
     rig = campaign_rig(campaign, bare=dry.stiffness, to_set_point=settings.correct, off=checked.off)
     rig = rig.doubting(checked.doubted)
     solved = solve_campaign(campaign, gathered, digests, workers, rig)
+    excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
     jobs = []
     for p, data in enumerate(gathered):
-        jobs.append((point_share(solved, data, p, dry, check_conditions(checked, data.names)),))
-    excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
+        conditions = *check_conditions(checked, data.names), *without_runs(data.point, excluded, several)
+        jobs.append((point_share(solved, data, p, dry, conditions),))
     points = []
     for point in workers.map(finished_point, jobs, settings):
-        without = without_runs(point.point, excluded, several)
-        points.append(replace(point, quality=merged(point.quality, without)))
+        points.append(point)
         report("estimating", len(points), len(gathered))
     places = [data.point for data in gathered]
     remarks = unstated(campaign) + excluded_runs(excluded, len(finished.outcomes), places, several)

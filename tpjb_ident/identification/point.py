@@ -51,7 +51,7 @@ class PointShare:
 
 
 def point_share(solved: CampaignSolution, data: PointData, p: int, dry: DryTest, checks: Conditions) -> PointShare:
-    """The part of a campaign's solution that belongs to point `p`, and what the `checks` of its runs say."""
+    """The part of a campaign's solution that belongs to point `p`; `checks`: what is known of its runs beforehand."""
     solution, blocks = solved.solution, solved.solution.blocks
     runs, m = len(data.runs), len(solution.rig)
     shift, factor = np.zeros((runs, m), complex), np.ones((runs, m), complex)
