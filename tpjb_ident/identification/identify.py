@@ -9,7 +9,7 @@ from rigdata.arrays import FloatArray, IntArray
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from rigdata.vector import zero_uncertainty
-from tpjb_ident.bands.responses import BandPoint, band_groups, read_point
+from tpjb_ident.bands.responses import BandPoint, read_points
 from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import Conditions, holding, merged
@@ -197,18 +197,13 @@ def identify_bands(
     checked = campaign_verdicts(campaign, observations)
     bad = checked.unusable
     unusable = [ExcludedRun(run.id, run.point, RigDataError(bad[run.id])) for run in runs if run.id in bad]
-    groups = band_groups([run for run in runs if run.id not in bad])
-
+    usable = [run for run in runs if run.id not in bad]
     excluded: list[ExcludedRun] = []
 
     def solve(rig: Rig) -> BandSolution:
         fast = {sensor.name: rig.rates[sensor.clock] for sensor in rig.channels if sensor.clock in rig.rates}
-        points = []
-        excluded[:] = unusable
-        for group in groups:
-            point, without = read_point(group, settings.phasors, fast)
-            points += [] if point is None else [point]
-            excluded.extend(without)
+        points, unread = read_points(usable, settings.phasors, fast)
+        excluded[:] = unusable + unread
         if not points:
             raise excluded[0].error
         loads = static_loads(campaign, points)
