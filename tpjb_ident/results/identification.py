@@ -119,7 +119,7 @@ class Identification(Presented):
         rows = []
         for p in self.points:
             key = p.point.key
-            rows += [[w.run, w.time, float(np.degrees(w.direction)), w.weight, w.reason, *key] for w in p.rejected]
+            rows += [[w.run, w.time, np.degrees(w.direction), w.weight, w.reason, *key] for w in p.rejected]
         return pd.DataFrame(rows, columns=list(_WINDOW_COLUMNS))
 
     def budget_frame(self) -> pd.DataFrame:
@@ -177,7 +177,7 @@ def _estimate_row(p: PointResult, est: DynamicStiffness, model: dict[str, str]) 
         "n_records": p.n_records,
         "n_windows": p.n_windows,
         "condition_number": est.condition,
-        "outlier_fraction": float(rejected) / max(len(weights), 1),
+        "outlier_fraction": rejected / max(len(weights), 1),
         "quality": quality_cell(conditions),
         "quality_detail": "; ".join(sentences(conditions)),
         "n_windows_rejected": rejected,

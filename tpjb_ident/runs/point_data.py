@@ -112,7 +112,7 @@ class FinishedRuns:
 
     def without(self, problems: Mapping[str, Problem]) -> FinishedRuns:
         """The runs, those with an error of their own left out; raises the first error where none remains."""
-        outcomes: list[RunDigest | ExcludedRun] = []
+        outcomes = []
         for outcome in self.outcomes:
             if isinstance(outcome, RunDigest) and outcome.run in problems:
                 outcome = ExcludedRun(outcome.run, outcome.point, RigDataError(problems[outcome.run]))
@@ -181,8 +181,8 @@ class PointData(RunsOfPoint):
         """Housing mass whose inertia is in F [kg]: zero where no accelerometer measures it."""
         return self.runs[0].housing_mass - self.inertia
 
-    def counted(self, weights: FloatArray) -> list[tuple[RunPhasors, IntArray]]:
-        """Runs with the places of their whole windows of some weight (n,), those that have any."""
+    def counted(self, weights: FloatArray | float = 1.0) -> list[tuple[RunPhasors, IntArray]]:
+        """Runs with the places of their whole windows, those that have any; of some weight where one is given, (n,)."""
         good = self.whole & (weights > 0)
         places = [np.flatnonzero(good & (self.run_index == i)) for i in range(len(self.runs))]
         return [(run, rows) for run, rows in zip(self.runs, places) if len(rows)]
