@@ -87,7 +87,7 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
     readers = device_readers(run, command=True)
     described = [channel for reader in readers for channel in reader.channels]
     single = len(run.of("command")) == 1
-    recorded: list[tuple[Channel, FloatArray]] = []
+    recorded = []
     begins, lost, command = [], 0.0, np.zeros((2, n))
     inside, grid = np.ones(n, dtype=bool), np.arange(float(n))
     for reader in readers:
@@ -200,7 +200,7 @@ def _at(values: FloatArray, places: FloatArray) -> FloatArray:
     return interpolated((values - mean)[None], places)[0] + mean
 
 
-def interpolated(rows: FloatArray, at: FloatArray) -> FloatArray:
+def interpolated(rows: FloatArray, at: np.ndarray) -> FloatArray:
     """Rows (k, n) at the places `at` [samples]; `at` (m,)."""
     base = np.floor(at).astype(int)
     share = at - base
@@ -284,7 +284,7 @@ def _without_periodic(rows: FloatArray, period: int | None) -> FloatArray:
     return (folded - folded.mean(axis=1, keepdims=True)).reshape(len(rows), -1)
 
 
-def bins_taken(frequencies: FloatArray, lines: tuple[Line, ...], seconds: float, width: float = LEFT_OUT) -> BoolArray:
+def bins_taken(frequencies: np.ndarray, lines: tuple[Line, ...], seconds: float, width: float = LEFT_OUT) -> BoolArray:
     """Bins that a line may have spoiled, (n,)."""
     disturbed = np.zeros(len(frequencies), dtype=bool)
     for line in lines:

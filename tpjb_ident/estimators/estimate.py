@@ -64,7 +64,7 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
     if means is None or means.spare < _MIN_SPARE_REPEATS:
         return None
     noise = unbiased_noise(means.noise, means.spare)
-    rows: list[dict[str, object]] = []  # a block a direction that has windows
+    rows = []  # a block a direction that has windows
     for g in np.flatnonzero(means.count > 0):
         row = {"run": g, "omega": 1.0, "z": means.mean[g], "noise": noise / means.count[g], "dof": means.spare}
         rows.append(row | {"present": np.ones(4, dtype=bool), "along": _AXES})

@@ -66,7 +66,7 @@ class Regression:
 
         Windows alone in their direction cannot be held against a fit that has none of them.
         """
-        leverage = _squares(self._x.conj(), np.asarray(np.linalg.inv(self._sums(weights)[0]), dtype=complex))
+        leverage = _squares(self._x.conj(), np.linalg.inv(self._sums(weights)[0]))
         return 1 / (1 + np.maximum(leverage, 0.0))
 
     def scatter(self, rows: ComplexArray, weights: FloatArray, shrinkage: float = 1.0) -> ComplexArray:
@@ -84,7 +84,7 @@ class Regression:
         return self._y - B @ self._x
 
 
-def _squares(rows: ComplexArray, matrix: ComplexArray) -> FloatArray:
+def _squares(rows: ComplexArray, matrix: np.ndarray) -> FloatArray:
     """r^H A r of every window, (..., n); `rows` (..., q, n), `matrix` (..., q, q)."""
     moved = matrix @ rows
     return (rows.real * moved.real + rows.imag * moved.imag).sum(axis=-2)
@@ -93,7 +93,7 @@ def _squares(rows: ComplexArray, matrix: ComplexArray) -> FloatArray:
 def distance2(rows: ComplexArray, inner: ComplexArray) -> FloatArray:
     """2 r^H S^-1 r of every window, (..., n), from residuals (..., q, n) and their scatter S (..., q, q)."""
     # a scatter that is all but singular makes rounding large, of either sign
-    return np.maximum(2 * _squares(rows, np.asarray(np.linalg.inv(inner), dtype=complex)), 0.0)
+    return np.maximum(2 * _squares(rows, np.linalg.inv(inner)), 0.0)
 
 
 @dataclass(frozen=True)

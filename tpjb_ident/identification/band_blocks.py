@@ -71,7 +71,7 @@ def band_blocks(
     clearance: float | None,
 ) -> BandBlocks:
     """Responses of all runs."""
-    rows: list[dict[str, object]] = []
+    rows = []
     calibrations: list[dict[Hashable, int]] = [{} for _ in rig.channels]
     operating: list[OperatingPoint] = []
     runs: list[str] = []
@@ -280,7 +280,7 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
 
 def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[IntArray, ...]:
     """Parts of all bands; few tones are no band: each that is told is a point."""
-    parts: list[IntArray] = []
+    parts = []
     for b in range(len(data.turning)):
         lines = np.flatnonzero(used & (data.band == b))
         if len(lines) < 2 * MODELS["K-C-M"]:

@@ -105,9 +105,11 @@ def with_found_devices(rig: Rig, blocks: Blocks, start: float) -> Rig:
     ):
         devices["acceleration"] = "accelerometers" if acceleration.clear else ""
         rates |= {"accelerometers": acceleration.rate} if acceleration.clear else {}
-    separate = [replace(s, clock=devices.get(s.quantity, "")) for s in rig.channels]
-    sensors = tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.clock else s for s in separate)
-    return replace(rig, channels=sensors, rates=rates)
+    sensors = []
+    for s in rig.channels:
+        clock = devices.get(s.quantity, "")
+        sensors.append(replace(s, clock=clock, delay_uncertainty=s.delay_uncertainty or start) if clock else s)
+    return replace(rig, channels=tuple(sensors), rates=rates)
 
 
 class _Rate(NamedTuple):
@@ -136,7 +138,7 @@ def _rate(rig: Rig, blocks: Blocks, quantity: str) -> _Rate | None:
 
 def _turning(blocks: Blocks, rows: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Rate at which the phase of some sensors turns (n,) [rad/s], and its standard error (n,)."""
-    z: ComplexArray = blocks.z[:, rows]
+    z = blocks.z[:, rows]
     power = np.maximum(np.sum(np.abs(z) ** 2, axis=1), 1e-300)
     turning = np.sum(z.conj() * blocks.slope[:, rows], axis=1).imag / power
     noise = blocks.slope_noise[:, rows][:, :, rows]
@@ -169,7 +171,7 @@ def campaign_blocks(
     noises, freedoms = _pooled_noise(means, [data.runs[0].length for data in points])
     names: list[str] = []
     calibrations: list[dict[Hashable, int]] = [{} for _ in means[0].channels[0]]
-    rows: list[dict[str, Any]] = []
+    rows = []
     for p, (data, point, miss) in enumerate(zip(points, means, misses)):
         w = point.means
         for g, (run, line) in enumerate(zip(data.runs, data.lines)):
@@ -350,7 +352,7 @@ def covariances_of(
 
 def total(covariances: Mapping[str, FloatArray]) -> FloatArray:
     """Sum of covariances (8, 8) by source."""
-    return np.sum([np.zeros((8, 8)), *covariances.values()], axis=0)
+    return sum(covariances.values(), np.zeros((8, 8)))
 
 
 def shared_changes(

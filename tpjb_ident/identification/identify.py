@@ -299,7 +299,7 @@ def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float |
         by_method={est.method: est},
         n_windows=sum(line.n_rows for line in inside),
         outlier_fraction=0.0,
-        coherence=float(np.median([line.coherence.min() for line in inside])) if inside else float("nan"),
+        coherence=float(np.median([line.coherence.min() for line in inside])) if inside else np.nan,
         amplitude=amplitude,
         quality=merged(quality, physics(est, point.inertia), bent),
         rejected=(),

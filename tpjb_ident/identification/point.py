@@ -169,7 +169,7 @@ def all_methods(
     """Every method that was asked for and applies; the solve's is there where it has an answer, and its scatter."""
     drive = _nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
-    estimates: dict[str, DynamicStiffness] = {}
+    estimates = {}
     for name in dict.fromkeys((*settings.methods, settings.method)):
         method, norm = method_of(name)
         if name == SOLVED and solved is not None:

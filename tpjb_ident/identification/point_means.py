@@ -67,7 +67,7 @@ def _residual_density(
 ) -> tuple[float, ComplexArray]:
     """Noise of a phasor times the length of its fit (m, m), by what lines leave of the records, after its freedom."""
     m = len(rig.channels)
-    rows: list[ComplexArray] = [np.zeros((0, m), complex)]
+    rows = [np.zeros((0, m), complex)]
     for run, line in zip(data.runs, data.lines):
         if line < len(run.residual):
             bins = by_channel(run.residual[line], run.channels, rig.channels)

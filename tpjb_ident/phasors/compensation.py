@@ -88,7 +88,7 @@ class SlowerChannel:
 
 def filled_channels(run: Run) -> dict[str, SlowerChannel]:
     """Channels that were sampled slower than they were written, by name."""
-    slower: dict[str, SlowerChannel] = {}
+    slower = {}
     for reader in device_readers(run):
         power = np.clip(np.log2(_LOOK * reader.rate) + 1, _LEAST_POWER, _MOST_POWER)
         _, rows = reader.read(0, min(reader.length, 2 ** int(power) - 2))

@@ -106,7 +106,7 @@ def known_lines(
     strong = strong_lines(driven, speed, mains)
     for f in extra:
         strong.append(next((line for line in faint if abs(line.frequency - f) < spacing), Line("found", f, _EXACT)))
-    conditions: list[Condition] = []
+    conditions = []
     nuisance: list[Line] = []
     resolved: list[Line] = []
     level = Line("level", 0.0)

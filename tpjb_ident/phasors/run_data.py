@@ -232,7 +232,7 @@ def mains_lines(run: RunPhasors) -> tuple[ComplexArray | None, ComplexArray | No
     harmonics = (n * e.frequency for e in run.lines.excitation for n in (2, 3))
     if any(abs(f - mains.frequency) <= mains.wander for f in harmonics):
         return None, None
-    typical: list[ComplexArray | None] = []
+    typical = []
     for z in (run.displacement[:, place], run.force[:, place]):
         complete = z[np.isfinite(z).all(axis=1)]
         typical.append(complex_median(complete) if len(complete) else None)

@@ -111,7 +111,7 @@ def _longest(windows: ComplexArray, edges: IntArray, idle: BoolArray) -> BoolArr
     inside = ~idle & (stretch == np.bincount(stretch[~idle]).argmax())
     places = np.flatnonzero(inside)
     middle = complex_median(windows[places])
-    distance: FloatArray = np.linalg.norm(windows - middle, axis=1)
+    distance = np.linalg.norm(windows - middle, axis=1)
     for end, inner in ((places[0], places[1:4]), (places[-1], places[-4:-1])):
         if distance[end] > max(_ACROSS * np.linalg.norm(middle), 3 * np.max(distance[inner], initial=0.0)):
             inside[end] = False
