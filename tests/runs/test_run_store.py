@@ -111,7 +111,7 @@ def test_a_run_that_another_command_has_cleared_is_done_again(path, whole, tmp_p
     campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
     all_runs(campaign, settings, silent, store=store)
     counted.clear()
-    monkeypatch.setattr(RunStore, "load", lambda store, run, mark: None)
+    monkeypatch.setattr(RunStore, "load", lambda store, run: ("", None))
     assert same(all_runs(campaign, settings, silent, store=store), whole)
     assert len(counted) == len(whole)
 

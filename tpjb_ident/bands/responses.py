@@ -10,7 +10,6 @@ taken to be the force's, as H1 does.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -225,44 +224,36 @@ class BandPoint(RunsOfPoint):
         """Whether the records may begin and end in motion."""
         return self.kind in OPEN_ENDS
 
-    @cached_property
-    def classic(self) -> list[ClassicLine]:
-        """Every line by the methods of analysers."""
-        return [classic_line(self.runs, bins, self.open) for bins in self.bins]
 
-
-def read_point(
+def read_points(
     runs: Sequence[Run], settings: PhasorSettings, fast: Mapping[str, float]
-) -> tuple[BandPoint | None, list[ExcludedRun]]:
-    """Transform the runs of a point, and name those that cannot be used; None where there is no other.
+) -> tuple[list[BandPoint], list[ExcludedRun]]:
+    """Transform runs, those of one operating point and kind of excitation together, and name those of no use.
 
     `fast`: rates of the channels' clocks by name, relative.
     """
-    spectra: list[RunSpectra] = []
-    unusable = []
-    first, band = runs[0], _common_band(runs)
-    seconds = min(run.length / run.sample_rate for run in runs)
+    groups: dict[tuple[object, ...], list[Run]] = {}
     for run in runs:
-        try:
-            spectra.append(run_spectra(run, band, seconds, settings, fast))
-        except RigDataError as error:
-            unusable.append(ExcludedRun(run.id, run.point, error))
-    if not spectra:
-        return None, unusable
-    _refuse_unlike(spectra)
-    point = replace(first.point, excitation=0.0)
-    return BandPoint(point, tuple(spectra), first.excitation_kind, bins_of_lines(spectra)), unusable
-
-
-def _common_band(runs: Sequence[Run]) -> tuple[float, float]:
-    """What the bands of some runs have in common [Hz]."""
-    bands = np.array([run.band for run in runs if run.band is not None])
-    low, high = float(bands[:, 0].max()), float(bands[:, 1].min())
-    first = runs[0]
-    if not low < high:
-        text = f"runs at {first.point} have no common excitation_band"
-        raise RigDataError(Problem("error", first.file, "excitation_band", text, "Check the bands", first.id))
-    return low, high
+        groups.setdefault((*run.point.static_key, run.excitation_kind), []).append(run)
+    points, unusable = [], []
+    for key in sorted(groups, key=repr):
+        first, spectra = groups[key][0], []
+        bands = np.array([run.band for run in groups[key] if run.band is not None])
+        band = low, high = float(bands[:, 0].max()), float(bands[:, 1].min())
+        if not low < high:
+            text = f"runs at {first.point} have no common excitation_band"
+            raise RigDataError(Problem("error", first.file, "excitation_band", text, "Check the bands", first.id))
+        seconds = min(run.length / run.sample_rate for run in groups[key])
+        for run in groups[key]:
+            try:
+                spectra.append(run_spectra(run, band, seconds, settings, fast))
+            except RigDataError as error:
+                unusable.append(ExcludedRun(run.id, run.point, error))
+        if spectra:
+            _refuse_unlike(spectra)
+            point, bins = replace(first.point, excitation=0.0), bins_of_lines(spectra)
+            points.append(BandPoint(point, tuple(spectra), first.excitation_kind, bins))
+    return points, unusable
 
 
 def _refuse_unlike(spectra: Sequence[RunSpectra]) -> None:
@@ -276,14 +267,6 @@ def _refuse_unlike(spectra: Sequence[RunSpectra]) -> None:
                 f"runs at {first.point} repeat with different periods ({', '.join(sentences)}); "
                 "excite the runs of one point with one period, or list them as different kinds of excitation"
             )
-
-
-def band_groups(runs: Sequence[Run]) -> list[list[Run]]:
-    """Group broadband runs by operating point and kind of excitation, sorted."""
-    groups: dict[tuple[object, ...], list[Run]] = {}
-    for run in runs:
-        groups.setdefault((*run.point.static_key, run.excitation_kind), []).append(run)
-    return [groups[key] for key in sorted(groups, key=repr)]
 
 
 def bins_of_lines(spectra: Sequence[RunSpectra]) -> tuple[IntArray, ...]:

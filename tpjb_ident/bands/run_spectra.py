@@ -76,7 +76,7 @@ def find_period(clean: Samples, band: tuple[float, float], lines: tuple[Line, ..
     `lines` of shaft and mains are taken off; `most` is the share of the power that may not repeat.
     """
     n, step = clean.length, clean.rate / clean.length
-    frequency = np.asarray(0.5 * step * np.arange(n + 1), dtype=float)
+    frequency = 0.5 * step * np.arange(n + 1)
     inside = (
         (frequency > band[0] - 2 * step) & (frequency < band[1] + 2 * step) & ~bins_taken(frequency, lines, 1 / step)
     )
@@ -156,7 +156,7 @@ def _chance_of_noise(clean: Samples, period: float, band: tuple[float, float], l
         return 1.0
     power = np.sum(np.abs(np.fft.rfft(periodic.signals(), axis=1)) ** 2, axis=0)
     bins = np.arange(len(power))
-    frequency = np.asarray(step * bins, dtype=float)
+    frequency = step * bins
     inside = (frequency > band[0] - 0.5 * step) & (frequency < band[1] + 0.5 * step)
     away = np.abs((bins + count // 2) % count - count // 2)
     at_lines = inside & (away == 0) & ~bins_taken(frequency, lines, 1 / (count * step), LEFT_OUT_OF_PERIOD)
@@ -176,7 +176,7 @@ def resampled(samples: Samples, period: float, top: float) -> Samples:
     if slip <= _MAX_SLIP:
         count = samples.length // q
         return samples.mapped(lambda rows: rows[:, : count * q])
-    at = np.asarray(np.arange(count * q) * (period / q), dtype=float)
+    at = np.arange(count * q) * (period / q)
     return samples.mapped(lambda rows: interpolated(rows, at), samples.rate * q / period)
 
 
@@ -271,7 +271,7 @@ def run_spectra(
 
     def transformed(record: Samples, places: IntArray) -> RunSpectra:
         z = _bins(record.rows, length, places)
-        frequencies = np.asarray(np.fft.rfftfreq(length, 1 / clean.rate)[places], dtype=float)
+        frequencies = np.fft.rfftfreq(length, 1 / clean.rate)[places]
         none = np.zeros((len(z), len(mean)))
         spectra = RunSpectra(
             run.id,

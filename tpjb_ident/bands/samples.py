@@ -24,7 +24,7 @@ from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.line_fit import BAD_LIMIT, even_design, robust_deviation
 from tpjb_ident.phasors.lines import HIGHEST, MAINS_DRIFT, SPEED_DRIFT, Line, strong_lines
-from tpjb_ident.phasors.run_data import device_readers
+from tpjb_ident.phasors.run_data import DeviceReader, device_readers
 from tpjb_ident.phasors.whole_record import vertex
 
 #: Share of a channel's samples that may be missing in stretches, bridged by straight lines,
@@ -69,8 +69,7 @@ class Samples(Directed):
         if self.command is not None:
             groups = [self.command]
         centred = [rows - rows.mean(axis=1, keepdims=True) for rows in groups]
-        sizes = [float(np.sqrt(np.mean(rows**2))) if rows.size else 0.0 for rows in centred]
-        return np.concatenate([rows / size for rows, size in zip(centred, sizes) if size > 0])
+        return np.concatenate([rows / rows.std() for rows in centred if rows.any()])
 
     def mapped(self, change: Callable[[FloatArray], FloatArray], rate: float | None = None) -> Samples:
         """The record with all rows (k, n) changed alike, command too; at another rate where one is given."""
@@ -88,7 +87,7 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
     readers = device_readers(run, command=True)
     described = [channel for reader in readers for channel in reader.channels]
     single = len(run.of("command")) == 1
-    recorded: list[tuple[Channel, FloatArray]] = []
+    recorded = []
     begins, lost, command = [], 0.0, np.zeros((2, n))
     inside, grid = np.ones(n, dtype=bool), np.arange(float(n))
     for reader in readers:
@@ -100,7 +99,7 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
         begins.append(_begin(run, time, reader.rate))
         at = grid  # the places [samples] of the first device's times
         if not is_alike:
-            _refuse_unlike(run, reader.channels[0].name, reader.rate, highest)
+            _refuse_unlike(run, reader, highest)
             at = (grid / run.sample_rate + begins[0] - begins[-1]) * reader.rate
             inside &= (at >= _TAPS) & (at <= reader.length - 1 - _TAPS)  # as far as the kernel reaches
         for channel, values in zip(reader.channels, rows):
@@ -135,15 +134,16 @@ def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
     return float(np.median(off)) / rate
 
 
-def _refuse_unlike(run: Run, name: str, rate: float, highest: float) -> None:
+def _refuse_unlike(run: Run, reader: DeviceReader, highest: float) -> None:
     """Refuse a device of its own rate that is too slow for the kernel; blows hold what folds back into the band."""
     need, cure = "", "Sample faster, or excite lower frequencies"
     if run.excitation_kind == "impact":
         need, cure = f"the first one at {run.sample_rate:.6g} Hz; blows need one rate", "Record all at one rate"
-    elif highest >= _REACH * rate:
+    elif highest >= _REACH * reader.rate:
         need = f"a band up to {highest:g} Hz needs {highest / _REACH:.4g} Hz"
     if need:
-        raise refuse(run.file, f"device of channel {name}", f"is sampled at {rate:.6g} Hz, {need}", cure, run.id)
+        place, fault = f"device of channel {reader.channels[0].name}", f"is sampled at {reader.rate:.6g} Hz, {need}"
+        raise refuse(run.file, place, fault, cure, run.id)
 
 
 def _rounding(time: FloatArray) -> float:
@@ -200,7 +200,7 @@ def _at(values: FloatArray, places: FloatArray) -> FloatArray:
     return interpolated((values - mean)[None], places)[0] + mean
 
 
-def interpolated(rows: FloatArray, at: FloatArray) -> FloatArray:
+def interpolated(rows: FloatArray, at: np.ndarray) -> FloatArray:
     """Rows (k, n) at the places `at` [samples]; `at` (m,)."""
     base = np.floor(at).astype(int)
     share = at - base
@@ -284,7 +284,7 @@ def _without_periodic(rows: FloatArray, period: int | None) -> FloatArray:
     return (folded - folded.mean(axis=1, keepdims=True)).reshape(len(rows), -1)
 
 
-def bins_taken(frequencies: FloatArray, lines: tuple[Line, ...], seconds: float, width: float = LEFT_OUT) -> BoolArray:
+def bins_taken(frequencies: np.ndarray, lines: tuple[Line, ...], seconds: float, width: float = LEFT_OUT) -> BoolArray:
     """Bins that a line may have spoiled, (n,)."""
     disturbed = np.zeros(len(frequencies), dtype=bool)
     for line in lines:

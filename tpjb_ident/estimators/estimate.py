@@ -64,7 +64,7 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
     if means is None or means.spare < _MIN_SPARE_REPEATS:
         return None
     noise = unbiased_noise(means.noise, means.spare)
-    rows: list[dict[str, object]] = []  # a block a direction that has windows
+    rows = []  # a block a direction that has windows
     for g in np.flatnonzero(means.count > 0):
         row = {"run": g, "omega": 1.0, "z": means.mean[g], "noise": noise / means.count[g], "dof": means.spare}
         rows.append(row | {"present": np.ones(4, dtype=bool), "along": _AXES})
@@ -139,15 +139,17 @@ class RlmSettings:
     quick: bool = False  #: whether its covariance is not asked for
 
 
-def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | None = None) -> RlmSolution:
+_HUBER = RlmSettings()
+
+
+def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings = _HUBER) -> RlmSolution:
     """Run statsmodels' RLM on a real system, guarded; `design` (m, p), `response` (m,)."""
-    settings = settings or RlmSettings()
     if np.iscomplexobj(design) or np.iscomplexobj(response):
         raise ComplexInputError(
             "RLM solves real systems; complex data would come back with false standard errors. "
             "Stack real and imaginary parts first (tpjb_ident.estimators.r_matrix.real_rows)"
         )
-    if settings.quick and settings.norm in _QUICK and settings.scale == "mad":
+    if settings.quick and settings.norm in _QUICK:
         weight, threshold = _QUICK[settings.norm]
         tolerance, most = settings.tolerance, settings.max_iterations
         fit = RlmSolution(*reweighted(design, response, lambda u: weight(u, threshold), None, tolerance, most))
@@ -180,7 +182,7 @@ def _statsmodels(design: FloatArray, response: FloatArray, settings: RlmSettings
     return RlmSolution(params, weights, float(fit.scale), int(fit.fit_history["iteration"]), covariance)
 
 
-def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> TableFit:
+def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings = _HUBER) -> TableFit:
     """Solve Eq. (15) axis by axis with statsmodels; `D`, `F` (n, 2)."""
     n = len(D)
     h = np.zeros((2, 2), dtype=complex)
@@ -191,7 +193,7 @@ def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = Non
         design, response = real_rows(D, F[:, axis])
         solution = solve_rlm(design, response, settings)
         h[axis] = solution.params[:2] + 1j * solution.params[2:]
-        rows = np.array([2 * axis, 2 * axis + 1, 4 + 2 * axis, 5 + 2 * axis])
+        rows = 2 * axis + np.array([0, 1, 4, 5])
         covariance[np.ix_(rows, rows)] = solution.covariance
         weights[:, axis] = np.minimum(solution.weights[:n], solution.weights[n:])
         conditions += solution.conditions
@@ -200,7 +202,6 @@ def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = Non
 
 #: Condition number of the displacement directions beyond which entries cannot be told apart.
 _MAX_CONDITION = 30.0
-_HUBER = RlmSettings()
 #: Share of windows without weight beyond which the answer needs a look.
 _MAX_REJECTED = 0.4
 #: A window counts as rejected below this weight.
@@ -308,7 +309,7 @@ def estimate_table(
 
 def _obstacles(table: PhasorTable, method: str) -> Conditions:
     """Why a table gives no H, the first reason first."""
-    few = len(table) < 2 or table.n_directions < 2
+    few = table.n_directions < 2
     count = f"{len(table)} usable windows in {table.n_directions} directions; H needs two directions at least"
     is_line = not np.isfinite(displacement_condition(table.D))
     line = "all displacements are collinear: H needs two directions in them"
@@ -379,7 +380,7 @@ def _with_scatter(table: PhasorTable, fit: TableFit, variance: float) -> TableFi
 
 def _in_units(table: PhasorTable, omega: float, name: str, fit: TableFit) -> DynamicStiffness:
     """Back to SI, weights back on all given windows, status from what the numbers say."""
-    per_axis = np.repeat(fit.weights[:, None], 2, axis=1) if fit.weights.ndim == 1 else fit.weights
+    per_axis = fit.weights.reshape(len(table), -1)
     joint = per_axis.min(axis=1)
     condition = displacement_condition(table.D, joint)
     all_weights = np.zeros((len(table.valid), 2))
@@ -422,5 +423,3 @@ SOLVERS: dict[str, Callable[[PhasorTable, RlmSettings], tuple[TableFit, PhasorTa
     "iv": lambda table, _: instrumental_fit(table),
 }
 METHODS = tuple(SOLVERS)
-
-__all__ = ["METHODS", "NORMS", "estimate_dynamic_stiffness", "estimate_table"]

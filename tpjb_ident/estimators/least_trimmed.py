@@ -66,7 +66,7 @@ class Regression:
 
         Windows alone in their direction cannot be held against a fit that has none of them.
         """
-        leverage = _squares(self._x.conj(), np.asarray(np.linalg.inv(self._sums(weights)[0]), dtype=complex))
+        leverage = _squares(self._x.conj(), np.linalg.inv(self._sums(weights)[0]))
         return 1 / (1 + np.maximum(leverage, 0.0))
 
     def scatter(self, rows: ComplexArray, weights: FloatArray, shrinkage: float = 1.0) -> ComplexArray:
@@ -84,7 +84,7 @@ class Regression:
         return self._y - B @ self._x
 
 
-def _squares(rows: ComplexArray, matrix: ComplexArray) -> FloatArray:
+def _squares(rows: ComplexArray, matrix: np.ndarray) -> FloatArray:
     """r^H A r of every window, (..., n); `rows` (..., q, n), `matrix` (..., q, q)."""
     moved = matrix @ rows
     return (rows.real * moved.real + rows.imag * moved.imag).sum(axis=-2)
@@ -93,7 +93,7 @@ def _squares(rows: ComplexArray, matrix: ComplexArray) -> FloatArray:
 def distance2(rows: ComplexArray, inner: ComplexArray) -> FloatArray:
     """2 r^H S^-1 r of every window, (..., n), from residuals (..., q, n) and their scatter S (..., q, q)."""
     # a scatter that is all but singular makes rounding large, of either sign
-    return np.maximum(2 * _squares(rows, np.asarray(np.linalg.inv(inner), dtype=complex)), 0.0)
+    return np.maximum(2 * _squares(rows, np.linalg.inv(inner)), 0.0)
 
 
 @dataclass(frozen=True)
@@ -133,10 +133,8 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Init
 def evenly_chosen(direction: IntArray, most: int) -> IntArray:
     """Indices of at most about `most` windows, the same share of every direction, spread over its time."""
     n = len(direction)
-    if n <= most:
-        return np.arange(n)
     by_direction = np.argsort(direction, kind="stable")
-    return np.sort(by_direction[np.round(np.linspace(0, n - 1, most)).astype(int)])
+    return np.sort(by_direction[np.round(np.linspace(0, n - 1, min(n, most))).astype(int)])
 
 
 def _start_pairs(direction: IntArray, seed: int) -> IntArray:
@@ -249,8 +247,7 @@ def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1,
         text = f"{n} windows are too few for a robust fit; least squares was used"
         return _plain_fit(regression, np.ones(n), Condition("no-robust-start", text))
     subset = evenly_chosen(direction, MANY_WINDOWS)
-    first = regression if len(subset) == n else Regression(X[subset], Y[subset])
-    start = robust_start(first, direction[subset], seed)
+    start = robust_start(Regression(X[subset], Y[subset]), direction[subset], seed)
     if start.exact:
         size = np.linalg.norm(regression.residual(start.coefficients), axis=0)
         good = size <= 1e-9 * np.median(np.linalg.norm(Y, axis=1))

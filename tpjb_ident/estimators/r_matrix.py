@@ -60,7 +60,7 @@ class PhasorTable:
     @property
     def n_directions(self) -> int:
         """Number of distinct direction labels."""
-        return int(self.direction.max()) + 1 if len(self) else 0
+        return len(np.unique(self.direction))
 
     @property
     def h_scale(self) -> float:

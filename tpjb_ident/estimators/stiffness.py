@@ -8,6 +8,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Conditions
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.estimate.arrowhead import real_numbers
 from tpjb_ident.estimate.statistics import half_width
 from tpjb_ident.rounding import with_interval
 from tpjb_ident.schema import DAMPING, STIFFNESS
@@ -95,7 +96,7 @@ class DynamicStiffness:
     @property
     def vector(self) -> FloatArray:
         """The eight real entries in the order of the covariance [N/m]."""
-        return np.concatenate([self.h.real.ravel(), self.h.imag.ravel()])
+        return real_numbers(self.h)
 
     @property
     def standard_error(self) -> FloatArray:

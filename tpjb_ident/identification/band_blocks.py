@@ -8,14 +8,20 @@ bend h within the part.
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.bands.film_products import film_products
-from tpjb_ident.bands.responses import BandPoint, ClassicLine, line_response, one_phase_set, pooled_noise
+from tpjb_ident.bands.responses import (
+    BandPoint,
+    ClassicLine,
+    classic_line,
+    line_response,
+    one_phase_set,
+    pooled_noise,
+)
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.arrowhead import MODELS, Shape, complex_matrix, least_squares, power_columns, real_numbers
 from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, adjoint, alive, film_force, stacked, vector
@@ -49,6 +55,7 @@ class BandBlocks:
     omega: FloatArray  #: (L,), rad/s: of every line
     driven: BoolArray  #: (L,): whether an excitation stands above the noise in one direction
     clear: BoolArray  #: (L,): and in both
+    classic: list[ClassicLine]  #: L of them: every line by the methods of analysers
     turning: FloatArray  #: (B,): relative scatter of the film's force from run to run with the shaft's angle
 
     @property
@@ -64,8 +71,8 @@ def band_blocks(
     clearance: float | None,
 ) -> BandBlocks:
     """Responses of all runs."""
-    rows: list[dict[str, object]] = []
-    calibrations: list[list[Hashable]] = [[] for _ in rig.channels]
+    rows = []
+    calibrations: list[dict[Hashable, int]] = [{} for _ in rig.channels]
     operating: list[OperatingPoint] = []
     runs: list[str] = []
     films = [_film(point, clearance) for point in points]
@@ -92,7 +99,10 @@ def band_blocks(
     blocks = stacked(operating, runs, len(rig), rows, np.array(bent)[band], band)
     weak, strong = _strengths(rig, blocks).T
     driven = strong > STRONG
-    coherent = np.array([classic.coherence.min() for point in points for classic in point.classic])
+    classic = []
+    for point in points:
+        classic += [classic_line(point.runs, bins, point.open) for bins in point.bins]
+    coherent = np.array([line.coherence.min() for line in classic])
     quiet = np.array([point.method == "hv" for point in points])[band]
     return BandBlocks(
         tuple(points),
@@ -101,6 +111,7 @@ def band_blocks(
         2 * np.pi * np.concatenate([point.frequencies for point in points]),
         driven,
         np.where(quiet, np.nan_to_num(coherent) > _LEAST_COHERENCE, weak > STRONG),
+        classic,
         np.array(turning),
     )
 
@@ -114,10 +125,8 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
     repeats = np.sqrt(max(len(point.runs), 2) / 2) if periodic and not pair and one_phase_set(point.runs) else 0.0
     film = film_products(point.runs)
     change, scatter = film.change, film.scatter
-    if not film.seen and not clearance:
-        change, scatter = 0.0, np.zeros_like(scatter)
-    elif not film.seen:
-        rms, peak = (max(getattr(s, name) for s in point.runs) / clearance for name in ("rms", "peak"))
+    if not film.seen:  # without a clearance nothing is stated
+        rms, peak = (max(getattr(s, name) for s in point.runs) / (clearance or np.inf) for name in ("rms", "peak"))
         stated = band_change("pair" if pair else point.kind, rms, peak, _one_sided(point.runs))
         scatter = np.fmin(scatter, (line_scatter(rms) if film.even else stated) / np.sqrt(2))
         change = np.fmin(change, stated)
@@ -196,11 +205,6 @@ class BandSolution(BandBlocks):
     condition: FloatArray  #: (L,): condition number of the motions
     run_scatter: float  #: of the runs' gains
 
-    @cached_property
-    def classic(self) -> list[ClassicLine]:
-        """All lines by the methods of analysers."""
-        return [line for point in self.points for line in point.classic]
-
     def usable_of(self, b: int) -> IntArray:
         """Lines of a band with an answer."""
         return np.flatnonzero(self.usable & (self.band == b))
@@ -209,7 +213,7 @@ class BandSolution(BandBlocks):
         """Half of what H2 lies above H1 at some lines (2, 2) [N/m], between which H is if nothing tells noise."""
         blind = [k for k in lines if self.usable[k] and self.points[self.band[k]].method == "hv"]
         halves = [0.5 * (self.classic[k].h["h2"] - self.classic[k].h["h1"]) for k in blind]
-        return np.mean([*halves], axis=0) if halves else np.zeros((2, 2), complex)
+        return np.mean(halves, axis=0) if halves else np.zeros((2, 2), complex)
 
 
 def solve_bands(rig: Rig, data: BandBlocks) -> BandSolution:
@@ -276,7 +280,7 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
 
 def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[IntArray, ...]:
     """Parts of all bands; few tones are no band: each that is told is a point."""
-    parts: list[IntArray] = []
+    parts = []
     for b in range(len(data.turning)):
         lines = np.flatnonzero(used & (data.band == b))
         if len(lines) < 2 * MODELS["K-C-M"]:

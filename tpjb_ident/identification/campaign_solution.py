@@ -105,9 +105,11 @@ def with_found_devices(rig: Rig, blocks: Blocks, start: float) -> Rig:
     ):
         devices["acceleration"] = "accelerometers" if acceleration.clear else ""
         rates |= {"accelerometers": acceleration.rate} if acceleration.clear else {}
-    separate = [replace(s, clock=devices.get(s.quantity, "")) for s in rig.channels]
-    sensors = tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.clock else s for s in separate)
-    return replace(rig, channels=sensors, rates=rates)
+    sensors = []
+    for s in rig.channels:
+        clock = devices.get(s.quantity, "")
+        sensors.append(replace(s, clock=clock, delay_uncertainty=s.delay_uncertainty or start) if clock else s)
+    return replace(rig, channels=tuple(sensors), rates=rates)
 
 
 class _Rate(NamedTuple):
@@ -136,7 +138,7 @@ def _rate(rig: Rig, blocks: Blocks, quantity: str) -> _Rate | None:
 
 def _turning(blocks: Blocks, rows: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Rate at which the phase of some sensors turns (n,) [rad/s], and its standard error (n,)."""
-    z: ComplexArray = blocks.z[:, rows]
+    z = blocks.z[:, rows]
     power = np.maximum(np.sum(np.abs(z) ** 2, axis=1), 1e-300)
     turning = np.sum(z.conj() * blocks.slope[:, rows], axis=1).imag / power
     noise = blocks.slope_noise[:, rows][:, :, rows]
@@ -168,8 +170,8 @@ def campaign_blocks(
     """Stack the runs of all points; `bent` (P,)."""
     noises, freedoms = _pooled_noise(means, [data.runs[0].length for data in points])
     names: list[str] = []
-    calibrations: list[list[Hashable]] = [[] for _ in means[0].channels[0]]
-    rows: list[dict[str, Any]] = []
+    calibrations: list[dict[Hashable, int]] = [{} for _ in means[0].channels[0]]
+    rows = []
     for p, (data, point, miss) in enumerate(zip(points, means, misses)):
         w = point.means
         for g, (run, line) in enumerate(zip(data.runs, data.lines)):
@@ -202,13 +204,11 @@ def campaign_blocks(
     return stacked([data.point for data in points], names, len(calibrations), rows, bent)
 
 
-def channel_columns(channels: Sequence[Channel | None], tables: list[list[Hashable]]) -> dict[str, Any]:
-    """What a block's channels (m,) are; `tables` holds the calibrations of each sensor, new ones join it."""
+def channel_columns(channels: Sequence[Channel | None], tables: list[dict[Hashable, int]]) -> dict[str, Any]:
+    """What a block's channels (m,) are; `tables` numbers the calibrations of each sensor, new ones join it."""
     numbers = []
-    for channel, calibrations in zip(channels, tables):
-        if channel is not None and channel.calibration not in calibrations:
-            calibrations.append(channel.calibration)
-        numbers.append(0 if channel is None else calibrations.index(channel.calibration))
+    for channel, table in zip(channels, tables):
+        numbers.append(0 if channel is None else table.setdefault(channel.calibration, len(table)))
     present = np.array([channel is not None for channel in channels])
     return {"present": present, "along": axes_of(channels), "calibration": numbers}
 
@@ -218,20 +218,19 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
 
     What points share is the noise's density: that of a window goes with one over its length [s].
     """
-    densities = [(p.means.spare, length * p.means.noise) for p, length in zip(means, lengths) if p.means is not None]
-    if sum(spare for spare, _ in densities) < _FREEDOM:
+    nothing = (0.0, np.zeros_like(means[0].residual[1]))
+    own = [nothing if p.means is None else (p.means.spare, n * p.means.noise) for p, n in zip(means, lengths)]
+    densities = own
+    if sum(spare for spare, _ in own) < _FREEDOM:
         # too few windows in all the campaign: what the lines leave of the records tells the noise
-        densities += [(spare, noise) for noise, spare in (p.residual for p in means)]
+        densities = own + [p.residual for p in means]
     total = sum(spare for spare, _ in densities)
-    density = np.asarray(sum(spare * noise for spare, noise in densities) / max(total, 1.0), complex)
-    noises: list[ComplexArray] = []
-    freedoms: list[float] = []
-    for p, length in zip(means, lengths):
-        spare, single = (0.0, density) if p.means is None else (p.means.spare, length * p.means.noise)
+    density = sum(spare * noise for spare, noise in densities) / max(total, 1.0)
+    noises, freedoms = [], []
+    for (spare, noise), length in zip(own, lengths):
         more = min(max(_FREEDOM - spare, 0.0), total - spare)
         freedom = max(spare + more, 1.0)
-        noise = np.asarray((spare * single + more * density) / freedom / length, complex)
-        noises.append(unbiased_noise(noise, freedom))
+        noises.append(unbiased_noise((spare * noise + more * density) / freedom / length, freedom))
         freedoms.append(freedom)
     return noises, np.array(freedoms)
 
@@ -353,7 +352,7 @@ def covariances_of(
 
 def total(covariances: Mapping[str, FloatArray]) -> FloatArray:
     """Sum of covariances (8, 8) by source."""
-    return np.sum([np.zeros((8, 8)), *covariances.values()], axis=0)
+    return sum(covariances.values(), np.zeros((8, 8)))
 
 
 def shared_changes(

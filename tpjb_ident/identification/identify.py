@@ -9,7 +9,7 @@ from rigdata.arrays import FloatArray, IntArray
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from rigdata.vector import zero_uncertainty
-from tpjb_ident.bands.responses import BandPoint, band_groups, read_point
+from tpjb_ident.bands.responses import BandPoint, read_points
 from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import Conditions, holding, merged
@@ -160,14 +160,14 @@ def assemble(
     rig = campaign_rig(campaign, bare=dry.stiffness, to_set_point=settings.correct, off=checked.off)
     rig = rig.doubting(checked.doubted)
     solved = solve_campaign(campaign, gathered, digests, workers, rig)
+    excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
     jobs = []
     for p, data in enumerate(gathered):
-        jobs.append((point_share(solved, data, p, dry, check_conditions(checked, data.names)),))
-    excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
+        conditions = *check_conditions(checked, data.names), *without_runs(data.point, excluded, several)
+        jobs.append((point_share(solved, data, p, dry, conditions),))
     points = []
     for point in workers.map(finished_point, jobs, settings):
-        without = without_runs(point.point, excluded, several)
-        points.append(replace(point, quality=merged(point.quality, without)))
+        points.append(point)
         report("estimating", len(points), len(gathered))
     places = [data.point for data in gathered]
     remarks = unstated(campaign) + excluded_runs(excluded, len(finished.outcomes), places, several)
@@ -197,18 +197,13 @@ def identify_bands(
     checked = campaign_verdicts(campaign, observations)
     bad = checked.unusable
     unusable = [ExcludedRun(run.id, run.point, RigDataError(bad[run.id])) for run in runs if run.id in bad]
-    groups = band_groups([run for run in runs if run.id not in bad])
-
+    usable = [run for run in runs if run.id not in bad]
     excluded: list[ExcludedRun] = []
 
     def solve(rig: Rig) -> BandSolution:
         fast = {sensor.name: rig.rates[sensor.clock] for sensor in rig.channels if sensor.clock in rig.rates}
-        points = []
-        excluded[:] = unusable
-        for group in groups:
-            point, without = read_point(group, settings.phasors, fast)
-            points += [] if point is None else [point]
-            excluded.extend(without)
+        points, unread = read_points(usable, settings.phasors, fast)
+        excluded[:] = unusable + unread
         if not points:
             raise excluded[0].error
         loads = static_loads(campaign, points)
@@ -304,7 +299,7 @@ def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float |
         by_method={est.method: est},
         n_windows=sum(line.n_rows for line in inside),
         outlier_fraction=0.0,
-        coherence=float(np.median([line.coherence.min() for line in inside])) if inside else float("nan"),
+        coherence=float(np.median([line.coherence.min() for line in inside])) if inside else np.nan,
         amplitude=amplitude,
         quality=merged(quality, physics(est, point.inertia), bent),
         rejected=(),

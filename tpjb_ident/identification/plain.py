@@ -79,13 +79,11 @@ def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.Dat
     rows = []
     for p in points:
         point = p.data.point
-        row: dict[str, object] = dict(zip(POINT_KEY, point.key))
         factor = np.repeat([1.0, 1 / point.excitation], 4)
-        for name, value, error in zip(COEFFICIENT_COLUMNS, real_numbers(p.h) * factor, p.standard_error * factor):
-            row[name], row[f"{name}_se"] = value, error
-        figures = (settings.norm, settings.window, len(p.data.runs), int(p.data.whole.sum()), quality_cell(p.status))
-        rows.append(row | dict(zip(_FIGURES, figures)))
-    columns = [c for name in COEFFICIENT_COLUMNS for c in (name, f"{name}_se")]
+        numbers = np.stack([real_numbers(p.h) * factor, p.standard_error * factor], axis=1)
+        figures = (settings.norm, settings.window, len(p.data.runs), p.data.whole.sum(), quality_cell(p.status))
+        rows.append([*point.key, *numbers.ravel(), *figures])
+    columns = [name + ending for name in COEFFICIENT_COLUMNS for ending in ("", "_se")]
     return pd.DataFrame(rows, columns=[*POINT_KEY, *columns, *_FIGURES])
 
 

@@ -51,7 +51,7 @@ class PointShare:
 
 
 def point_share(solved: CampaignSolution, data: PointData, p: int, dry: DryTest, checks: Conditions) -> PointShare:
-    """The part of a campaign's solution that belongs to point `p`, and what the `checks` of its runs say."""
+    """The part of a campaign's solution that belongs to point `p`; `checks`: what is known of its runs beforehand."""
     solution, blocks = solved.solution, solved.solution.blocks
     runs, m = len(data.runs), len(solution.rig)
     shift, factor = np.zeros((runs, m), complex), np.ones((runs, m), complex)
@@ -169,7 +169,7 @@ def all_methods(
     """Every method that was asked for and applies; the solve's is there where it has an answer, and its scatter."""
     drive = _nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
-    estimates: dict[str, DynamicStiffness] = {}
+    estimates = {}
     for name in dict.fromkeys((*settings.methods, settings.method)):
         method, norm = method_of(name)
         if name == SOLVED and solved is not None:

@@ -30,7 +30,7 @@ class PointMeans:
     means: WindowMeans | None
     channels: tuple[tuple[Channel | None, ...], ...]  #: (g, m): None where a run says nothing of a sensor
     condition: float
-    residual: tuple[ComplexArray, float]  #: density of the noise (m, m) and its degrees of freedom
+    residual: tuple[float, ComplexArray]  #: degrees of freedom of the noise and its density (m, m)
     status: Conditions = ()
     shaft: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (g,): NaN where it is not on the line
     shaft_conditions: Conditions = ()
@@ -64,10 +64,10 @@ def _film(rig: Rig, mass: float) -> FloatArray:
 
 def _residual_density(
     data: PointData, rig: Rig, means: WindowMeans | None, film: FloatArray
-) -> tuple[ComplexArray, float]:
-    """Noise of a phasor times the length of its fit (m, m), by what lines leave of the records, and its freedom."""
+) -> tuple[float, ComplexArray]:
+    """Noise of a phasor times the length of its fit (m, m), by what lines leave of the records, after its freedom."""
     m = len(rig.channels)
-    rows: list[ComplexArray] = [np.zeros((0, m), complex)]
+    rows = [np.zeros((0, m), complex)]
     for run, line in zip(data.runs, data.lines):
         if line < len(run.residual):
             bins = by_channel(run.residual[line], run.channels, rig.channels)
@@ -76,7 +76,7 @@ def _residual_density(
     if means is not None:
         bins = bins - motion_in(bins, np.ones(len(bins)), means.mean, film)
     freedom = float(len(bins))
-    return bins.T @ bins.conj() / max(freedom, 1.0), freedom
+    return freedom, bins.T @ bins.conj() / max(freedom, 1.0)
 
 
 def _shaft(data: PointData, means: WindowMeans | None, rig: Rig) -> tuple[ComplexArray, Conditions]:

@@ -88,7 +88,7 @@ class SlowerChannel:
 
 def filled_channels(run: Run) -> dict[str, SlowerChannel]:
     """Channels that were sampled slower than they were written, by name."""
-    slower: dict[str, SlowerChannel] = {}
+    slower = {}
     for reader in device_readers(run):
         power = np.clip(np.log2(_LOOK * reader.rate) + 1, _LEAST_POWER, _MOST_POWER)
         _, rows = reader.read(0, min(reader.length, 2 ** int(power) - 2))
@@ -179,22 +179,30 @@ def compensated(result: Phasors, run: Run, slower: Mapping[str, SlowerChannel], 
     `delays` [s]: of whole quantities.
     """
     frequencies = result.lines.whole_frequencies
-    gains = np.ones((len(frequencies), len(result.channels)), dtype=complex)
-    for k, channel in enumerate(result.channels):
-        gains[:, k] = np.exp(-2j * np.pi * frequencies * delays.get(channel.quantity, 0.0))
+    columns = []
+    for channel in result.channels:
+        gain = np.exp(-2j * np.pi * frequencies * delays.get(channel.quantity, 0.0))
         if channel.response:
-            gain = channel.response.at(frequencies)
-            unknown = ~np.isfinite(gain) | (np.abs(gain) <= 1e-6)
+            response = channel.response.at(frequencies)
+            unknown = ~np.isfinite(response) | (np.abs(response) <= 1e-6)
             if unknown[: len(result.lines.excitation)].any():
                 text = f"its response at the excitation of {frequencies[unknown][0]:g} Hz is not known"
                 cure = "Extend filter_table, or check filter"
                 raise refuse(run.file, f"channel {channel.name}", f"{text}, or nothing comes through", cure, run.id)
-            gains[:, k] *= np.where(unknown, 1.0, gain)  # 1 at disturbing lines that a table does not reach
+            gain *= np.where(unknown, 1.0, response)  # 1 at disturbing lines that a table does not reach
         if channel.temperature_reference is not None and not np.isnan(result.temperature):
             warmer = result.temperature - channel.temperature_reference
-            gains[:, k] *= 1 + channel.temperature_coefficient * warmer
+            gain *= 1 + channel.temperature_coefficient * warmer
         if channel.name in slower:
-            gains[:, k] *= slower[channel.name].at(frequencies)
+            gain *= slower[channel.name].at(frequencies)
+        columns.append(gain)
     rates = ", ".join(f"{name} {_ORDERS[s.order]} from {s.rate:.4g} Hz" for name, s in slower.items())
     filled = holding((slower, "slower-channels", f"{rates}; what that does to a sine was taken out"))
-    return replace(result.divided(gains), conditions=merged(result.conditions, filled))
+    gains = np.stack(columns, axis=1)
+    return replace(
+        result,
+        z=result.z / gains[: result.z.shape[1]],
+        record=result.record / gains[: len(result.record)],
+        residual=tuple(bins / gain for bins, gain in zip(result.residual, gains)),
+        conditions=merged(result.conditions, filled),
+    )

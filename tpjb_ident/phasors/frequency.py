@@ -5,7 +5,8 @@ advance from window to window tells a frequency error to a fraction of the line'
 against a drive that turns with it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,16 +29,11 @@ _CLEAR = 10.0
 _NO_TURNS = np.empty(0, complex)
 
 
-@dataclass(frozen=True)
-class ShaftCourse:
+class ShaftCourse(NamedTuple):
     """Shaft speed over a run, whatever windows it was found in: a second fit may cut the run otherwise."""
 
     time: FloatArray  #: (n,), s: middle of the windows in which it was found
-    speed: FloatArray  #: (n,)
-
-    def at(self, time: FloatArray) -> FloatArray:
-        """Speed at `time` (m,) [s], [Hz]."""
-        return np.interp(time, self.time, self.speed)
+    speed: FloatArray  #: (n,), Hz
 
 
 def shaft_speed(run: Run) -> tuple[float, Conditions]:
@@ -117,8 +113,7 @@ MAX_WINDOW_SLIP = 0.005
 _ALL = slice(None)
 
 
-@dataclass(frozen=True)
-class Tuning:
+class Tuning(NamedTuple):
     """What to do better in a second fit."""
 
     lines: LineSet
@@ -142,8 +137,7 @@ def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
     return replace(result, z=result.z * turn[:, :, None], lines=lines)
 
 
-@dataclass(frozen=True)
-class _Advance:
+class _Advance(NamedTuple):
     """How a line's phase advances from window to window beyond its frequency."""
 
     windows: IntArray  #: (n,): that show it
@@ -223,7 +217,7 @@ def device_rates(result: RunPhasors) -> dict[str, float]:
 def exact_frequencies(result: RunPhasors, places: list[int]) -> FloatArray:
     """Frequencies of the whole record's lines by the clock of some channels, (n_whole_lines,) [Hz]."""
     turning = _line_slip(result, result.lines.place("1X"), places)
-    frequencies = np.array([line.frequency + turning * line.order for line in result.lines.whole])
+    frequencies = result.lines.with_slip(turning)
     for k, line in enumerate(result.lines.whole):
         if line.name in ("excitation", "mains"):
             frequencies[k] += _line_slip(result, k, places)

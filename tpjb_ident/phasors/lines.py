@@ -13,7 +13,7 @@ is the criterion: 1.0 for orthogonal lines, 1.3 is accepted.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -64,7 +64,7 @@ class LineSet:
     @property
     def whole_frequencies(self) -> FloatArray:
         """Frequencies of the whole record's lines [Hz], (n_whole_lines,)."""
-        return np.array([line.frequency for line in self.whole])
+        return self.with_slip(0.0)
 
     @property
     def driven(self) -> tuple[float, ...]:
@@ -86,16 +86,9 @@ class LineSet:
         """Lines of the whole record: those of the windows, then the faint ones."""
         return self.excitation + self.nuisance + self.faint
 
-    def at_speed(self, speed: float, rate: float = 0.0) -> LineSet:
-        """The same lines with 1X, 2X.. at another shaft speed [Hz]; all by a clock that runs faster by `rate`."""
-        moved = {}
-        for name in ("excitation", "nuisance", "faint"):
-            lines = []
-            for line in getattr(self, name):
-                frequency = line.frequency * (1 + rate) + line.order * (speed - self.speed)
-                lines.append(replace(line, frequency=frequency))
-            moved[name] = tuple(lines)
-        return replace(self, speed=speed, **moved)
+    def with_slip(self, slip: float) -> FloatArray:
+        """Frequencies of the whole record's lines where the shaft turns faster by `slip` [Hz], (n_whole_lines,)."""
+        return np.array([line.frequency + line.order * slip for line in self.whole])
 
 
 def known_lines(
@@ -113,7 +106,7 @@ def known_lines(
     strong = strong_lines(driven, speed, mains)
     for f in extra:
         strong.append(next((line for line in faint if abs(line.frequency - f) < spacing), Line("found", f, _EXACT)))
-    conditions: list[Condition] = []
+    conditions = []
     nuisance: list[Line] = []
     resolved: list[Line] = []
     level = Line("level", 0.0)

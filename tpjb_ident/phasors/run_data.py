@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -124,12 +124,6 @@ class RunPhasors(Directed):
         """X and Y of a quantity's mean in every window, (n_windows, 2)."""
         return self.plane(quantity, self.mean).real
 
-    def divided(self, gains: ComplexArray) -> Self:
-        """The run without gains of its channels at the whole record's lines, (n_whole_lines, n_channels)."""
-        residual = tuple(bins / gain for bins, gain in zip(self.residual, gains))
-        record = self.record / gains[: len(self.record)]
-        return replace(self, z=self.z / gains[: self.z.shape[1]], record=record, residual=residual)
-
     def film_force(self, values: ComplexArray) -> ComplexArray:
         """X and Y (.., 2) of the oil force [N] by values (.., n_channels) of all channels.
 
@@ -184,9 +178,9 @@ FilmLines = dict[str, FilmLine]
 
 
 def film_lines(run: RunPhasors) -> tuple[FilmLines | None, ...]:
-    """What the film makes of every excitation line of a run; None where it has none, or not the whole record's."""
+    """What the film makes of every excitation line of a run, None of one at rest; () without the whole record's."""
     if not len(run.record) or len(run.residual) < len(run.record):
-        return tuple(None for _ in run.lines.excitation)
+        return ()
     displacement, force = run.plane("displacement", run.record), run.film_force(run.record)
     # the square that rounding puts on a line is the sum over the channels
     steps = np.diag(np.sqrt(len(run.rounding) * run.rounding)).astype(complex)
@@ -238,7 +232,7 @@ def mains_lines(run: RunPhasors) -> tuple[ComplexArray | None, ComplexArray | No
     harmonics = (n * e.frequency for e in run.lines.excitation for n in (2, 3))
     if any(abs(f - mains.frequency) <= mains.wander for f in harmonics):
         return None, None
-    typical: list[ComplexArray | None] = []
+    typical = []
     for z in (run.displacement[:, place], run.force[:, place]):
         complete = z[np.isfinite(z).all(axis=1)]
         typical.append(complex_median(complete) if len(complete) else None)

@@ -111,7 +111,7 @@ def _longest(windows: ComplexArray, edges: IntArray, idle: BoolArray) -> BoolArr
     inside = ~idle & (stretch == np.bincount(stretch[~idle]).argmax())
     places = np.flatnonzero(inside)
     middle = complex_median(windows[places])
-    distance: FloatArray = np.linalg.norm(windows - middle, axis=1)
+    distance = np.linalg.norm(windows - middle, axis=1)
     for end, inner in ((places[0], places[1:4]), (places[-1], places[-4:-1])):
         if distance[end] > max(_ACROSS * np.linalg.norm(middle), 3 * np.max(distance[inner], initial=0.0)):
             inside[end] = False
@@ -140,8 +140,8 @@ def extract(
     channels.sort(key=lambda described: VECTOR_QUANTITIES.index(described[0].quantity))
     length, count = plan_windows(run.length, run.sample_rate, lines, window)
     seconds = length / run.sample_rate
-    middles = np.asarray((np.arange(count) + 0.5) * length / run.sample_rate, dtype=float)
-    speeds = np.full(count, np.nan) if follow is None else follow.at(middles)
+    middles = (np.arange(count) + 0.5) * length / run.sample_rate
+    speeds = np.full(count, np.nan) if follow is None else np.interp(middles, *follow)
     fit = WindowFit.empty(count, len(lines.frequencies), len(channels))
     start = np.empty(0)
     with run.opened():
@@ -150,8 +150,7 @@ def extract(
             if k and (reader.rate, reader.length) != (readers[0].rate, readers[0].length):
                 firsts, samples = reader.first_samples(start), int(seconds * reader.rate + 1e-6)
             fast = (clocks or {}).get(reader.device.name, 0.0)
-            moved = lines.at_speed(lines.speed, fast)
-            (z, *figures), starts, shown = _device_windows(reader, samples, firsts, moved, speeds)
+            (z, *figures), starts, shown = _device_windows(reader, samples, firsts, lines, speeds, 1 + fast)
             # phases count by the lines' common frequencies
             ahead = np.multiply.outer(starts + 0.5 * seconds, fast * lines.frequencies[shown])
             chosen = np.array([c in reader.channels for c, _ in channels])
@@ -175,19 +174,19 @@ def extract(
 
 
 def _device_windows(
-    reader: DeviceReader, length: int, firsts: IntArray, lines: LineSet, speeds: FloatArray
+    reader: DeviceReader, length: int, firsts: IntArray, lines: LineSet, speeds: FloatArray, faster: float
 ) -> tuple[WindowFit, FloatArray, BoolArray]:
     """Fit of one device's windows, chunk by chunk, their starts (n,) [s], and which lines its rate shows, (n_lines,).
 
     Those with times or a shaft speed of their own are fitted one by one. Those that are noisier than the run's usual
-    one are fitted anew: a chunk alone may hold nothing to compare.
+    one are fitted anew: a chunk alone may hold nothing to compare. Lines turn `faster` by the device's clock, a factor.
     """
     shown = lines.frequencies < HIGHEST * reader.rate
     if not shown[: len(lines.excitation)].all() or length <= 2 * (2 * shown.sum() + 2):
         names, run = ", ".join(c.name for c in reader.channels), reader.run
         fault = f"{reader.rate:g} samples per second cannot show the excitation in windows of {length} samples"
         raise refuse(run.file, f"channels {names}", fault, "Sample them faster, or record longer", run.id)
-    fitter = LineFitter(length, reader.rate, lines.frequencies[shown])
+    fitter = LineFitter(length, reader.rate, faster * lines.frequencies[shown])
     windows = WindowFit.empty(len(firsts), int(shown.sum()), len(reader.channels))
     starts = np.full(len(firsts), np.nan)
 
@@ -204,12 +203,12 @@ def _device_windows(
         stray = np.abs(time - time[:, :1] - np.arange(length) / reader.rate).max(axis=1)
         uneven = ~(stray <= MAX_JITTER / reader.rate)
         for i in np.flatnonzero(uneven | np.isfinite(speeds[first:stop])).tolist():
-            timed, speed = np.isfinite(time[i]), speeds[first + i]
+            timed, slip = np.isfinite(time[i]), np.nan_to_num(speeds[first + i] - lines.speed)
             if timed.sum() > 2 * fitter.design.shape[1]:
-                moved = lines.at_speed(speed) if np.isfinite(speed) else lines
+                moved = lines.with_slip(slip)[: len(shown)]
                 times = time[i, timed]
                 stamps = times if uneven[i] else None
-                single = LineFitter(len(times), reader.rate, moved.frequencies[shown], time=stamps)
+                single = LineFitter(len(times), reader.rate, faster * moved[shown], time=stamps)
                 part.put(slice(i, i + 1), single.fit(rows[:, i : i + 1, timed], times[:1], usual))
         windows.put(slice(first, stop), part)
         starts[first:stop] = start
@@ -238,7 +237,11 @@ def run_phasors(run: Run, settings: PhasorSettings | None = None) -> RunPhasors:
         cure = "Excite with sines, or leave the run out"
         raise refuse(run.file, "excitation", text, cure, run.id)
     run = with_kept_beginning(run)
-    fit = _beginning_fit(run, settings)
+    beginning = beginning_of(run, SHORT) if run.length > SHORT else run
+    try:
+        fit = _RunFit(beginning, settings)
+    except RecordTooShortError:  # the beginning is not enough; all of it may be
+        fit = _RunFit(run, settings)
     if fit.run.length < run.length:
         fit.extend(run)
     result, slower = fit.result, fit.slower
@@ -249,16 +252,6 @@ def run_phasors(run: Run, settings: PhasorSettings | None = None) -> RunPhasors:
     temperature = beginning_of(run, SHORT).mean_temperature() or np.nan
     described = replace(result, conditions=conditions, device=device, temperature=temperature)
     return compensated(described, run, slower, settings.delays)
-
-
-def _beginning_fit(run: Run, settings: PhasorSettings) -> _RunFit:
-    """Fit of a run, of the beginning of a long one."""
-    if run.length > SHORT:
-        try:
-            return _RunFit(beginning_of(run, SHORT), settings)
-        except RecordTooShortError:  # the beginning is not enough; all of it may be
-            pass
-    return _RunFit(run, settings)
 
 
 class _RunFit:

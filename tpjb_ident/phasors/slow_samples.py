@@ -58,7 +58,7 @@ def spare_slopes(run: Run, along: FloatArray) -> dict[str, FloatArray]:
 
     Of quantities alone that more than two channels tell.
     """
-    slopes: dict[str, FloatArray] = {}
+    slopes = {}
     for quantity in ("force", "displacement"):
         names = [name for name, c in run.channels.items() if c.quantity == quantity and c.axis is not None]
         if len(names) < 3:
@@ -142,7 +142,7 @@ def live_run(run: Run) -> Run:
     A force or displacement that stops in the middle of a staircase looks like a very stiff or very soft pivot: nothing
     in the curve itself gives it away, but readings without noise do.
     """
-    statistics: dict[str, ChannelStatistics] = {}
+    statistics = {}
     for name, channel in run.channels.items():
         if channel.quantity in ("force", "displacement"):
             statistics[name] = ChannelStatistics()

@@ -103,8 +103,7 @@ def chance_of(chi_square: float, dof: int, noise_dof: Sequence[float]) -> float:
     variance of nu / 2 is.
     """
     plain = float(chdtrc(dof, chi_square)) if dof > 0 else np.nan
-    finite = np.array([nu for nu in noise_dof if np.isfinite(nu) and nu < _LARGE_DOF])
-    if not len(finite) or not plain <= 0.5:
+    if not min(noise_dof) < _LARGE_DOF or not plain <= 0.5:
         return plain
     rng = np.random.default_rng(_DRAWN[1])
     degrees = dof / len(noise_dof)
@@ -149,6 +148,8 @@ def fit_over_frequency(
     spare, noise_dof = 8 * len(chosen) - len(x), [float(np.median(e.dof)) for e in chosen]
     lengths = np.linalg.norm(residual, axis=1) / np.linalg.norm(y, axis=1)
     spread = np.sum(variances**2 / np.array(noise_dof)[:, None], axis=0)  # Welch and Satterthwaite
+    with np.errstate(divide="ignore"):  # covariances may be known
+        dof = variances.sum(axis=0) ** 2 / spread
     shared = np.zeros((1, len(chosen), 8))
     if changes is not None:
         shared = changes.reshape(len(changes), -1, 8)[:, usable]
@@ -156,7 +157,7 @@ def fit_over_frequency(
         model,
         x,
         random.sum(axis=0),
-        np.where(spread > 0, variances.sum(axis=0) ** 2 / np.where(spread > 0, spread, 1.0), np.inf),
+        dof,
         _systematic(gains, np.array([e.systematic for e in chosen]), shared),
         chi_square,
         spare,

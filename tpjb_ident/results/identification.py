@@ -119,7 +119,7 @@ class Identification(Presented):
         rows = []
         for p in self.points:
             key = p.point.key
-            rows += [[w.run, w.time, float(np.degrees(w.direction)), w.weight, w.reason, *key] for w in p.rejected]
+            rows += [[w.run, w.time, np.degrees(w.direction), w.weight, w.reason, *key] for w in p.rejected]
         return pd.DataFrame(rows, columns=list(_WINDOW_COLUMNS))
 
     def budget_frame(self) -> pd.DataFrame:
@@ -177,7 +177,7 @@ def _estimate_row(p: PointResult, est: DynamicStiffness, model: dict[str, str]) 
         "n_records": p.n_records,
         "n_windows": p.n_windows,
         "condition_number": est.condition,
-        "outlier_fraction": float(rejected) / max(len(weights), 1),
+        "outlier_fraction": rejected / max(len(weights), 1),
         "quality": quality_cell(conditions),
         "quality_detail": "; ".join(sentences(conditions)),
         "n_windows_rejected": rejected,
@@ -203,7 +203,7 @@ def coefficient_columns(est: DynamicStiffness) -> dict[str, float]:
     return dict(zip(names, numbers.ravel().tolist()))
 
 
-def _budget_rows(p: PointResult) -> list[dict[str, Any]]:
+def _budget_rows(p: PointResult) -> list[list[Any]]:
     """Rows of ``budget.csv`` of one point.
 
     The intervals are its sum: the random sources together with Student's t of their degrees of freedom, the systematic
@@ -218,14 +218,10 @@ def _budget_rows(p: PointResult) -> list[dict[str, Any]]:
     rows = []
     for i, name in enumerate(names):
         for j, source in enumerate(parts):
-            kind, dof = ("random", float(est.dof[i])) if source in p.scattering else ("systematic", np.inf)
+            kind, dof = ("random", est.dof[i]) if source in p.scattering else ("systematic", np.inf)
             unit = "N/m" if i < 4 else "Ns/m"
-            values = (name, unit, source, kind, float(errors[j, i]), float(shares[j, i]), dof)
-            rows.append({**point_columns(p), **dict(zip(_BUDGET_COLUMNS, values))})
+            rows.append([*p.point.key, name, unit, source, kind, errors[j, i], shares[j, i], dof])
     return rows
-
-
-__all__ = ["Identification", "coefficient_columns"]
 
 
 _KEY_COLUMNS = (*STATIC_KEY, "excitation")

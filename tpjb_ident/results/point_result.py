@@ -152,7 +152,7 @@ def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatA
     """
     good = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1) & (weights > 0)
     if not good.any() or not np.isfinite(h).all():
-        return float("nan")
+        return np.nan
     w = weights[good, None]
     residual = F[good] - D[good] @ h.T
     power = (w * np.abs(F[good]) ** 2).sum(axis=0)
@@ -171,11 +171,11 @@ def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> t
     """Windows without weight, each with the reason that shows in its own numbers; `h` (2, 2) [N/m], `weights` (n,)."""
     verdicts = []
     answered = bool(np.isfinite(h).all())
-    for i in np.flatnonzero(weights < REJECTED_WEIGHT):
+    for i in np.flatnonzero(weights < REJECTED_WEIGHT).tolist():
         run = data.runs[data.run_index[i]]
         k = int(i - np.searchsorted(data.run_index, data.run_index[i]))
-        direction = float("nan") if run.direction is None else run.direction
-        reason = _reason(data, run.lost[k], int(i), weights, answered)
+        direction = np.nan if run.direction is None else run.direction
+        reason = _reason(data, run.lost[k], i, weights, answered)
         verdicts.append(WindowVerdict(run.run, float(run.start[k]), float(weights[i]), direction, reason))
     return tuple(verdicts)
 
@@ -186,7 +186,7 @@ def _reason(data: PointData, lost: FloatArray, i: int, weights: FloatArray, answ
         share = lost[data.runs[data.run_index[i]].pick(name)].max(initial=0.0)
         if share > 0.5:
             return f"{100 * share:.0f} % of the {name} samples missing or glitched"
-    if not (np.isfinite(data.D[i]).all() and np.isfinite(data.F[i]).all()):
+    if not data.whole[i]:
         return "missing values"
     if not answered:
         return "the point has no answer"
@@ -210,7 +210,7 @@ def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> Con
 
 def _missing(data: PointData) -> Conditions:
     """Windows of the excitation without phasors, pointed out when they are many or a whole run's."""
-    used = {run.run for run, _ in data.counted(np.ones(len(data.D)))}
+    used = {run.run for run, _ in data.counted()}
     empty = [run.run for run in data.runs if run.run not in used]
     driven = data.whole[np.concatenate([_in_stretch(run) for run in data.runs])]
     lost = 1 - driven.mean()
@@ -254,7 +254,7 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Conditions:
     bad = (weights < REJECTED_WEIGHT) & data.whole
     total, count = int(bad.sum()), int(data.whole.sum())
     named = []
-    for run, places in data.counted(np.ones(len(weights))):
+    for run, places in data.counted():
         n, hits = len(places), int(bad[places].sum())
         chance = (total - hits + 0.5) / (count - n + 1.0)
         if hits >= 3 and hits > 0.4 * n and bdtrc(hits - 1, n, min(chance, 1.0)) < 1e-3:
@@ -286,7 +286,7 @@ def with_probe_doubts(
     """
     if not clearance or not clearance > 0:
         return tuple(points)
-    by_probe: dict[str, str] = {}
+    by_probe = {}
     for (run, name), half in swept.items():
         if not _TRAVEL[0] * clearance < half < _TRAVEL[1] * clearance:
             by_probe[name] = f"{name} travels {1e6 * half:.3g} um to either side in the sweep {run}"

@@ -112,7 +112,7 @@ class FinishedRuns:
 
     def without(self, problems: Mapping[str, Problem]) -> FinishedRuns:
         """The runs, those with an error of their own left out; raises the first error where none remains."""
-        outcomes: list[RunDigest | ExcludedRun] = []
+        outcomes = []
         for outcome in self.outcomes:
             if isinstance(outcome, RunDigest) and outcome.run in problems:
                 outcome = ExcludedRun(outcome.run, outcome.point, RigDataError(problems[outcome.run]))
@@ -181,8 +181,8 @@ class PointData(RunsOfPoint):
         """Housing mass whose inertia is in F [kg]: zero where no accelerometer measures it."""
         return self.runs[0].housing_mass - self.inertia
 
-    def counted(self, weights: FloatArray) -> list[tuple[RunPhasors, IntArray]]:
-        """Runs with the places of their whole windows of some weight (n,), those that have any."""
+    def counted(self, weights: FloatArray | float = 1.0) -> list[tuple[RunPhasors, IntArray]]:
+        """Runs with the places of their whole windows, those that have any; of some weight where one is given, (n,)."""
         good = self.whole & (weights > 0)
         places = [np.flatnonzero(good & (self.run_index == i)) for i in range(len(self.runs))]
         return [(run, rows) for run, rows in zip(self.runs, places) if len(rows)]
@@ -200,22 +200,16 @@ def finite_mean(rows: FloatArray) -> FloatArray:
 
 def gather(runs: Sequence[RunPhasors]) -> list[PointData]:
     """Group runs by operating point; a record with several excitation lines feeds several points."""
-    groups: dict[tuple[object, ...], tuple[OperatingPoint, list[tuple[RunPhasors, int]]]] = {}
-    known: dict[tuple[object, ...], list[OperatingPoint]] = {}
+    loads: dict[tuple[object, ...], dict[OperatingPoint, list[tuple[RunPhasors, int]]]] = {}
     for run in runs:
         for i, frequency in enumerate(run.lines.driven):
-            point = point_of(run.point, frequency)
-            others = known.setdefault(point.static_key, [])
+            line = point_of(run.point, frequency)
+            points = loads.setdefault(line.static_key, {})
             # of one set point that the drive missed, runs find the frequency each by itself
-            point = next((other for other in others if _is_line(other, point)), point)
-            if point.key not in groups:
-                others.append(point)
-            groups.setdefault(point.key, (point, []))[1].append((run, i))
-    return [point_data(*groups[key]) for key in sorted(groups)]
-
-
-def _is_line(first: OperatingPoint, second: OperatingPoint) -> bool:
-    return abs(first.excitation - second.excitation) <= _ONE_LINE * first.excitation
+            alike = (p for p in points if abs(p.excitation - line.excitation) <= _ONE_LINE * p.excitation)
+            points.setdefault(next(alike, line), []).append((run, i))
+    members = [pair for points in loads.values() for pair in points.items()]
+    return [point_data(*pair) for pair in sorted(members, key=lambda pair: pair[0].key)]
 
 
 def point_of(point: OperatingPoint, frequency: float) -> OperatingPoint:

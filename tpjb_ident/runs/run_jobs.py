@@ -20,9 +20,10 @@ import hashlib
 import json
 import shutil
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -108,22 +109,18 @@ class RunStore:
     def _file(self, run_id: str) -> Path:
         return self.folder / f"{hashlib.sha256(run_id.encode()).hexdigest()[:32]}.npz"
 
-    def known(self, run_id: str) -> str:
-        """Fingerprint under which a run is kept, "" if it is not."""
-        stored = self._read(run_id)
-        return "" if stored is None else str(stored[0]["fingerprint"])
-
-    def _read(self, run_id: str) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
+    def load(self, run: Run) -> tuple[str, RunDigest | None]:
+        """Fingerprint under which a run is kept, and what it says; "" and None if it is not."""
         try:
             # opened here: numpy leaves a file open that it cannot understand
-            with self._file(run_id).open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            with self._file(run.id).open("rb") as file, np.load(file, allow_pickle=False) as stored:
                 arrays = {name: stored[name] for name in stored.files}
             meta = json.loads(str(arrays.pop("meta")))
-            if meta["run"] != run_id or not isinstance(meta["fingerprint"], str):
-                return None
+            mark, result = meta["fingerprint"], unpacked(meta["result"], arrays, run)
+            is_ours = meta["run"] == run.id and isinstance(mark, str) and isinstance(result, RunDigest)
         except _NOT_OURS:
-            return None  # not there, cut off, or not ours: the run is simply done again
-        return meta, arrays
+            is_ours = False  # not there, cut off, or not ours: the run is simply done again
+        return (mark, result) if is_ours else ("", None)
 
     def keep(self, mark: str, result: RunDigest) -> None:
         """Keep a finished run under its fingerprint `mark`."""
@@ -133,17 +130,6 @@ class RunStore:
         with suppress(FileNotFoundError):  # another run into the same folder has ended and cleared it
             self.folder.mkdir(parents=True, exist_ok=True)
             write_atomic(self._file(result.run), lambda path: np.savez(path, meta=text, **arrays))
-
-    def load(self, run: Run, mark: str) -> RunDigest | None:
-        """Give a kept run back; None if it is not there, or not under this fingerprint."""
-        stored = self._read(run.id)
-        if not mark or stored is None or stored[0]["fingerprint"] != mark:
-            return None
-        try:
-            result = unpacked(stored[0]["result"], stored[1], run)
-        except _NOT_OURS:
-            return None
-        return result if isinstance(result, RunDigest) else None
 
     def clear(self) -> None:
         """Forget everything; the folder that it lies in goes too if nothing else is there."""
@@ -212,21 +198,20 @@ def all_runs(
     """What every dynamic run says; one that cannot be used is left out and named."""
     runs = campaign.of_kind("dynamic")
     progress(runs[0].id if runs else "", 0, len(runs))
-    jobs = []
+    jobs, kept = [], []
     for run in runs:  # workers may stand in another folder
         reader: Any = run.reader
         if not reader.path.is_absolute():
             reader = replace(reader, path=reader.path.absolute())
-        stored = None if store is None else store.known(run.id)
-        jobs.append((replace(run, reader=reader), settings, stored))
-    finished: list[RunDigest | ExcludedRun] = []
+        known, former = (None, None) if store is None else store.load(run)
+        jobs.append((replace(run, reader=reader), settings, known))
+        kept.append(former)
+    finished: list[Any] = []
     results = (workers or Workers()).map(process_run, jobs)
-    for run, (mark, result) in zip(runs, results, strict=True):
+    for run, former, (mark, result) in zip(runs, kept, results, strict=True):
         if store is not None and mark and isinstance(result, RunDigest):
             store.keep(mark, result)
-        if store is not None and result is None:  # or cleared by another command since
-            result = store.load(run, mark)
-        finished.append(result or one_run(run, settings))
+        finished.append(result or former)
         progress(run.id, len(finished), len(runs))
     gathered = FinishedRuns(tuple(finished))
     return gathered.without(_dead_accelerometers(gathered.digests))
@@ -243,18 +228,18 @@ def _dead_accelerometers(digests: Sequence[RunDigest]) -> dict[str, Problem]:
     return dead if 2 * len(dead) < len(digests) else {}
 
 
-def process_run(run: Run, settings: PhasorSettings, stored: str | None) -> tuple[str, RunDigest | ExcludedRun | None]:
+def process_run(run: Run, settings: PhasorSettings, known: str | None) -> tuple[str, RunDigest | ExcludedRun | None]:
     """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
 
     The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
     is kept anywhere (`known` is None) it is not asked for.
     """
     try:
-        if stored is None:
+        if known is None:
             return "", one_run(run, settings)
         with run.opened():  # once for both
             mark = fingerprint(run, settings)
-            if mark and mark == stored:
+            if mark and mark == known:
                 return mark, None
             before = file_state(run.reader.path)
             result = one_run(run, settings)
@@ -348,12 +333,15 @@ def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -
     return result
 
 
-def check_conditions(result: Verdicts, runs: Iterable[str]) -> Conditions:
+def check_conditions(result: Verdicts, runs: Sequence[str]) -> Conditions:
     """What the checks say of one point."""
-    members = list(runs)
+    conditions = []
     groups = ((_CONTRADICTED, result.shared), (_DOUBTFUL, result.doubtful), (_RUN_GAIN, result.run_gains))
-    by_name = ((name, [p for run in members for p in by_run.get(run, ())]) for name, by_run in groups)
-    return tuple(Condition(name, _sentence(problems)) for name, problems in by_name if problems)
+    for name, by_run in groups:
+        problems = list(chain.from_iterable(by_run.get(run, ()) for run in runs))
+        if problems:
+            conditions.append(Condition(name, _sentence(problems)))
+    return tuple(conditions)
 
 
 def _sentence(problems: list[Problem]) -> str:
