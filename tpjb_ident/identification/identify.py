@@ -179,6 +179,9 @@ def assemble(
 
 #: Share of the driven lines that must be told from noise.
 _LEAST_LINES = 0.5
+#: Coherence below which it is no noise that keeps the force from following the shaft, command or not, but samples that
+#: were lost, say: noise that lets H1 be a sixth too small leaves 0.84.
+_LEAST_COHERENCE = 0.7
 #: Disturbing lines that are named.
 _NAMED = 6
 #: Source of what the solves without an instrument are apart.
@@ -324,7 +327,8 @@ def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> Condition
     bare = solved.solution.rig.bare
     unknown = int((~bare.known(solved.omega[usable])).sum()) if len(bare.omega) else 0
     blind = point.method == "hv" and len(usable) > 0
-    coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if blind else 1.0
+    coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if len(usable) else 1.0
+    least = MIN_COHERENCE if blind else _LEAST_COHERENCE
     text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"
     return merged(
         fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.runs)),
@@ -334,7 +338,7 @@ def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> Condition
             (few and not alike, "excitation-too-weak", weak),
             (held, "lines-left-out", listed(held, _NAMED)),
             (blind, "no-instrument", text),
-            (coherent < MIN_COHERENCE, "low-coherence", f"{coherent:.2f}, median over the band"),
+            (coherent < least, "low-coherence", f"{coherent:.2f}, median over the band"),
             (unknown, "baseline-missing", f"at {unknown} of {len(usable)} lines of the band"),
         ),
     )
