@@ -53,17 +53,17 @@ def simulate(
     from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 
     refuse_unknown(plan, PLANS, "--plan")
-    tests = (RigPlan.like_paper if plan == "paper" else RigPlan.short)(len(drawing.pads))
+    pads = len(drawing.pads)
+    tests = RigPlan.like_paper(pads) if plan == "paper" else RigPlan.short(pads)
     points = operating_points(load or "5 kN", "-90 deg", speed, excitation or "25 Hz")
-    # every run with a shaft that turns
-    tests = tests.turning(shaft_speed=points[0].shaft_speed)
+    tests = tests.turning(shaft_speed=points[0].shaft_speed)  # of every run with a shaft that turns
     if load is not None or excitation is not None:
         tests = replace(tests, dynamic=tuple(points))
     tests = replace(tests, repeats=repeats).turning(rotation=rotation_choice(c, drawing))
     largest = max(point.static_load for point in tests.dynamic)
     rig = VirtualRig(
         truth=rig_truth(drawing, settings, bearing.read_text("utf-8-sig")),
-        instruments=erring_instruments(Instruments.like_paper(len(drawing.pads), seed, largest), settings.effects),
+        instruments=erring_instruments(Instruments.like_paper(pads, seed, largest), settings.effects),
         noise=Noise.like_samples().scaled(noise) if noise > 0 else Noise.none(),
         seed=seed,
         campaign=name,
