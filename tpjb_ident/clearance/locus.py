@@ -17,7 +17,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
-from tpjb_ident.conditions import Condition, holding, sentences
+from tpjb_ident.conditions import Conditions, holding, sentences
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.lines import line_design
 from tpjb_ident.phasors.slow_noise import DRIFT_RATE, NoiseModel, NoiseSeries, estimate_noise
@@ -96,7 +96,7 @@ class Locus(Presented):
     points: tuple[LocusPoint, ...]
     centre: FloatArray
     drift: FloatArray
-    status: tuple[Condition, ...] = ()
+    status: Conditions = ()
 
     def to_frame(self) -> pd.DataFrame:
         """Table of `locus.csv` (outputs.md)."""
@@ -211,23 +211,18 @@ def _read(run: Run) -> _Record:
     design = line_design(time, np.array(turning), drift_order=0)
     mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
     load = mean[-1, 2:]
+    steady = place - design[:, :-1] @ mean[:-1, :2]
+    label, whole = time_bins(time, _BLOCK)
+    moment, x, y = (ndimage.mean(values, label, whole) for values in (time, *steady.T))
+    duration, constant = np.full(len(whole), _BLOCK), np.ones((len(whole), 1))
     return _Record(
         run=run,
         position=np.asarray(mean[-1, :2]),
-        load=float(np.hypot(*load)),
-        direction=float(np.arctan2(load[1], load[0])),
+        load=np.hypot(*load),
+        direction=math.atan2(load[1], load[0]),
         span=time[-1] - time[0],
-        blocks=_blocks(time, place - design[:, :-1] @ mean[:-1, :2]),
+        blocks=(NoiseSeries(moment, duration, x, constant), NoiseSeries(moment, duration, y, constant)),
     )
-
-
-def _blocks(time: FloatArray, place: FloatArray) -> tuple[NoiseSeries, NoiseSeries]:
-    """Both components of a steady place (n, 2) [m] in blocks, of which none is half empty."""
-    label, whole = time_bins(time, _BLOCK)
-    moment, *components = (ndimage.mean(values, label, whole) for values in (time, *place.T))
-    duration, constant = np.full(len(whole), _BLOCK), np.ones((len(whole), 1))
-    x, y = (NoiseSeries(moment, duration, values, constant) for values in components)
-    return x, y
 
 
 def _noise(records: Sequence[_Record]) -> NoiseModel:
@@ -318,9 +313,7 @@ def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
     return same and turn < _SAME_DIRECTION
 
 
-def _status(
-    points: list[LocusPoint], polygon: ClearancePolygon | None, repeats: int, moved: str
-) -> tuple[Condition, ...]:
+def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, repeats: int, moved: str) -> Conditions:
     """Named conditions of a locus; `moved`: of shafts that do not stand, and a zero that did not."""
     missed, behind = [], []
     for p in points:

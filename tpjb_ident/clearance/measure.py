@@ -13,12 +13,11 @@ from rigdata.problem import refuse
 from rigdata.vector import directions
 from tpjb_ident.clearance.polygon import SideFit, alike, corners, find_centre, fit_sides, gain_ratio, untested
 from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals, read_sweep
-from tpjb_ident.conditions import Condition, holding, sentences
+from tpjb_ident.conditions import Condition, Conditions, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.dry_record import axial_channels, refusal, relative_calibration
-from tpjb_ident.pivot.refusals import usable_runs
 from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import TANGENT
 
@@ -98,7 +97,7 @@ class ClearancePolygon(Presented):
     pivot_scale_se: float
     noise: NoiseModel = field(repr=False)
     temperature: float = np.nan
-    status: tuple[Condition, ...] = ()
+    status: Conditions = ()
     relative_calibration: FloatArray | float = 0.0
     as_read: tuple[FloatArray, FloatArray] | None = None
 
@@ -184,21 +183,12 @@ def measure_clearance(
     return measure_run(coldest_first(runs)[0], pivot_angles, curves or ())
 
 
-def measure_sweeps(
-    runs: Sequence[Run], pivot_angles: Sequence[float], curves: Sequence[PivotCurve], most: int | None = None
-) -> tuple[list[ClearancePolygon], list[Condition]]:
-    """Polygons of sweeps, the coldest first, at `most` so many, and what is wrong with those that are of no use."""
-    polygons, problems = usable_runs(coldest_first(runs), lambda run: measure_run(run, pivot_angles, curves), most)
-    refused = [Condition("runs-refused", f"{problem.run} ({problem})") for problem in problems]
-    return polygons, refused
-
-
 def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotCurve] = ()) -> ClearancePolygon:
     """Measure the polygon of one run; parameters as `measure_clearance`."""
     angles, run = np.asarray(pivot_angles, dtype=float), live_run(run)
     contact, fit = _read_sides(run, angles, curves, LARGEST_DEFLECTION)
-    if fit.deflection.max() > LARGEST_DEFLECTION:  # pads that seemed not to be touched were
-        contact, fit = _read_sides(run, angles, curves, fit.deflection.max())
+    if (largest := fit.deflection.max()) > LARGEST_DEFLECTION:  # pads that seemed not to be touched were
+        contact, fit = _read_sides(run, angles, curves, largest)
     walk = fit.noise.walk * np.sqrt(np.ptp(contact.time))
     if walk > _LARGEST_WALK:
         what = f"has a shaft that was turned, or probes that moved: their zero walks by {1e6 * walk:.1f} µm"
@@ -214,8 +204,13 @@ def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotC
     # which of two unequal probes is right is as unknown as how far they are apart
     calibration = [np.hypot(relative_calibration(probes, angle), 0.5 * ratio) for angle in angles]
     polygon = replace(polygon, relative_calibration=np.array(calibration))
-    status = (*_status(fit, polygon, curves), *differ, *_extrapolated(contact.push, curves, len(angles)))
-    return replace(polygon, status=status)
+    # the push lies outside what the dry tests measured in most sweeps
+    outside = [curve for curve in curves if curve.is_extrapolated(contact.push)]
+    lowest = min((curve.valid_from for curve in outside), default=0.0)
+    pads = " of all pads" if len(outside) == len(angles) else _of_pads([curve.pad for curve in outside])
+    detail = f"pushed with {contact.push:.0f} N, the dry tests{pads} hold from {lowest:.0f} N on; the sweep corrects it"
+    extrapolated = holding((outside, "give-extrapolated", detail))
+    return replace(polygon, status=(*_status(fit, polygon, curves), *differ, *extrapolated))
 
 
 def _read_sides(
@@ -223,7 +218,7 @@ def _read_sides(
 ) -> tuple[ContactIntervals, SideFit]:
     """Averages and sides of a sweep whose pivots deflect by so much [m] at most."""
     contact = read_sweep(run, angles, deflection)
-    pads = np.flatnonzero(np.bincount(contact.pad, minlength=len(angles)) >= _FEWEST_BLOCKS)
+    pads = np.flatnonzero(np.bincount(contact.pad) >= _FEWEST_BLOCKS)
     if len(pads) < 3:
         what = f"reaches {len(pads)} of {len(angles)} pads"
         raise refusal(run, "record", what, "Check pad angles and channels")
@@ -268,7 +263,7 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
     )
 
 
-def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple[float, tuple[Condition, ...]]:
+def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple[float, Conditions]:
     """One probe reads more than the other, by which share: sizes do not tell, the angles between the sides do."""
     if len(probes) != 2:
         return 0.0, ()
@@ -281,15 +276,6 @@ def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple
     more = "more" if ratio > 0 else "less"
     detail = f"the sides stand as if {first.name} read {share} {more} than {second.name}; half of it is taken off each"
     return ratio, (Condition("probe-gains-differ", detail),)
-
-
-def _extrapolated(push: float, curves: Sequence[PivotCurve], count: int) -> tuple[Condition, ...]:
-    """The push lies outside what the dry tests measured: true of most sweeps, and to be said."""
-    outside = [c for c in curves if c.is_extrapolated(push)]
-    lowest = min((c.valid_from for c in outside), default=0.0)
-    pads = " of all pads" if len(outside) == count else _of_pads([c.pad for c in outside])
-    detail = f"pushed with {push:.0f} N, the dry tests{pads} hold from {lowest:.0f} N on; the sweep corrects it"
-    return holding((outside, "give-extrapolated", detail))
 
 
 def coldest_first(runs: Sequence[Run]) -> list[Run]:
@@ -306,7 +292,7 @@ def _of_pads(numbers: Sequence[int]) -> str:
     return f" of pads {', '.join(f'#{number}' for number in numbers)}"
 
 
-def _status(fit: SideFit, polygon: ClearancePolygon, curves: Sequence[PivotCurve]) -> tuple[Condition, ...]:
+def _status(fit: SideFit, polygon: ClearancePolygon, curves: Sequence[PivotCurve]) -> Conditions:
     """Named conditions of the sides and of the clearances."""
     others = (fit.pads[untested(curves, fit.pads)] + 1).tolist()
     pads = "" if len(others) == len(fit.pads) else _of_pads(others)

@@ -78,7 +78,15 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
         weights = equal if np.linalg.matrix_rank(design * equal[:, None], 1e-3) == 3 else weights
     gain = _gain(design, weights)
     solution = gain @ distances
-    return Centre(solution[:2], float(solution[2]), gain, *_explanations(design, distances, solution))
+    # of four pads any one may be the one that stands off: what each is off by, and where the centre is then
+    suspects, shifts = np.zeros(len(angles)), np.zeros((len(angles), 3))
+    for pad in range(4) if len(angles) == 4 else ():
+        others = np.delete(np.arange(4), pad)
+        shifts[pad] = np.linalg.solve(design[others], distances[others]) - solution
+        suspects[pad] = distances[pad] - design[pad] @ (solution + shifts[pad])
+    # of pads at right angles two of the four lie along each axis
+    unknown = 0.5 * _AS_DEVIATION**2 * shifts[:, :2].T @ shifts[:, :2]
+    return Centre(solution[:2], solution[2], gain, unknown, suspects)
 
 
 def _gain(design: FloatArray, weights: FloatArray) -> FloatArray:
@@ -86,25 +94,11 @@ def _gain(design: FloatArray, weights: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights))
 
 
-def _explanations(design: FloatArray, distances: FloatArray, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Covariance (2, 2) [m^2] and offsets (n,) [m] of the centres that leave one of four pads off, each another one."""
-    suspects, shifts = np.zeros(len(design)), np.zeros((len(design), 3))
-    for pad in range(len(design)) if len(design) == 4 else ():
-        others = np.delete(np.arange(4), pad)
-        shifts[pad] = np.linalg.solve(design[others], distances[others]) - solution
-        suspects[pad] = distances[pad] - design[pad] @ (solution + shifts[pad])
-    # of pads at right angles two of the four lie along each axis
-    covariance = 0.5 * _AS_DEVIATION**2 * shifts[:, :2].T @ shifts[:, :2]
-    return covariance, suspects
-
-
 def corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:
     """Corners (n, 2) [m] between neighbouring sides: angles (n,) [rad], clearances (n,) [m]."""
-    n = directions(angles)
-    following = np.roll(n, -1, axis=0)
-    systems = np.stack([n, following], axis=1)
-    sides = np.stack([clearances, np.roll(clearances, -1)], axis=1)
-    return np.asarray(np.linalg.solve(systems, sides[..., None])[..., 0])
+    sides = np.column_stack([directions(angles), clearances])
+    pairs = np.stack([sides, np.roll(sides, -1, axis=0)], axis=1)
+    return np.linalg.solve(pairs[..., :2], pairs[..., 2:])[..., 0]
 
 
 def gain_ratio(angles: FloatArray, tilt: FloatArray, tilt_se: FloatArray, axes: Sequence[float]) -> tuple[float, float]:
@@ -189,22 +183,32 @@ def untested(curves: Sequence[PivotCurve], pad: IntArray) -> BoolArray:
 
 def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, curves: Sequence[PivotCurve]) -> SideFit:
     """Fit the sides of the pads (r,) that a sweep reached: angles (n,) [rad] of all pads."""
-    place, foot = _place_along_side(contact, angles, pads)
+    far = np.array([np.quantile(contact.along[contact.pad == k], 0.9) for k in pads])
+    frame = np.column_stack([directions(angles[pads]), np.ones(len(pads))])
+    foot = np.linalg.lstsq(frame, far, rcond=None)[0][:2]
+    place = contact.across - (directions(angles + 0.5 * np.pi) @ foot)[contact.pad]
     usable = np.isin(contact.pad, pads) & _consistent(contact, place)
     used, place = contact.take(usable), place[usable]
-    noise = _noise(used, place)
+    # the noise of the probes as the sweep itself shows it, about smooth sides
+    columns = used.time, used.duration, used.along, _smooth_side(used, place)
+    noise = estimate_noise([NoiseSeries(*(c[used.pad == k] for c in columns)) for k in np.unique(used.pad)])
     r, of_pad = len(pads), (used.pad[:, None] == pads).astype(float)
     full = _pivot_deflection(curves, pads, np.full(r, used.push))
     unknown = untested(curves, pads)
     carried = _pivot_deflection(curves, used.pad, used.load)
     alone = used.touched.sum(axis=1) == 1
-    whitener = _whitener(used, angles, noise, np.hypot(_SLIDING * carried * alone, used.level_error))
+    # all pads share the two probes; by itself each average is as unsure as a sliding shaft and a converter's step
+    normal, same = directions(angles)[used.pad], used.time[:, None] == used.time
+    covariance = (normal @ normal.T) * (noise.white * same / used.duration + noise.slow_covariance(used.time))
+    unsure = (_SLIDING * carried * alone) ** 2 + used.level_error**2
+    covariance += np.diag(1e-9 * np.diag(covariance) + unsure)
+    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
     fits, lag = [], used.lag(angles)
     for error in _LAG_ERRORS:
         late = used.lagging(angles, lag + error)
         late_carried = _pivot_deflection(curves, late.pad, late.load)
-        columns, precision, mean = _pivot_terms(late, of_pad, late_carried, full, unknown)
-        design = np.hstack([of_pad, -of_pad * place[:, None], columns])
+        terms, precision, mean = _pivot_terms(late, of_pad, late_carried, full, unknown)
+        design = np.hstack([of_pad, -of_pad * place[:, None], terms])
         prior = np.r_[np.zeros(r), np.full(r, TILT_SPREAD**-2), precision]
         fits.append(_least_squares(whitener, used.along, design, prior, np.r_[np.zeros(2 * r), mean]))
     beta, covariance, misfit = _mixed(fits)
@@ -213,7 +217,10 @@ def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, cur
     # a shaft that lies in a corner reads one step for long
     distances = covariance[:r, :r] + used.level_error**2 * np.eye(r)
     scale, scale_se = (np.nan, np.nan) if unknown.all() else (float(pivots[-1]), float(errors[-1]))
-    deflection, deflection_se = np.nan_to_num(scale) * full, full * _secant_errors(curves, pads, used.push)
+    deflection, deflection_se = np.nan_to_num(scale) * full, np.zeros(r)
+    for curve in curves:  # of the secant at the push
+        of_curve = pads == curve.pad - 1
+        deflection_se[of_curve] = full[of_curve] * curve.relative_stiffness_se(used.push, secant=True)
     # an error of a curve shifts its side by the share of the deflection that the averages carry on the mean
     mean_carried = of_pad.T @ carried / of_pad.sum(axis=0)
     share = np.divide(mean_carried, full, out=np.zeros(r), where=full > 0)
@@ -223,14 +230,6 @@ def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, cur
     return SideFit(
         pads, foot, distance, distances, tilt, tilt_se, deflection, deflection_se, scale, scale_se, noise, misfit
     )  # fmt: skip
-
-
-def _secant_errors(curves: Sequence[PivotCurve], pads: IntArray, load: float) -> FloatArray:
-    """Relative standard error (r,) of the deflection of pads (r,) at a load [N] by their curves."""
-    errors = np.zeros(len(pads))
-    for curve in curves:
-        errors[pads == curve.pad - 1] = np.sqrt(curve.relative_stiffness_covariance(load, secant=True)[0, 0])
-    return errors
 
 
 def _pivot_terms(
@@ -251,14 +250,6 @@ def _pivot_terms(
     free = of_pad[:, unknown] * carried[:, None] / full[unknown]
     columns = np.column_stack([free, of_pad @ full * bend, of_pad @ ~unknown * carried])
     return columns, np.r_[spread, _SHAPE_SPREAD, _SCALE_SPREAD] ** -2, np.r_[mean, 0.0, 1.0]
-
-
-def _place_along_side(contact: ContactIntervals, angles: FloatArray, pads: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Place (m,) on each side, from the foot of the polygon's centre, and that centre (2,) [m]."""
-    far = np.array([np.quantile(contact.along[contact.pad == k], 0.9) for k in pads])
-    design = np.column_stack([directions(angles[pads]), np.ones(len(pads))])
-    centre = np.linalg.lstsq(design, far, rcond=None)[0][:2]
-    return contact.across - (directions(angles + 0.5 * np.pi) @ centre)[contact.pad], centre
 
 
 def _smooth_side(contact: ContactIntervals, place: FloatArray) -> FloatArray:
@@ -285,25 +276,6 @@ def _consistent(contact: ContactIntervals, place: FloatArray) -> BoolArray:
                 break
         consistent[members] = good
     return consistent
-
-
-def _noise(contact: ContactIntervals, place: FloatArray) -> NoiseModel:
-    """Noise of the probes as the sweep itself shows it, about smooth sides."""
-    columns = contact.time, contact.duration, contact.along, _smooth_side(contact, place)
-    series = [NoiseSeries(*(c[contact.pad == k] for c in columns)) for k in np.unique(contact.pad)]
-    return estimate_noise(series)
-
-
-def _whitener(contact: ContactIntervals, angles: FloatArray, noise: NoiseModel, unsure: FloatArray) -> FloatArray:
-    """Inverse Cholesky factor of the covariance of the averages; all pads share the two probes.
-
-    `unsure` (m,) is a standard deviation of each average by itself [m].
-    """
-    n = directions(angles)[contact.pad]
-    same = contact.time[:, None] == contact.time[None, :]
-    covariance = (n @ n.T) * (noise.white * same / contact.duration + noise.slow_covariance(contact.time))
-    covariance += np.diag(1e-9 * np.diag(covariance) + unsure**2)
-    return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
 def _least_squares(

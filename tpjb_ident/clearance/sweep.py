@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.campaign import Run
@@ -103,9 +103,9 @@ def read_sweep(run: Run, angles: FloatArray, deflection: float) -> ContactInterv
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(time)]
     long = (stops - starts) >= min(_SHORTEST, samples)
     starts, stops = starts[long], stops[long]
-    moment, x, y, *force = piece_means(np.column_stack([time, position, load]), starts, stops).T
-    place, pads_touched = np.column_stack([x, y]), touched[starts]
-    carried = _carried(np.column_stack(force), angles, pads_touched)
+    means = piece_means(np.column_stack([time, position, load]), starts, stops)
+    moment, place, force, pads_touched = means[:, 0], means[:, 1:3], means[:, 3:], touched[starts]
+    carried = _carried(force, angles, pads_touched)
     row, pad = np.nonzero(np.isfinite(carried) & _settled(moment, place, pads_touched)[:, None])
     tangent = directions(angles + 0.5 * np.pi)
     return ContactIntervals(
@@ -115,7 +115,7 @@ def read_sweep(run: Run, angles: FloatArray, deflection: float) -> ContactInterv
         along=np.sum(place[row] * directions(angles)[pad], axis=1),
         across=np.sum(place[row] * tangent[pad], axis=1),
         load=carried[row, pad],
-        force=np.column_stack(force)[row],
+        force=force[row],
         touched=pads_touched[row],
         push=float(np.median(np.hypot(*load.T))),
         level_error=level_error(position),
@@ -174,5 +174,4 @@ def _settled(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArr
     spread = robust_deviation(speed[corner] - ordinary)
     moving = corner & (speed > ordinary + _MOVING * spread)
     # the piece beside a moving one hides a remainder of the way below the noise, and would do so at every corner
-    beside = np.r_[moving[1:], False] | np.r_[False, moving[:-1]]
-    return ~corner | ~(moving | beside)
+    return ~corner | ~binary_dilation(moving)

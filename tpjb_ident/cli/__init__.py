@@ -1,17 +1,24 @@
 """The `tpjb` command. Nothing else imports this package."""
 
+import os
 import sys
 from typing import Any
 
 from tpjb_ident.runtime import interrupts
+from tpjb_ident.runtime.threads import THREAD_VARIABLES
 
 
 def main() -> None:
     """Run the command line; the entry point of `tpjb` and of ``python -m tpjb_ident``."""
     _one_thread_for_small_matrices()
     interrupts.listen()
-    for stream in (sys.stdout, sys.stderr):
-        _never_refuse(stream)
+    streams: list[Any] = [sys.stdout, sys.stderr]
+    for stream in streams:
+        if hasattr(stream, "reconfigure"):  # else there is none at all (pythonw), or it is a caller's own
+            utf8 = "utf" in (stream.encoding or "").lower()
+            # a terminal or a pipe that has no µ or ± shows a question mark: no result is lost to a sign. UTF-8 lacks
+            # only what stands for a file name's broken bytes; written as an escape, that is valid JSON too
+            stream.reconfigure(errors="backslashreplace" if utf8 else "replace")
     try:
         from tpjb_ident.cli.commands.app import app
 
@@ -35,19 +42,6 @@ def _one_thread_for_small_matrices() -> None:
     Matrices here have a few hundred rows: threads wait for each other more than they help (a diagnosis took 53 s
     instead of 22 s), and the last bits of a result depend on their number.
     """
-    import os
-
-    from tpjb_ident.runtime.threads import THREAD_VARIABLES
-
     if "numpy" not in sys.modules:
         for name in THREAD_VARIABLES:
             os.environ.setdefault(name, "1")
-
-
-def _never_refuse(stream: Any) -> None:
-    """Let a terminal or a pipe that has no µ or ± show a question mark: no result is lost to a sign."""
-    if not hasattr(stream, "reconfigure"):  # none at all (pythonw), or a caller's own
-        return
-    utf8 = "utf" in (stream.encoding or "").lower()
-    # UTF-8 lacks only what stands for a file name's broken bytes; written as an escape, that is valid JSON too
-    stream.reconfigure(errors="backslashreplace" if utf8 else "replace")

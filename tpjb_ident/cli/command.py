@@ -225,7 +225,7 @@ class Command(Terminal):
     ) -> None:
         text = f"{category.__name__}: {message} ({filename}:{lineno})"
         if _ARITHMETIC.search(str(message)):
-            self.arithmetic.setdefault(text, None)
+            self.arithmetic[text] = None
         else:
             self.warn(text)
 
@@ -276,7 +276,12 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
             c = Command(name, recorded, out, as_json or quiet)
             exit_code = c.run(function, options)
             if as_json:
-                _print_document(c.document(exit_code))
+                from tpjb_ident.presentation import json_data
+
+                # escapes where standard output is not UTF-8, which every program that reads JSON expects
+                ascii_only = "utf" not in (sys.stdout.encoding or "").lower()
+                document = json_data(c.document(exit_code))
+                typer.echo(json.dumps(document, indent=1, ensure_ascii=ascii_only, allow_nan=False))
             if exit_code:
                 raise typer.Exit(exit_code)
 
@@ -294,14 +299,6 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
         return run
 
     return decorate
-
-
-def _print_document(document: Mapping[str, Any]) -> None:
-    from tpjb_ident.presentation import json_data
-
-    # escapes where standard output is not UTF-8, which every program that reads JSON expects
-    ascii_only = "utf" not in (sys.stdout.encoding or "").lower()
-    typer.echo(json.dumps(json_data(document), indent=1, ensure_ascii=ascii_only, allow_nan=False))
 
 
 def _end_of(error: BaseException) -> tuple[int, str, str]:

@@ -110,24 +110,19 @@ def show_identification(c: Command, result: Identification) -> None:
     flagged = sum(bool(quality) and not untrusted(quality) for quality in qualities)
     flags = f", {flagged} with flags" if flagged else ""
     c.print(f"{result.campaign}: {counted(_counted_places(result), 'operating point')}, {trust}{flags}.")
-    if "coefficients" in c.frames:
-        _show_coefficients(c, f"{result.campaign}: {result.method}, 95 % intervals", c.frames["coefficients"])
+    frame = c.frames.get("coefficients")
+    if frame is not None and len(frame):
+        point = f"{POINT} rotation" if "clockwise" in set(frame["rotation"]) else POINT
+        title = f"{result.campaign}: {result.method}, 95 % intervals"
+        c.show_frame(title, frame, f"{point} {DIRECT} outlier_fraction quality", "coefficients.csv")
+        title = "cross-coupled, where they are more than a tenth of the direct ones"
+        c.show_frame(title, frame[cross_coupling_matters(frame)], f"{point} {_CROSS}", "coefficients.csv")
     for name, over in (("frequency_fits", "frequency"), ("frf_models", "the band")):
         if name in c.frames:
             title = f"models over {over}, 95 % intervals; raw H: none, use frf.csv or the coefficients"
             c.show_frame(title, c.frames[name], _MODELS, f"{name}.csv")
     for k, remark in enumerate(result.remarks()):
         c.print(f"note: {remark}" if k < len(result.conditions) else f"flag: {remark}")
-
-
-def _show_coefficients(c: Command, title: str, frame: pd.DataFrame) -> None:
-    """Print K and C of every point with half the width of their intervals, and its flags."""
-    if frame.empty:
-        return
-    point = f"{POINT} rotation" if "clockwise" in set(frame["rotation"]) else POINT
-    c.show_frame(title, frame, f"{point} {DIRECT} outlier_fraction quality", "coefficients.csv")
-    title = "cross-coupled, where they are more than a tenth of the direct ones"
-    c.show_frame(title, frame[cross_coupling_matters(frame)], f"{point} {_CROSS}", "coefficients.csv")
 
 
 def cross_coupling_matters(frame: pd.DataFrame) -> BoolArray:

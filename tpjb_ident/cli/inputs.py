@@ -112,9 +112,10 @@ def operating_points(
     directions = parse_values(load_direction, "angle", "--load-direction")
     speeds = parse_values(speed, "speed", "--speed", is_positive=True)
     frequencies = parse_values(excitation, "speed", "--excitation", is_positive=True) if excitation else (0.0,)
-    if len(loads) * len(directions) * len(speeds) * len(frequencies) > MAX_VALUES:
+    axes = loads, directions, speeds, frequencies
+    if math.prod(map(len, axes)) > MAX_VALUES:
         raise BadInputError(f"more than {MAX_VALUES} operating points. Take larger steps.")
-    return [OperatingPoint(*point, rotation) for point in itertools.product(loads, directions, speeds, frequencies)]
+    return [OperatingPoint(*point, rotation) for point in itertools.product(*axes)]
 
 
 def rotation_choice(c: Command, bearing: Bearing) -> str:

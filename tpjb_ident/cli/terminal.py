@@ -116,11 +116,18 @@ class Terminal:
         self.tables.append({"title": title, "columns": headings, "rows": texts})
         if self._silent:
             return
-        shown = texts[:MOST_ROWS] if file else texts
-        lines = _titled_table(printable(title), columns, headings, shown)
+        shown, title = texts[:MOST_ROWS] if file else texts, printable(title)
+        varying = list(range(len(columns)))
+        if len(shown) > 1 and _total(_sizes([headings, *shown])) > _width():  # constant numbers go to the title
+            varying = [i for i, column in enumerate(columns) if column.words or len({row[i] for row in shown}) > 1]
+            constant = [i for i in range(len(columns)) if i not in varying and shown[0][i].strip(" -")]
+            title = "; ".join([title, *(readable(columns[i].with_unit(shown[0][i].strip())) for i in constant)])
+        names, *body = [[row[i] for i in varying] for row in [headings, *shown]]
+        words = [k for k, i in enumerate(varying) if columns[i].words]
+        lines = ["", *wrapped(title, _width()), *table_lines(names, body, words, _width()), ""]
         if len(shown) < len(texts):
             lines.append(f"{len(texts) - len(shown)} more rows: {file} has all {len(texts)}")
-        print("\n".join(["", *lines]), flush=True)
+        print("\n".join(lines), flush=True)
 
     def show_frame(self, title: str, frame: pd.DataFrame, names: str, file: str = "") -> None:
         """Print columns of a table on disk, by the names in a text; what has an interval with half of it."""
@@ -137,10 +144,10 @@ class Terminal:
         if cells:
             self.show(title, columns, zip(*cells, strict=True), file)
 
-    def show_table(self, table: Table, name: str = "") -> None:
+    def show_table(self, table: Table, name: str) -> None:
         """Print a table of a page; `name` says what it is of."""
         columns = [Column(title, words=i in table.text_columns) for i, title in enumerate(table.columns)]
-        self.show(": ".join(filter(None, (name, table.caption))), columns, table.rows)
+        self.show(f"{name}: {table.caption}", columns, table.rows)
 
     @contextlib.contextmanager
     def conclusion(self, sentences: Sequence[str]) -> Iterator[None]:
@@ -233,18 +240,6 @@ def cell_len(text: str) -> int:
 def wrapped(text: str, width: int) -> list[str]:
     """Break a sentence at spaces; words that are longer than a line, as paths are, stay whole."""
     return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False) or [""]
-
-
-def _titled_table(title: str, columns: list[Column], headings: list[str], rows: list[list[str]]) -> list[str]:
-    """Lines of a title and its table; of one that is too wide, columns of one and the same number go to the title."""
-    varying = list(range(len(columns)))
-    if len(rows) > 1 and _total(_sizes([headings, *rows])) > _width():
-        varying = [i for i, column in enumerate(columns) if column.words or len({row[i] for row in rows}) > 1]
-        constant = [i for i in range(len(columns)) if i not in varying and rows[0][i].strip(" -")]
-        title = "; ".join([title, *(readable(columns[i].with_unit(rows[0][i].strip())) for i in constant)])
-    names, *cells = [[row[i] for i in varying] for row in [headings, *rows]]
-    words = [k for k, i in enumerate(varying) if columns[i].words]
-    return [*wrapped(title, _width()), *table_lines(names, cells, words, _width()), ""]
 
 
 def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int) -> list[str]:

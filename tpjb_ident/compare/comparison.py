@@ -10,7 +10,6 @@ import pandas as pd
 
 from model.bearing import Bearing
 from model.effects import Effect
-from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.clearance.locus import Locus
@@ -307,19 +306,3 @@ def _loci(static: StaticTests, predictions: Predictions) -> pd.DataFrame | None:
     table = pd.concat(frames, ignore_index=True)
     table.insert(0, "pivots", np.repeat(list(predictions), len(measured)))
     return table
-
-
-def predicted_loci(loci: pd.DataFrame | None) -> dict[str, FloatArray]:
-    """Predicted positions (n, 2) [m] by pivot model."""
-    if loci is None:
-        return {}
-    models = loci.groupby("pivots", sort=False)[["x_m_predicted", "y_m_predicted"]]
-    return {str(name): rows.to_numpy() for name, rows in models}
-
-
-def locus_distances(loci: pd.DataFrame | None) -> dict[Any, float]:
-    """Root mean square distance between measured and predicted locus by pivot model [m]; empty without locus runs."""
-    if loci is None:
-        return {}
-    squares = (loci["x_m_predicted"] - loci["x_m"]) ** 2 + (loci["y_m_predicted"] - loci["y_m"]) ** 2
-    return dict(np.sqrt(squares.groupby(loci["pivots"], sort=False).mean()))

@@ -215,29 +215,23 @@ def _pivots(a: Side, b: Side) -> pd.DataFrame:
     for table in (a.pivots, b.pivots):
         sound = ~table["extrapolated"].astype(bool) & table["contact_complete"].astype(bool)
         curves.append(dict(iter(table[sound].groupby("pad"))))
-    pairs = [_at_common_loads(curves[0][pad], curves[1][pad]) for pad in curves[0] if pad in curves[1]]
-    if not pairs:
+    frames: list[list[pd.DataFrame]] = [[], []]
+    for pad in filter(curves[1].__contains__, curves[0]):
+        pair = [side[pad] for side in curves]
+        low, high = max(curve["force_N"].min() for curve in pair), min(curve["force_N"].max() for curve in pair)
+        force = np.linspace(low, high, _PIVOT_LOADS if low < high else 0)
+        for curve, tables in zip(pair, frames, strict=True):
+            scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve else 0.0
+            columns = {TANGENT + end: np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS}
+            columns["systematic"] = scale * columns[TANGENT]
+            tables.append(pd.DataFrame({"force_N": force, "pad": pad, **columns}))
+    if not frames[0]:
         return pd.DataFrame()
-    left, right = (pd.concat(frames, ignore_index=True) for frames in zip(*pairs, strict=True))
+    left, right = (pd.concat(tables, ignore_index=True) for tables in frames)
     before, after = left["systematic"], right["systematic"]
     systematic = (after - before) ** 2 if same else before**2 + after**2
     judged = _judged(TANGENT, (left, right), systematic, _NO_CHANGE * left[TANGENT], len(left))
     return pd.DataFrame({"pad": left["pad"], "force_N": left["force_N"], **judged})
-
-
-def _at_common_loads(*curves: pd.DataFrame) -> list[pd.DataFrame]:
-    """Curves of one pad at loads at which both were measured."""
-    low = max(curve["force_N"].min() for curve in curves)
-    high = min(curve["force_N"].max() for curve in curves)
-    force = np.linspace(low, high, _PIVOT_LOADS if low < high else 0)
-    frames = []
-    for curve in curves:
-        frame = pd.DataFrame({"force_N": force}).assign(pad=curve["pad"].iloc[0])
-        for name in (TANGENT + end for end in _ENDS):
-            frame[name] = np.interp(force, curve["force_N"], curve[name])
-        scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve else 0.0
-        frames.append(frame.assign(systematic=scale * frame[TANGENT]))
-    return frames
 
 
 def _clearance(a: Side, b: Side) -> pd.DataFrame:
@@ -255,29 +249,29 @@ def _clearance(a: Side, b: Side) -> pd.DataFrame:
     return pd.DataFrame({"pad": pads["pad"], **judged})
 
 
-def shown(row: Mapping[Any, Any], name: str, scale: float, side: str = "difference") -> str:
-    """A difference, or one side's value, with its interval, for a table or a sentence."""
-    value, low, high = (row[f"{name}_{side}{end}"] for end in _ENDS)
+def _shown(row: Mapping[Any, Any], name: str, scale: float) -> str:
+    """A difference with its interval, for a sentence."""
+    value, low, high = (row[f"{name}_difference{end}"] for end in _ENDS)
     return with_interval(value, low, high, scale)
 
 
 def difference_sentences(difference: Difference) -> tuple[str, ...]:
     """Say what changed from A to B, the answer first."""
-    a, b, points = difference.a.name, difference.b.name, difference.points
+    a, b, points = difference.a, difference.b, difference.points
     judged = points.filter(like="_changed").to_numpy()
     number, yes, no = judged.size, (judged == "yes").sum(), (judged == "no").sum()
-    if not number:
-        sentences = _sentences_beside(difference)
-        is_static = difference.a.coefficients.empty and difference.b.coefficients.empty
-        return sentences if is_static else (f"{a} and {b} have no operating point in common.", *sentences)
-    head = f"From {a} to {b} {yes} of {number} coefficients changed beyond what both intervals allow"
-    rest = f"{no} coefficients are the same within {100 * _NO_CHANGE:g} %"
-    rest += f", of {number - yes - no} the records cannot tell." if number > yes + no else "."
-    return (
-        f"{head}, most of all {_largest_change(points)}." if yes else f"{head}.",
-        f"At {counted(len(points), 'common operating point')}: {rest}",
-        *_sentences_beside(difference),
-    )
+    sentences = []
+    if number:
+        most = f", most of all {_largest_change(points)}" if yes else ""
+        sentences.append(
+            f"From {a.name} to {b.name} {yes} of {number} coefficients changed beyond what both intervals allow{most}."
+        )
+        unsure = f", of {number - yes - no} the records cannot tell" if number > yes + no else ""
+        same = f"{no} coefficients are the same within {100 * _NO_CHANGE:g} %"
+        sentences.append(f"At {counted(len(points), 'common operating point')}: {same}{unsure}.")
+    elif not (a.coefficients.empty and b.coefficients.empty):
+        sentences.append(f"{a.name} and {b.name} have no operating point in common.")
+    return (*sentences, *_sentences_beside(difference))
 
 
 def _largest_change(points: pd.DataFrame) -> str:
@@ -290,7 +284,7 @@ def _largest_change(points: pd.DataFrame) -> str:
     number, index = np.unravel_index(np.nanargmax(sizes), sizes.shape)
     name, row = COEFFICIENT_COLUMNS[index], points.iloc[number].to_dict()
     kind = KINDS[name[0]]
-    size = f"{shown(row, name, kind.display_scale)} {kind.display_unit}"
+    size = f"{_shown(row, name, kind.display_scale)} {kind.display_unit}"
     place = place_of(row["static_load_N"], row["excitation_Hz"])
     return f"{name[:3]} at {place}: {percent(shares[name][number])} of the mean direct coefficient ({size})"
 
@@ -316,7 +310,7 @@ def _sentences_beside(difference: Difference) -> tuple[str, ...]:
         for pad, rows in changed.groupby("pad"):
             row = rows.iloc[-1].to_dict()
             at = f" at {amount(row['force_N'], 'load', '.3g')}" if "force_N" in frame else ""
-            parts.append(f"pad #{pad:g} by {shown(row, name, size(quantity))} {symbol(quantity)}{at}")
+            parts.append(f"pad #{pad:g} by {_shown(row, name, size(quantity))} {symbol(quantity)}{at}")
         sentences.append(
             f"{words} changed: {'; '.join(parts)}." if parts else f"{words}: no pad changed beyond its interval."
         )

@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from model.effects import EffectKind, EffectWords, Parameter, known_effects
+from model.effects import EffectWords, Parameter, known_effects
 from tpjb_ident.columns import UNITS
 from tpjb_ident.rounding import fixed, plain, with_interval
 
@@ -86,17 +86,12 @@ def words_of(name: str) -> EffectWords | None:
 
 def finding(name: str, parameters: Mapping[str, Estimate]) -> str:
     """Say what was found, in one clause with its size; an effect without words by its name."""
-    words = words_of(name)
-    if words is not None:
-        return words.finding.format(**_fields(known_effects()[name], parameters))
-    sizes = ", ".join(f"{key.replace('_', ' ')} {amount(value)}" for key, value in parameters.items())
-    return f"{name.replace('_', ' ')}: {sizes}"
-
-
-def _fields(kind: EffectKind, parameters: Mapping[str, Estimate]) -> dict[str, _Field | str]:
-    """Fields of a finding by name; a parameter that each pad has is listed pad by pad."""
+    kind, words = known_effects().get(name), words_of(name)
+    if kind is None or words is None:
+        sizes = ", ".join(f"{key.replace('_', ' ')} {amount(value)}" for key, value in parameters.items())
+        return f"{name.replace('_', ' ')}: {sizes}"
     fields: dict[str, _Field | str] = {p.name: _Field(parameters[p.name], p) for p in kind.parameters}
-    if kind.per_pad is not None:
+    if kind.per_pad is not None:  # a parameter that each pad has is listed pad by pad
         pads = {key.rpartition("_")[2]: amount(value) for key, value in parameters.items() if key not in fields}
         fields[kind.per_pad.name] = ", ".join(f"#{pad} {size}" for pad, size in pads.items())
-    return fields
+    return words.finding.format(**fields)

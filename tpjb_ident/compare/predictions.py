@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -50,15 +51,15 @@ def counts_from_measured(path: Path | None) -> bool:
     return entries.get("counted_from") == "measured pivots"
 
 
-def refuse_counted_twice(pivots: Any, effects: Sequence[Effect], path: Path | None) -> None:
+def refuse_counted_twice(pivots: Any, effects: Sequence[Effect], path: Path) -> None:
     """Refuse measured pivots together with effects that count from the printed formula."""
     twice = counted_twice(effects)
-    if not (isinstance(pivots, Path) or pivots == "measured") or not twice or counts_from_measured(path):
-        return
-    raise BadInputError(
-        f"--effects {path.name if path else ''}: {', '.join(twice)} would count twice: measured pivots give way as far "
-        "as they do already. Use --pivots kirk with these effects, or take them out of the file with measured pivots."
-    )
+    is_measured = isinstance(pivots, Path) or pivots == "measured"
+    if is_measured and twice and not counts_from_measured(path):
+        raise BadInputError(
+            f"--effects {path.name}: {', '.join(twice)} would count twice: measured pivots give way as far as they do "
+            "already. Use --pivots kirk with these effects, or take them out of the file with measured pivots."
+        )
 
 
 #: Called with what is being done, how many are done, of how many.
@@ -82,22 +83,20 @@ def predict_points(
     progress: Progress | None = None,
 ) -> list[dict[str, Any]]:
     """Predict every operating point: rows of ``prediction.csv``, and whether a pivot is pressed beyond its dry test."""
-    wanted = tuple(points)
-    bearing = as_it_turns(bearing, {point.rotation for point in wanted})
-    groups: dict[OperatingPoint, list[float]] = {}
-    for point in wanted:
-        frequencies = groups.setdefault(_static(point), [])
-        if _excitation(point) not in frequencies:
-            frequencies.append(_excitation(point))
-    found = {}
+    excited = list(map(_excited, points))
+    bearing = as_it_turns(bearing, {point.rotation for point in excited})
+    groups = defaultdict(list)
+    for point in dict.fromkeys(excited):
+        groups[replace(point, excitation=0.0)].append(point)
+    rows: dict[OperatingPoint, dict[str, Any]] = {}
     before = None
-    for done, (static, frequencies) in enumerate(sorted(groups.items())):
+    for done, (static, group) in enumerate(sorted(groups.items()), start=1):
         prediction = predict(
             bearing,
             static.static_load,
             static.static_load_direction,
             static.shaft_speed,
-            np.array(frequencies),
+            np.array([point.excitation for point in group]),
             pivots=settings.pivots,
             thermal=settings.thermal,
             effects=settings.effects,
@@ -106,24 +105,20 @@ def predict_points(
             rotation=static.rotation,
         )
         before = prediction if prediction.converged else None
-        found[static] = prediction
+        rows |= {point: _row(point, prediction, index) for index, point in enumerate(group)}
         if progress is not None:
-            progress(f"{static.static_load / 1e3:g} kN", done + 1, len(groups))
-    return [_row(p, found[_static(p)], groups[_static(p)].index(_excitation(p))) for p in wanted]
+            progress(f"{static.static_load / 1e3:g} kN", done, len(groups))
+    return [rows[point] for point in excited]
 
 
-def _excitation(point: OperatingPoint) -> float:
-    return point.excitation if point.excitation > 0 else point.shaft_speed
-
-
-def _static(point: OperatingPoint) -> OperatingPoint:
-    return replace(point, excitation=0.0)
+def _excited(point: OperatingPoint) -> OperatingPoint:
+    """The point, excited at the running speed where it states no excitation."""
+    return point if point.excitation > 0 else replace(point, excitation=point.shaft_speed)
 
 
 def point_columns(point: OperatingPoint) -> dict[str, float | str]:
     """Key columns of every table over operating points (outputs.md)."""
-    excited = replace(point, excitation=_excitation(point))
-    return dict(zip(POINT_KEY, excited.key, strict=True))
+    return dict(zip(POINT_KEY, _excited(point).key, strict=True))
 
 
 def _row(point: OperatingPoint, p: Prediction, index: int) -> dict[str, Any]:
@@ -153,7 +148,7 @@ def _row(point: OperatingPoint, p: Prediction, index: int) -> dict[str, Any]:
 
 def _pad_columns(p: Prediction, number: int) -> dict[str, float]:
     i, pad = number - 1, f"pad{number}"
-    idle, flow = number in p.idle_pads, p.pad_flow[number - 1]
+    idle, flow = number in p.idle_pads, p.pad_flow[i]
     return {
         f"{pad}_load_N": p.pad_load[i],
         f"{pad}_tilt_rad": p.tilt[i],

@@ -11,13 +11,13 @@ import numpy as np
 from model.bearing import Bearing
 from rigdata.campaign import Campaign
 from rigdata.problem import Problem, RigDataError
-from rigdata.run import Run
 from tpjb_ident.clearance.locus import Locus, measure_locus
-from tpjb_ident.clearance.measure import ClearancePolygon, measure_run, measure_sweeps
+from tpjb_ident.clearance.measure import ClearancePolygon, coldest_first, measure_run
 from tpjb_ident.clearance.polygon import SIDES
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.fit import fit_pivots
+from tpjb_ident.pivot.refusals import usable_runs
 
 #: Measured over drawn clearance beyond which the probes' scale is wrong, or the bearing file is another bearing's.
 _SCALE = (0.5, 2.0)
@@ -30,7 +30,7 @@ class StaticTests:
     curves: tuple[PivotCurve, ...]
     clearance: ClearancePolygon | None
     locus: Locus | None
-    left_out: tuple[Condition, ...] = ()
+    left_out: Conditions = ()
     other_sweeps: tuple[ClearancePolygon, ...] = ()  #: where all of them are measured
 
 
@@ -39,11 +39,11 @@ def measure_static(
 ) -> StaticTests:
     """Measure what the campaign holds of pivot curves, clearance polygon (of the coldest sweep) and locus."""
     angles = [pad.pivot_angle for pad in bearing.pads]
-    curves: tuple[PivotCurve, ...] = ()
-    if with_pivots and campaign.of_kind("dry_pivot"):
-        curves = fit_pivots(campaign, angles, on_refusal="few")
-    most = None if every_sweep else 1
-    polygons, excluded = measure_sweeps(campaign.of_kind("clearance"), angles, curves, most)
+    has_pivots = with_pivots and campaign.of_kind("dry_pivot")
+    curves = fit_pivots(campaign, angles, on_refusal="few") if has_pivots else ()
+    sweeps, most = coldest_first(campaign.of_kind("clearance")), None if every_sweep else 1
+    polygons, problems = usable_runs(sweeps, lambda run: measure_run(run, angles, curves), most)
+    excluded = [Condition("runs-refused", f"{problem.run} ({problem})") for problem in problems]
     clearance = polygons[0] if polygons else None
     locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
     excluded += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]
@@ -58,30 +58,28 @@ def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Prob
             fault = f"loads pad #{run.pad}, the bearing has {len(bearing.pads)}"
             problems.append(Problem("error", run.file, "pad", fault, "Correct pad in the manifest", run.id))
     refused = {problem.run for problem in former if problem.severity == "error"}
-    for run in campaign.of_kind("clearance"):
-        problems += [] if run.id in refused else _of_sweep(run, bearing, not any(SIDES in p.what for p in former))
-    return problems
-
-
-def _of_sweep(run: Run, bearing: Bearing, tells_gains: bool) -> list[Problem]:
-    try:
-        polygon = measure_run(run, [pad.pivot_angle for pad in bearing.pads])
-    except RigDataError as error:
-        return [Problem("warning", p.file, p.place, p.what, p.cure, run.id) for p in error.problems]
-    names = " and ".join(channel.name for channel in run.of("displacement"))
+    tells_gains = not any(SIDES in problem.what for problem in former)
     drawn = np.mean([pad.assembled_clearance for pad in bearing.pads])
-    measured = np.nanmean(polygon.clearance)
-    problems = []
-    for condition in polygon.status:
-        if condition == "probe-gains-differ" and tells_gains:
-            cure = "Check the sensitivities of both probes"
-            problems.append(Problem("warning", run.file, f"channels {names}", condition.detail, cure, run.id))
-    negative = polygon.negative_preloads([pad.pad_clearance for pad in bearing.pads])
-    if negative:
-        cure = "Check pad_clearance, and how these pads are seated: unloaded, they flutter"
-        problems.append(Problem("warning", run.file, "preload", negative, cure, run.id))
-    if not _SCALE[0] * drawn < measured < _SCALE[1] * drawn:
-        what = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
-        cure = "Check the sensitivities of the probes, and whether it is this bearing's file"
-        problems.append(Problem("error", run.file, f"channels {names}", what, cure, run.id))
+    for run in campaign.of_kind("clearance"):
+        if run.id in refused:
+            continue
+        try:
+            polygon = measure_run(run, [pad.pivot_angle for pad in bearing.pads])
+        except RigDataError as error:
+            problems += [Problem("warning", p.file, p.place, p.what, p.cure, run.id) for p in error.problems]
+            continue
+        channels = f"channels {' and '.join(channel.name for channel in run.of('displacement'))}"
+        measured = np.nanmean(polygon.clearance)
+        for condition in polygon.status:
+            if condition == "probe-gains-differ" and tells_gains:
+                cure = "Check the sensitivities of both probes"
+                problems.append(Problem("warning", run.file, channels, condition.detail, cure, run.id))
+        negative = polygon.negative_preloads([pad.pad_clearance for pad in bearing.pads])
+        if negative:
+            cure = "Check pad_clearance, and how these pads are seated: unloaded, they flutter"
+            problems.append(Problem("warning", run.file, "preload", negative, cure, run.id))
+        if not _SCALE[0] * drawn < measured < _SCALE[1] * drawn:
+            what = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
+            cure = "Check the sensitivities of the probes, and whether it is this bearing's file"
+            problems.append(Problem("error", run.file, channels, what, cure, run.id))
     return problems

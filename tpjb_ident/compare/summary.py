@@ -8,7 +8,7 @@ import pandas as pd
 
 from model.effects import kind_of
 from tpjb_ident.columns import amount, size, symbol
-from tpjb_ident.compare.comparison import Comparison, locus_distances
+from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.compare.effect_words import Estimate, finding
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.rounding import percent, signed
@@ -128,7 +128,15 @@ def summary_sentences(comparison: Comparison) -> tuple[str, ...]:
         found = found.drop(index=best.name)
     sentences += [f"With {_in_words(name)}: {_medians(row)}." for name, row in found.iterrows()]
     sentences += _pivot_sentence(comparison) + _extrapolation_sentence(comparison)
-    sentences += _clearance_sentence(comparison) + _locus_sentence(comparison)
+    sentences += _clearance_sentence(comparison)
+    loci = comparison.loci
+    if loci is not None:
+        squares = (loci["x_m_predicted"] - loci["x_m"]) ** 2 + (loci["y_m_predicted"] - loci["y_m"]) ** 2
+        distances = []
+        for name, distance in np.sqrt(squares.groupby(loci["pivots"], sort=False).mean()).items():
+            distances.append(f"{amount(distance, 'length', '.2g')} with {name.replace('kirk', 'Kirk')} pivots")
+        head = "The predicted shaft centre locus is off the measured one by (root mean square)"
+        sentences.append(f"{head} {', '.join(distances)}.")
     return (*sentences, *comparison.remarks)
 
 
@@ -186,11 +194,3 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
         f"The measured clearance differs from the drawing by {worst} {unit} at pad #{pad + 1}, where it differs most "
         f"(median of all pads {median} {unit}).",
     ]
-
-
-def _locus_sentence(comparison: Comparison) -> list[str]:
-    parts = []
-    for name, distance in locus_distances(comparison.loci).items():
-        parts.append(f"{amount(distance, 'length', '.2g')} with {name.replace('kirk', 'Kirk')} pivots")
-    head = "The predicted shaft centre locus is off the measured one by (root mean square)"
-    return [f"{head} {', '.join(parts)}."] if parts else []

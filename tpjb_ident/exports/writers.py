@@ -53,12 +53,10 @@ _TEMPLATES = jinja2.Environment(
 def _coefficient_table(points: pd.DataFrame) -> pd.DataFrame:
     """The table as it leaves: speed in rpm, frequency in rad/s."""
     intervals = [name + end for name in COLUMNS.values() for end in ENDS]
-    rates = {
-        "shaft_speed_rpm": 60 * points["shaft_speed_Hz"],
-        "frequency_rad_per_s": 2 * np.pi * points["excitation_Hz"],
-    }
     place = ["static_load_N", "static_load_direction_deg", "shaft_speed_rpm", "rotation", "frequency_rad_per_s"]
-    return points.assign(**rates)[[*place, *intervals, "quality", "trusted"]]
+    speed, frequency = 60 * points["shaft_speed_Hz"], _HZ * points["excitation_Hz"]
+    rates = points.assign(shaft_speed_rpm=speed, frequency_rad_per_s=frequency)
+    return rates[[*place, *intervals, "quality", "trusted"]]
 
 
 def write_csv(folder: Path, points: pd.DataFrame, source: str, name: str = NAME) -> None:
@@ -130,32 +128,25 @@ def write_mat(folder: Path, points: pd.DataFrame, source: str) -> None:
     """
     from scipy.io import savemat
 
-    members = [_struct(rows) for _, rows in points.groupby(list(STATIC_KEY))]
+    members = []
+    for (load, direction, speed, rotation), rows in points.groupby(list(STATIC_KEY)):
+        member = {
+            "load_N": load,
+            "direction_deg": direction,
+            "speed_Hz": speed,
+            "frequency_rad_per_s": _HZ * rows["excitation_Hz"].to_numpy(),
+        }
+        for name in _MATRICES:
+            columns = [column + name[1:] for column in KINDS[name[0].lower()].columns]
+            member[name] = rows[columns].to_numpy().T.reshape(2, 2, -1)
+        member["quality"] = np.array([printable(text) for text in rows["quality"]], dtype=object)
+        members.append(member | {"trusted": rows["trusted"].to_numpy(), "rotation": rotation})
     array = np.array([tuple(member.values()) for member in members], dtype=[(name, object) for name in members[0]])
     content = {"bearing": array, "source": printable(source)}
     file = io.BytesIO()
     savemat(file, content, oned_as="column", appendmat=False)
     timeless = _MAT_HEAD + file.getvalue()[len(_MAT_HEAD) :]
     write_atomic(folder / f"{NAME}.mat", lambda part: part.write_bytes(timeless))
-
-
-def _struct(rows: pd.DataFrame) -> dict[str, Any]:
-    """Fields of one static point, for MATLAB."""
-    load, direction, speed, rotation = rows[list(STATIC_KEY)].iloc[0]
-    matrices = {}
-    for name in _MATRICES:
-        columns = [column + name[1:] for column in KINDS[name[0].lower()].columns]
-        matrices[name] = rows[columns].to_numpy().T.reshape(2, 2, -1)
-    return {
-        "load_N": load,
-        "direction_deg": direction,
-        "speed_Hz": speed,
-        "frequency_rad_per_s": 2 * np.pi * rows["excitation_Hz"].to_numpy(),
-        **matrices,
-        "quality": np.array([printable(text) for text in rows["quality"]], dtype=object),
-        "trusted": rows["trusted"].to_numpy(),
-        "rotation": rotation,
-    }
 
 
 @dataclass(frozen=True, repr=False)
@@ -167,7 +158,7 @@ class Grid:
     @functools.cached_property
     def speed(self) -> FloatArray:
         """(n,) [Hz]."""
-        return np.asarray(self.rows["shaft_speed_Hz"].unique())
+        return self.rows["shaft_speed_Hz"].unique()
 
     @functools.cached_property
     def excitation(self) -> FloatArray:

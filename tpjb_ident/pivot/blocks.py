@@ -153,7 +153,17 @@ def cut_blocks(time: FloatArray, vectors: FloatArray, holds: tuple[Hold, ...], l
     span = time[-1] - time[0]
     period = span / max(len(time) - 1, 1)
     length *= math.ceil(max(span / MOST_BLOCKS, _FEWEST_SAMPLES * period) / length - 1e-6)
-    edges, number = _edges(time, holds, length)
+    bounds = np.r_[time[0], np.ravel([hold[:2] for hold in holds]), time[-1]]
+    pieces: list[tuple[float, float, int]] = []  # start, stop and number of the hold
+    for k, (start, stop) in enumerate(itertools.pairwise(bounds)):
+        if stop - start >= 0.4 * length:
+            count, piece = int((stop - start) / length + 1e-6), length
+            if k % 2 and count < 4:  # the rest of a short hold is too much to lose
+                count = max(1, round((stop - start) / length))
+                piece = (stop - start) / count
+            pieces += [(start + i * piece, start + (i + 1) * piece, k // 2 if k % 2 else -1) for i in range(count)]
+    table = np.array(pieces).reshape(-1, 3)
+    edges, number = table[:, :2], table[:, 2].astype(int)
     first, last = np.searchsorted(time, edges.T - 0.5 * period)
     # a piece that lost most of its samples to a glitch or a gap would carry a false weight
     whole = last - first >= np.maximum(_FEWEST_SAMPLES, 0.5 * np.diff(edges)[:, 0] / period)
@@ -165,21 +175,6 @@ def cut_blocks(time: FloatArray, vectors: FloatArray, holds: tuple[Hold, ...], l
     spread, rate = white_noise(vectors[:, 0]) / np.sqrt(count), np.where(number >= 0, 0.0, rate)
     branch = _directions(np.where(number >= 0, levels[number], load))
     return Blocks(moment, count * period, load, across_load, deflection, across, spread, rate, number, branch)
-
-
-def _edges(time: FloatArray, holds: tuple[Hold, ...], length: float) -> tuple[FloatArray, IntArray]:
-    """Start and stop of every piece (m, 2) [s] and its hold number (m,)."""
-    bounds = np.r_[time[0], np.ravel([hold[:2] for hold in holds]), time[-1]]
-    pieces = []
-    for k, (start, stop) in enumerate(itertools.pairwise(bounds)):
-        if stop - start >= 0.4 * length:
-            count, piece = int((stop - start) / length + 1e-6), length
-            if k % 2 and count < 4:  # the rest of a short hold is too much to lose
-                count = max(1, round((stop - start) / length))
-                piece = (stop - start) / count
-            pieces += [(start + i * piece, start + (i + 1) * piece, k // 2 if k % 2 else -1) for i in range(count)]
-    table = np.array(pieces, dtype=float).reshape(-1, 3)
-    return table[:, :2], table[:, 2].astype(int)
 
 
 def _directions(load: FloatArray) -> FloatArray:

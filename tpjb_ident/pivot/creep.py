@@ -17,7 +17,7 @@ import numpy as np
 from scipy import special
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.dry_record import DryRecord, pooled_noise, smooth_columns
 
@@ -28,9 +28,7 @@ _LEAST, _ALIKE = 3.0, 5.0
 _ROUNDS = 4
 
 
-def without_creep(
-    records: Sequence[DryRecord], noise: NoiseModel
-) -> tuple[list[DryRecord], NoiseModel, tuple[Condition, ...]]:
+def without_creep(records: Sequence[DryRecord], noise: NoiseModel) -> tuple[list[DryRecord], NoiseModel, Conditions]:
     """Records less the creep that their holds show alike, their noise, and a condition.
 
     Without creep they are given back as they are.
@@ -41,7 +39,7 @@ def without_creep(
     durations = [hold.duration for hold in itertools.chain.from_iterable(record.holds for record in held)]
     times = np.median(durations) * np.array(_TIMES)
     less = list(records)
-    condition: tuple[Condition, ...] = ()
+    condition: Conditions = ()
     for _ in range(_ROUNDS):  # what noise there is shows when the creep is off: until then it takes much for drift
         sums = np.array([_held_to_light(record, noise, times) for record in held])
         information, pull = np.maximum(sums[:, 0], 1e-300), sums[:, 1]
@@ -53,10 +51,15 @@ def without_creep(
         if share[best] < max(_LEAST * error[best], _ALIKE * math.sqrt(scatter[best] / total[best])):
             break
         weight = special.softmax(0.5 * np.where(share > 0.0, (share / error) ** 2, 0.0))
-        less = [_less(record, _courses(record, times) @ (share * weight)) for record in records]
+        less = []
+        for record in records:
+            blocks, creep = record.blocks, _courses(record, times) @ (share * weight)
+            largest = np.max(np.abs(creep)) / np.ptp(blocks.deflection)
+            blocks = replace(blocks, deflection=blocks.deflection - creep)
+            less.append(replace(record, blocks=blocks, creep=largest))
         noise = pooled_noise(less)
-        percent, seconds = f"{100 * share[best]:.1f} % (se {100 * error[best]:.1f} %)", times[best % len(times)]
-        detail = f"{percent} of the deflection follow a step within some {seconds:.2g} s"
+        percent = f"{100 * share[best]:.1f} % (se {100 * error[best]:.1f} %)"
+        detail = f"{percent} of the deflection follow a step within some {times[best % len(times)]:.2g} s"
         condition = (Condition("deflection-creeps", detail),)
     return less, noise, condition
 
@@ -90,9 +93,3 @@ def _held_to_light(record: DryRecord, noise: NoiseModel, times: FloatArray) -> t
     basis, _ = np.linalg.qr(levels)
     free = courses - basis @ (basis.T @ courses)
     return np.sum(free**2, axis=0), free.T @ np.linalg.solve(root, blocks.deflection)
-
-
-def _less(record: DryRecord, creep: FloatArray) -> DryRecord:
-    """A record less its creep (m,) [m], with the largest share of the deflection that it was."""
-    blocks, share = record.blocks, np.max(np.abs(creep)) / np.ptp(record.blocks.deflection)
-    return replace(record, blocks=replace(blocks, deflection=blocks.deflection - creep), creep=share)

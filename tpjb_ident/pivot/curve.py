@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy import integrate, special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
-from tpjb_ident.conditions import Condition, sentences
+from tpjb_ident.conditions import Conditions, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.dry_record import PadDirection
 from tpjb_ident.pivot.law_fit import FRICTION, OFFSET, SCALE, LawFit
@@ -162,7 +162,7 @@ class PivotCurve(Presented):
     displacement_direction: PadDirection
     hysteresis: Hysteresis | None = None
     relative_calibration: float = 0.0
-    status: tuple[Condition, ...] = ()
+    status: Conditions = ()
     runs: tuple[str, ...] = ()
     includes_housing: bool = True
 
@@ -247,7 +247,7 @@ class PivotCurve(Presented):
             Of the secant stiffness instead of the tangent one.
         """
         variance = np.diag(self.relative_stiffness_covariance(load, secant))
-        return np.asarray(np.sqrt(variance)).reshape(np.shape(load))
+        return np.sqrt(variance).reshape(np.shape(load))
 
     def relative_stiffness_covariance(self, load: ArrayLike, secant: bool = False) -> FloatArray:
         """Covariance of ln(stiffness) between pad loads (n,) [N], (n, n).
@@ -352,7 +352,7 @@ class PivotCurve(Presented):
 def _positive(load: ArrayLike) -> FloatArray:
     """Loads as an array; refused where one is negative or none: a pivot can only be pressed."""
     loads = np.asarray(load, dtype=float)
-    if np.any(~(loads >= 0.0)):
+    if not np.all(loads >= 0.0):
         raise ArgumentError("load must be zero or positive, and not NaN: a pivot can only be pressed")
     return loads
 

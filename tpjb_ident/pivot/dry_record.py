@@ -5,6 +5,7 @@ is the component of both along the pad's direction; the component across tells w
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -65,10 +66,7 @@ class DryRecord:
     load_direction: PadDirection = PadDirection()
     displacement_direction: PadDirection = PadDirection()
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)  #: of readings, where more than two tell a vector
-    friction: tuple[float, float] = (
-        FRICTION_SHARE,
-        FRICTION_SE,
-    )  #: share that it holds back, standard deviation: prior
+    friction: tuple[float, float] = FRICTION_SHARE, FRICTION_SE  #: share held back, standard deviation: prior
     creep: float = 0.0  #: share of the deflection that crept and was taken off
     free_load: float = 0.0  #: N: load up to which the shaft had not reached its pad
     load_error: float = 0.0  #: N: standard error of the zero of the load along the pad
@@ -90,7 +88,11 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         what = f"has {len(good)} samples, of which {100 * lost:.0f} % are missing or glitches: fewer than it takes"
         cure = "Export every sample, not one a step; state the sample_rate of a slower device; else repeat the test"
         raise refusal(run, "record", what, cure)
-    pickup = _pickup(run, {"force": load, "displacement": place}, good, rate)
+    pickup, channels, measured = None, axial_channels(run), {"force": load, "displacement": place}
+    # two channels per vector: only then the vector holds each of them as it was
+    if Counter(channel.quantity for channel in channels.values()) == dict.fromkeys(measured, 2):
+        values = {name: measured[c.quantity] @ directions(c.axis or 0.0) for name, c in channels.items()}
+        pickup = measure_pickup(values, good, rate)
     order = np.argsort(time, kind="stable")  # a logger may repeat or shuffle time stamps
     time, load, place = (values[order] for values in (time, load, place))
     good = good[order]
@@ -98,7 +100,9 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
     turns = good_samples(load, max(round(_COURSE[0] * rate), 3)) & np.isfinite(time)
     course = time[turns], load[turns]
     time, load, place = (values[good] for values in (time, load, place))
-    push = _push(load)
+    order = np.argsort(np.linalg.norm(load, axis=1))
+    few = max(3, len(load) // 20)
+    push = np.median(load[order[-few:]], axis=0) - np.median(load[order[:few]], axis=0)
     if angle is None:
         angle = math.atan2(push[1], push[0])
     if math.hypot(*push) <= max(10.0 * np.median(np.abs(np.diff(np.hypot(*load.T)))), 1e-9):
@@ -109,7 +113,9 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
     blocks = cut_blocks(time, vectors, holds)
     loose = before_contact(blocks)
     free_load = float(np.max(blocks.load[loose], initial=0.0))
-    blocks = blocks.take(~loose & ~_just_unloaded(blocks))
+    # where a record begins with unloading, nobody knows yet whether its pivot slides
+    sticks = (blocks.branch < 0) & (blocks.load > (1.0 - _STICKS_WITHIN) * blocks.load[0])
+    blocks = blocks.take(~loose & ~np.logical_and.accumulate(sticks))
     if len(blocks) < _FEWEST_BLOCKS:
         what = f"gives only {len(blocks)} usable averages of {BLOCK:g} s"
         raise refusal(run, "record", what, "Record for longer")
@@ -132,8 +138,7 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
 
 def pad_axes(angle: float) -> FloatArray:
     """Rows: unit vectors along and across a pad direction [rad], (2, 2)."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, s], [-s, c]])
+    return directions([angle, angle + 0.5 * math.pi])
 
 
 def before_contact(blocks: Blocks) -> BoolArray:
@@ -152,19 +157,6 @@ def before_contact(blocks: Blocks) -> BoolArray:
     loose = (near & (way > compliance * (_FREE * more + _NOTABLE_WAY * largest))).any(axis=1)
     beside = np.convolve(loose, np.ones(3), "same") > 0  # the average in which the way ends holds some of it
     return beside & (load < _NEAR * largest)
-
-
-def _just_unloaded(blocks: Blocks) -> BoolArray:
-    """Blocks (m,) in which a record begins with unloading: whether its pivot slides yet nobody knows."""
-    near = blocks.load > (1.0 - _STICKS_WITHIN) * blocks.load[0]
-    return np.logical_and.accumulate((blocks.branch < 0) & near)
-
-
-def _push(load: FloatArray) -> FloatArray:
-    """From the least to the greatest of some loads (n, 2), (2,) [N]."""
-    order = np.argsort(np.linalg.norm(load, axis=1))
-    few = max(3, len(load) // 20)
-    return np.median(load[order[-few:]], axis=0) - np.median(load[order[:few]], axis=0)
 
 
 def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
@@ -190,16 +182,14 @@ def with_load_zero(records: Sequence[DryRecord]) -> list[DryRecord]:
         return [_less_zero(record, np.zeros(2), np.diag(stated**2), "") for record in records]
     x, y = design / error[:, None], (across * np.cos(turn) - load * np.sin(turn)) / error
     scatter = np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2) / freedom
-    told = max(scatter, 1.0) * (special.stdtrit(freedom, 0.975) / special.ndtri(0.975)) ** 2  # of few
-    covariance = np.linalg.inv(x.T @ x / told + np.diag(1.0 / stated**2 if stated.all() else np.zeros(2)))
-    zero = covariance @ (x.T @ y) / told
+    variance = max(scatter, 1.0) * (special.stdtrit(freedom, 0.975) / special.ndtri(0.975)) ** 2
+    covariance = np.linalg.inv(x.T @ x / variance + np.diag(1.0 / stated**2 if stated.all() else np.zeros(2)))
+    zero = covariance @ (x.T @ y) / variance
     size, spread = np.hypot(*zero), math.sqrt(np.trace(covariance))
     is_clear = size > max(_CLEAR * spread, _NOTABLE * np.max(load))
     if not (is_clear or stated.all()):
         return list(records)
-    text = (
-        f"the lines along which the loads of all pads grow meet at {size:.0f} N (se {spread:.0f} N); it was taken off"
-    )
+    text = f"the lines along which all pads' loads grow meet at {size:.0f} N (se {spread:.0f} N); it was taken off"
     return [_less_zero(record, zero, covariance, text if is_clear else "") for record in records]
 
 
@@ -236,16 +226,6 @@ def relative_calibration(channels: Iterable[Channel], angle: float) -> float:
     """Relative standard uncertainty along a pad's angle [rad] from the certificates of channels."""
     # two channels at right angles share a direction as the squares of their cosines
     return math.hypot(*(math.cos((c.axis or 0.0) - angle) ** 2 * (c.uncertainty or 0.0) for c in channels))
-
-
-def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray, rate: float) -> PickupSignature | None:
-    """Mains line per channel. Two channels per vector: only then the vector holds each of them as it was."""
-    channels = axial_channels(run)
-    quantities = [c.quantity for c in channels.values()]
-    if any(quantities.count(quantity) != 2 for quantity in vectors):
-        return None
-    values = {name: vectors[c.quantity] @ pad_axes(c.axis or 0.0)[0] for name, c in channels.items()}
-    return measure_pickup(values, good, rate)
 
 
 def load_direction(blocks: Blocks) -> PadDirection:

@@ -19,7 +19,7 @@ from scipy import linalg, optimize, special
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.campaign import Campaign, Run
 from rigdata.problem import Problem, RigDataError, refuse
-from tpjb_ident.conditions import Condition, holding
+from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import refused_runs
 from tpjb_ident.pivot.blocks import slid
@@ -130,9 +130,16 @@ def bad_blocks(record: DryRecord, noise: NoiseModel) -> BoolArray:
     bad = ~record.good
     for _ in range(int(_MOST_BAD * len(np.unique(groups)))):
         data = fit_data([replace(record, good=~bad)], noise)
-        worst, size = _worst(fit_law(LAWS["spline"], True, data), data, groups[~bad])
-        if size < _BAD_LIMIT:
+        numbers = np.unique(groups[~bad])
+        fit = fit_law(LAWS["spline"], True, data)
+        shift, remainder, score = _score_of(fit, data, groups[~bad][:, None] == numbers)
+        information, whole = np.sum(shift * remainder, axis=0), np.sum(shift**2, axis=0)
+        # by how many standard errors each group is off; what the law can take up tells nothing
+        size = np.abs(score) / np.sqrt(np.maximum(information, 1e-6 * whole))
+        size[information <= 1e-6 * whole] = 0.0
+        if np.max(size) < _BAD_LIMIT:
             break
+        worst = numbers[np.argmax(size)]
         # a hold goes with the ramps on either side: whatever spoilt it need not have kept to its limits
         bad |= np.abs(groups - worst) <= worst % 2
     return bad
@@ -144,17 +151,6 @@ def _groups(record: DryRecord) -> IntArray:
     if not record.holds:
         return 2 * (np.arange(len(hold)) * GROUPS_ON_RAMP // len(hold))
     return np.where(hold >= 0, 2 * hold + 1, 2 * np.maximum.accumulate(hold) + 2)
-
-
-def _worst(fit: LawFit, data: FitData, groups: IntArray) -> tuple[int, float]:
-    """The group (of m) whose shift is most significant, and its size in standard errors."""
-    numbers = np.unique(groups)
-    shift, remainder, score = _score_of(fit, data, groups[:, None] == numbers)
-    information, whole = np.sum(shift * remainder, axis=0), np.sum(shift**2, axis=0)
-    size = np.abs(score) / np.sqrt(np.maximum(information, 1e-6 * whole))
-    size[information <= 1e-6 * whole] = 0.0
-    worst = np.argmax(size)
-    return int(numbers[worst]), size[worst]
 
 
 def _score_of(fit: LawFit, data: FitData, columns: FloatArray | BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -368,13 +364,13 @@ def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
     return measure_loop(law, float(max(up.min(), down.min())), float(min(up.max(), down.max())))
 
 
-def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> tuple[Condition, ...]:
+def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> Conditions:
     """Named conditions of a curve."""
     law, onset, bad = curve.law, curve.onset_load, np.sum(curve.steps.weight == 0.0)
     aside = abs(curve.displacement_direction.angle) > 0.5 * DISPLACEMENT_LIMIT
-    shares: dict[str, float] = {}
+    shares: dict[str, float] = defaultdict(float)
     for fit, weight in zip(curve.fits, curve.weights, strict=True):
-        shares[fit.name] = shares.get(fit.name, 0.0) + weight
+        shares[fit.name] += weight
     listed = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
     return holding(
         (bad > 0, "bad-steps", f"{bad} left out"),

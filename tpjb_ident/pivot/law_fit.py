@@ -140,7 +140,8 @@ class _Prior:
     high: FloatArray  #: (p,)
 
 
-def _prior(law: Law, contact: bool, data: FitData) -> _Prior:
+def fit_law(law: Law, contact: bool, data: FitData, start: FloatArray | None = None) -> LawFit:
+    """Fit one law by its posterior mode; `start` (p,) as `LawFit.theta`."""
     largest, flat = np.max(data.load), (0.0, np.inf, -np.inf, np.inf)
     # mean, standard deviation, lowest and highest of each parameter
     rows = [flat, (*data.friction, -0.2, 0.2), flat]
@@ -151,12 +152,7 @@ def _prior(law: Law, contact: bool, data: FitData) -> _Prior:
     mean, spread, low, high = np.array(rows).T
     root = np.diag(1.0 / spread)
     root[_shape(law), _shape(law)] = np.linalg.cholesky(law.prior_precision).T
-    return _Prior(mean, root, low, high)
-
-
-def fit_law(law: Law, contact: bool, data: FitData, start: FloatArray | None = None) -> LawFit:
-    """Fit one law by its posterior mode; `start` (p,) as `LawFit.theta`."""
-    prior = _prior(law, contact, data)
+    prior = _Prior(mean, root, low, high)
     theta = _start(prior, contact, data) if start is None else np.clip(start, prior.low, prior.high)
     unit = np.ones(len(theta))
     unit[OFFSET] = np.ptp(data.deflection)  # metres and pure numbers in one matrix: scale the metres

@@ -61,29 +61,24 @@ def mistake(
     signature: PickupSignature, others: Sequence[PickupSignature], pairs: Sequence[Sequence[str]]
 ) -> tuple[str, int] | None:
     """The mistake that, undone, makes a signature that of most others it now differs from, and how many these are."""
-    alike = [other for other in others if other.channels == signature.channels]
-    sizes = [_mismatch(signature, other) for other in alike]
-    agree = {}
-    for what, undone in _undone(signature, pairs):
-        limits = [min(_MATCHES, size - _CLEARER) if size > _MATCHES else 0.0 for size in sizes]
-        agree[what] = sum(_mismatch(undone, other) < limit for other, limit in zip(alike, limits, strict=True))
-    likeliest = max(agree, key=lambda what: agree[what])
-    return (likeliest, agree[likeliest]) if agree[likeliest] >= max(2, math.ceil(len(alike) / 2)) else None
-
-
-def _undone(signature: PickupSignature, pairs: Sequence[Sequence[str]]) -> list[tuple[str, PickupSignature]]:
-    """A run's signature with every simple mistake undone."""
     names, size = signature.channels, signature.size
-    variants = []
+    variants = {}  # with every simple mistake undone
     for pair in pairs:
         order, places = np.arange(len(names)), [names.index(name) for name in pair]
         order[places] = places[::-1]
         exchanged = replace(signature, size=size[order], noise=signature.noise[order])
-        variants.append((f"{pair[0]} and {pair[1]} are exchanged", exchanged))
+        variants[f"{pair[0]} and {pair[1]} are exchanged"] = exchanged
     for place, name in enumerate(names):
         sign = np.where(np.arange(len(names)) == place, -1.0, 1.0)
-        variants.append((f"{name} is reversed", replace(signature, size=size * sign)))
-    return variants
+        variants[f"{name} is reversed"] = replace(signature, size=size * sign)
+    alike = [other for other in others if other.channels == names]
+    sizes = [_mismatch(signature, other) for other in alike]
+    limits = [min(_MATCHES, size - _CLEARER) if size > _MATCHES else 0.0 for size in sizes]
+    agree = {}
+    for words, variant in variants.items():
+        agree[words] = sum(_mismatch(variant, other) < limit for other, limit in zip(alike, limits, strict=True))
+    likeliest = max(agree, key=lambda words: agree[words])
+    return (likeliest, agree[likeliest]) if agree[likeliest] >= max(2, math.ceil(len(alike) / 2)) else None
 
 
 def _mismatch(a: PickupSignature, b: PickupSignature) -> float:

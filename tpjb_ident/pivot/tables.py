@@ -72,7 +72,7 @@ def pivot_table(
     if not curves:
         raise ArgumentError("curves must hold at least one PivotCurve")
     grid = load_grid(curves) if loads is None else np.asarray(loads, dtype=float)
-    if np.any(~(grid > 0.0)):
+    if not np.all(grid > 0.0):
         raise ArgumentError("loads must be positive: at zero load there is no stiffness to speak of")
     frames = []
     for curve in curves:

@@ -1,5 +1,6 @@
 """The report of a comparison: answer, figures, tables, flags, and how it was made."""
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import pandas as pd
 from rigdata.arrays import FloatArray
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.columns import amount, size, symbol
-from tpjb_ident.compare.comparison import Comparison, predicted_loci
+from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
 from tpjb_ident.conditions import Condition
@@ -116,10 +117,18 @@ def _sections(comparison: Comparison, frame: pd.DataFrame, flagged: Sequence[tup
         "Intervals are 95 %, random and calibration errors together. Outliers is the share of record windows "
         "that got no weight."
     )
+    pads = () if comparison.bearing is None else comparison.bearing.pads
+    drawn = np.array([pad.pivot_angle for pad in pads]), np.array([pad.assembled_clearance for pad in pads])
+    polygon, predicted = comparison.clearance, {}
+    if comparison.loci is not None:
+        for name, rows in comparison.loci.groupby("pivots", sort=False):
+            predicted[str(name)] = rows[["x_m_predicted", "y_m_predicted"]].to_numpy()
+    clearances = [] if polygon is None else [clearance_table(polygon, drawn[1])]
+    places = position_panels(polygon, drawn, comparison.locus, predicted)
     return [
         *coefficient_sections(frame),
         _pivot_section(comparison),
-        _position_section(comparison),
+        Section("Clearance and shaft centre locus", panels=places, tables=clearances),
         *evidence,
         Section("Operating points", [note], tables=[*tables, _predicted_table(frame)]),
         Section("Quality flags", tables=[_flag_table(flagged)]),
@@ -139,14 +148,6 @@ def _pivot_section(comparison: Comparison) -> Section:
     )
     table = pivot_stiffness_table(comparison.curves, formula)
     return Section(heading, [note], pivot_panels(comparison.curves, formula), [table])
-
-
-def _position_section(comparison: Comparison) -> Section:
-    pads = () if comparison.bearing is None else comparison.bearing.pads
-    drawn = (np.array([pad.pivot_angle for pad in pads]), np.array([pad.assembled_clearance for pad in pads]))
-    panels = position_panels(comparison.clearance, drawn, comparison.locus, predicted_loci(comparison.loci))
-    tables = [] if comparison.clearance is None else [clearance_table(comparison.clearance, drawn[1])]
-    return Section("Clearance and shaft centre locus", panels=panels, tables=tables)
 
 
 def measured_table(result: Identification) -> Table:
@@ -178,11 +179,13 @@ def _predicted_table(frame: pd.DataFrame) -> Table:
 def _flag_table(flagged: Sequence[tuple[str, Condition]]) -> Table:
     """Flags in plain words; what says the same stands in one row."""
     columns = ["flag", "what it means", "where", "found"]
-    cells = [(str(flag), flag.meaning, place, flag.detail) for place, flag in flagged]
+    places = defaultdict(list)
+    for place, flag in flagged:
+        places[flag].append((place, flag.detail))
     rows = []
-    for key, places in pd.DataFrame(cells, columns=columns).groupby(columns[:2], sort=False):
-        details = filter(None, places["found"].unique())
-        rows.append([*map(str, key), "; ".join(places["where"]), "; ".join(details)])
+    for flag, occurrences in places.items():
+        where, details = zip(*occurrences, strict=True)
+        rows.append([flag, flag.meaning, "; ".join(where), "; ".join(filter(None, dict.fromkeys(details)))])
     return Table("Flags", columns, rows)
 
 
@@ -207,11 +210,12 @@ def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None)
         columns.append(f"at {amount(load, 'load', '.4g')}, {symbol('stiffness')}")
         columns += [] if formula is None else ["of Kirk's tangent"]
         for curve, row in zip(curves, rows, strict=True):
+            value = float(curve.stiffness(load))
             low, high = (float(end) for end in curve.stiffness_band(load))
             remark = " (extrapolated)" if curve.is_extrapolated(load) else ""
-            row.append(with_interval(float(curve.stiffness(load)), low, high, size("stiffness")) + remark)
+            row.append(with_interval(value, low, high, size("stiffness")) + remark)
             if formula is not None:
-                row.append(f"{100 * curve.stiffness(load) / formula(curve.pad, load)[1]:.0f} %")
+                row.append(f"{100 * value / formula(curve.pad, load)[1]:.0f} %")
     return Table("Measured tangent stiffness, 95 %", columns, rows)
 
 

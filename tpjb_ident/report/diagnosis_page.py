@@ -14,7 +14,7 @@ from tpjb_ident.columns import size, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.effect_words import Estimate, amount, finding, label_in_words, shown_unit, words_of
 from tpjb_ident.diagnosis.campaign import CampaignDiagnosis
-from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, median_deviations
+from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap_at
@@ -62,7 +62,7 @@ def verdict_sentences(
             worst=max(deviations, key=lambda c: abs(deviations[c][0])) if deviations else "",
             direct=DIRECT,
             rivals=[effect for group in verdict.indistinguishable for effect in group[1:]],
-            checks=dict.fromkeys(word.check for word in words if word is not None),
+            checks=dict.fromkeys(word.check for word in words if word),
             worse=worse,
             beyond=[a for a in verdict.assumptions if abs(a.deviation) > Deciding.visible],
             farthest=max(verdict.assumptions, key=lambda a: abs(a.deviation), default=None),
@@ -203,17 +203,6 @@ def _gap_table(verdict: Verdict) -> Table:
     return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows)
 
 
-def _effect_sections(verdict: Verdict) -> list[Section]:
-    """What each named effect is, how it looks on a rig, what to check first."""
-    sections = []
-    for effect in verdict.effects:
-        words = words_of(effect.name)
-        if words is not None:
-            texts = [words.physics, f"On the rig: {words.on_the_rig}", f"Check first: {words.check}."]
-            sections.append(Section(f"What it means: {finding(effect.name, effect.parameters)}", texts))
-    return sections
-
-
 def _other_explanations(verdict: Verdict) -> Section:
     """What else it could be, and the test that tells."""
     notes = []
@@ -232,7 +221,7 @@ def _rivals(verdict: Verdict) -> list[str]:
     names = {effect.name for effect in verdict.effects}
     listed = verdict.candidates
     named = [c for c in listed if {label.split()[0] for label in c.parameters} - set(TERMS) == names][:1]
-    probability = named[0].probability if named else 0.0
+    probability = sum(c.probability for c in named)
     odds = Deciding.included / (1.0 - Deciding.included)
     notes = []
     for rival in listed:
@@ -253,6 +242,21 @@ def _sections(result: CampaignDiagnosis, coefficients: list[Section]) -> list[Se
         "no fit has seen, and to which a model must extrapolate: the top load, the outer frequencies, another speed, "
         "a sector of the locus."
     )
+    panels, frame = [], residual_frame(result.diagnosis)
+    for over, name, title in _SERIES:
+        try:
+            panels.append(Panel(name, title, residual_series(frame, over)))
+        except ValueError:  # nothing varies over it
+            continue
+    title = "Gap by observable, held-out points where there are any (* fitted points)"
+    panels.append(Panel("gap-by-observable", title, gap(verdict)))
+    if len(frame):
+        panels.append(Panel("residual-map", "Residuals of every coefficient and point", residual_map(frame)))
+    effects = []
+    for effect in verdict.effects:  # what it is, how it looks on a rig, what to check first
+        if words := words_of(effect.name):
+            texts = [words.physics, f"On the rig: {words.on_the_rig}", f"Check first: {words.check}."]
+            effects.append(Section(f"What it means: {finding(effect.name, effect.parameters)}", texts))
     places = [
         [observable(d.observable), place(d.where), f"{d.size_sigma:.2f}", f"{100 * d.share:.1f} %"]
         for d in verdict.disagreement
@@ -265,30 +269,14 @@ def _sections(result: CampaignDiagnosis, coefficients: list[Section]) -> list[Se
     title = "Best first; log evidence in nats above the baseline's, everything free within its tolerance"
     explanations = Table(title, ["explanation", "log evidence", "held-out gap", "probability"], tried)
     return [
-        *_effect_sections(verdict),
+        *effects,
         *coefficients,
         _other_explanations(verdict),
-        Section("Where model and measurement part", [note], _diagnosis_panels(result.diagnosis), [shares]),
+        Section("Where model and measurement part", [note], panels, [shares]),
         *_evidence_sections(verdict),
         Section("Explanations that were fitted", tables=[explanations]),
         Section("The gap", tables=[_gap_table(verdict)] if verdict.effects else []),
     ]
-
-
-def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
-    """Draw the residuals over load, over frequency and as a map, and the gap by observable, before and after."""
-    panels = []
-    frame = residual_frame(diagnosis)
-    for over, name, title in _SERIES:
-        try:
-            panels.append(Panel(name, title, residual_series(frame, over)))
-        except ValueError:  # nothing varies over it
-            continue
-    title = "Gap by observable, held-out points where there are any (* fitted points)"
-    panels.append(Panel("gap-by-observable", title, gap(diagnosis.verdict)))
-    if len(frame):
-        panels.append(Panel("residual-map", "Residuals of every coefficient and point", residual_map(frame)))
-    return panels
 
 
 def _evidence_sections(verdict: Verdict) -> list[Section]:

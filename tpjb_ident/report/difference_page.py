@@ -41,11 +41,16 @@ def write_difference_report(folder: Path, difference: Difference, origin: Mappin
     """Write report.html and its figure into an existing folder."""
     points = difference.points
     flags = [Condition(name) for name in "; ".join(_flags(points)).split("; ") if name in KINDS]
+    facts = {}
+    for name, side in (("First", difference.a), ("Second", difference.b)):
+        parts, campaign = [side.name, "a folder of results"], side.campaign
+        if campaign is not None:
+            parts[1:] = campaign.description, f"{len(campaign.runs)} runs", campaign.date, campaign.by
+        facts[name] = ", ".join(filter(None, parts))
     page = Page(
         title=f"{difference.a.name} and {difference.b.name}: what changed",
         subtitle="Second less first, with 95 % intervals",
-        facts=_facts(difference)
-        | set_points(list(points.reindex(columns=POINT_KEY).itertuples(index=False, name=None))),
+        facts=facts | set_points(list(points.reindex(columns=POINT_KEY).itertuples(index=False, name=None))),
         values=_values_table(difference) if len(points) else None,
         flags=flags_line([flags], len(points)),
         lead="difference",
@@ -54,19 +59,6 @@ def write_difference_report(folder: Path, difference: Difference, origin: Mappin
         **origin,
     )
     return write_page(folder, page)
-
-
-def _facts(difference: Difference) -> dict[str, str]:
-    """What each side is, and when and by whom it was measured."""
-    facts = {}
-    for name, side in (("First", difference.a), ("Second", difference.b)):
-        campaign = side.campaign
-        if campaign is None:
-            facts[name] = f"{side.name}, a folder of results"
-            continue
-        parts = (side.name, campaign.description, f"{len(campaign.runs)} runs", campaign.date, campaign.by)
-        facts[name] = ", ".join(part for part in parts if part)
-    return facts
 
 
 def _values_table(difference: Difference) -> Table:
@@ -94,28 +86,20 @@ def _sections(difference: Difference) -> list[Section]:
     if len(points):
         tables = [_coefficient_table(points, kind) for kind in (STIFFNESS, DAMPING)]
         sections.append(Section("Coefficients", panels=[Panel("difference", _TITLE, _drawn, points)], tables=tables))
-    if len(pivots):
-        loads = (pivots["force_N"] / size("load")).map("{:.3g}".format)
-        cells = {
-            "pad": pivots["pad"].map("#{:g}".format),
-            f"load, {symbol('load')}": loads,
-            **_both(pivots, TANGENT, "stiffness"),
-        }
-        table = table_of("Tangent stiffness of the pivots, where both were measured; 95 %", cells)
-        sections.append(Section("Pivots", tables=[table]))
-    if len(clearance):
-        cells = {"pad": clearance["pad"].map("#{:g}".format), **_both(clearance, "clearance_m", "length")}
-        table = table_of("Assembled clearance at zero push load, 95 %", cells)
-        sections.append(Section("Clearance", tables=[table]))
+    for heading, caption, frame, name, quantity in (
+        ("Pivots", "Tangent stiffness of the pivots, where both were measured; 95 %", pivots, TANGENT, "stiffness"),
+        ("Clearance", "Assembled clearance at zero push load, 95 %", clearance, "clearance_m", "length"),
+    ):
+        if frame.empty:
+            continue
+        cells: dict[str, Iterable[str]] = {"pad": frame["pad"].map("#{:g}".format)}
+        if "force_N" in frame:
+            cells[f"load, {symbol('load')}"] = (frame["force_N"] / size("load")).map("{:.3g}".format)
+        for side, title in _SIDES.items():
+            cells[f"{title}, {symbol(quantity)}"] = interval_cells(frame, f"{name}_{side}", size(quantity))
+        cells["changed"] = frame[changed_column(name)]
+        sections.append(Section(heading, tables=[table_of(caption, cells)]))
     return sections
-
-
-def _both(frame: pd.DataFrame, name: str, quantity: str) -> dict[str, Iterable[str]]:
-    """A quantity of both sides, its difference, and whether it changed."""
-    cells = {}
-    for side, title in _SIDES.items():
-        cells[f"{title}, {symbol(quantity)}"] = interval_cells(frame, f"{name}_{side}", size(quantity))
-    return cells | {"changed": frame[changed_column(name)]}
 
 
 def _coefficient_table(points: pd.DataFrame, kind: Coefficient) -> Table:

@@ -15,7 +15,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
@@ -117,36 +116,30 @@ def _save_panel(index: int, folder: Path) -> str:
 
 
 def _hover_points(figure: Figure) -> tuple[np.ndarray, list[str]]:
-    """Where every marker is drawn, (n, 2) points of the SVG, and what it says."""
+    """Where every marker is drawn, (n, 2) points of the SVG, and what it says: label, value and interval, units."""
     places, texts = [np.zeros((0, 2))], []
     height = figure.get_size_inches()[1] * _POINTS_PER_INCH
     for axes in figure.axes:
         axes.get_xlim(), axes.get_ylim()  # limits are set late: asking settles them
         axes.apply_aspect()
-        bars = {bar[0]: bar for bar in axes.containers if isinstance(bar, ErrorbarContainer)}
+        xl, yl = printable(axes.get_xlabel()), printable(axes.get_ylabel())
+        containers = {bars[0]: bars for bars in axes.containers if isinstance(bars, ErrorbarContainer)}
         for line in axes.lines:
             points = np.asarray(line.get_xydata())
             if line.get_marker() in ("", "None", " ", None) or len(points) > _MOST_POINTS:
                 continue
             shown = axes.transData.transform(points) * _POINTS_PER_INCH / figure.dpi
             places.append(np.column_stack([shown[:, 0], height - shown[:, 1]]))
-            texts += _texts_of_line(axes, points, str(bars.get(line, line).get_label()), bars.get(line))
+            bars, halves = containers.get(line), np.full(len(points), np.nan)
+            label = str((line if bars is None else bars).get_label())
+            name = "" if label.startswith("_") else f"{printable(label)}: "
+            if bars is not None and bars[2] and bars.has_yerr and not bars.has_xerr:
+                for k, ends in enumerate(bars[2][0].get_segments()):
+                    halves[k] = 0.5 * abs(ends[-1][1] - ends[0][1]) if len(ends) else np.nan
+            for (x, y), half in zip(points, halves, strict=True):
+                spread = f" ± {significant(half, '.2g')}" if np.isfinite(half) else ""
+                texts.append(f"{name}{_with_unit(yl, y, spread)} at {_with_unit(xl, x)}")
     return np.concatenate(places), texts
-
-
-def _texts_of_line(axes: Axes, points: np.ndarray, label: str, bars: ErrorbarContainer | None) -> list[str]:
-    """What the markers of a line say: its label, their values with their intervals, in the units of the axes."""
-    name = "" if label.startswith("_") else f"{printable(label)}: "
-    xl, yl = printable(axes.get_xlabel()), printable(axes.get_ylabel())
-    halves = np.full(len(points), np.nan)
-    if bars is not None and bars[2] and bars.has_yerr and not bars.has_xerr:
-        for k, ends in enumerate(bars[2][0].get_segments()):
-            halves[k] = 0.5 * abs(ends[-1][1] - ends[0][1]) if len(ends) else np.nan
-    texts = []
-    for (x, y), half in zip(points, halves, strict=True):
-        spread = f" ± {significant(half, '.2g')}" if np.isfinite(half) else ""
-        texts.append(f"{name}{_with_unit(yl, y, spread)} at {_with_unit(xl, x)}")
-    return texts
 
 
 def _with_unit(label: str, value: float, spread: str = "") -> str:

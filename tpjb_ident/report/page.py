@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import jinja2
 import markupsafe
@@ -94,23 +94,19 @@ class Page:
 def render_page(page: Page, svg: Mapping[str, str]) -> str:
     """Render a report as HTML."""
     script = _TEMPLATES.get_template("sort.js").render()
-    running = f"{page.title} \N{MIDDLE DOT} {page.facts.get('Bearing', page.subtitle)}"
+    running = printable(f"{page.title} \N{MIDDLE DOT} {page.facts.get('Bearing', page.subtitle)}")
+    # in a style sheet: letters and digits as they are, everything else by its number, that no sign can end a string
+    running = "".join(c if c.isascii() and c.isalnum() else f"\\{ord(c):06x}" for c in running)
     return _TEMPLATES.get_template("report.html").render(
         page=page,
         drawn=_drawings(page.panels, svg),
         # our own text; the one text from outside is escaped, character by character
-        style=markupsafe.Markup(_TEMPLATES.get_template("style.css").render(running=_css_text(running))),
+        style=markupsafe.Markup(_TEMPLATES.get_template("style.css").render(running=markupsafe.Markup(running))),
         script=markupsafe.Markup(script),  # likewise
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         versions=versions(),
         finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )
-
-
-def _css_text(text: str) -> markupsafe.Markup:
-    """A text within a style sheet: letters and digits as they are, everything else by its number."""
-    letters = (c if c.isascii() and c.isalnum() else f"\\{ord(c):06x}" for c in printable(text))
-    return markupsafe.Markup("".join(letters))  # no sign is left that could end a string or an element
 
 
 def render_section(section: Section) -> str:
@@ -130,21 +126,14 @@ def write_page(folder: Path, page: Page) -> Path:
     return path
 
 
-class _Drawing(NamedTuple):
-    """A picture as an element of a page."""
-
-    element: markupsafe.Markup
-    wide: bool  #: takes a whole row
-
-
-def _drawings(panels: Iterable[Panel], svg: Mapping[str, str]) -> dict[str, _Drawing]:
-    """Drawings of panels by name."""
+def _drawings(panels: Iterable[Panel], svg: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    """Drawings of panels by name: each as an element of a page, and whether it takes a whole row."""
     drawings = {}
     for panel in panels:
         # matplotlib has escaped the labels inside the drawing already; the title is ours to escape
         title = str(markupsafe.escape(printable(panel.title)))
         element = markupsafe.Markup(inline_svg(svg[panel.name], panel.name, title))
-        drawings[panel.name] = _Drawing(element, is_wide(svg[panel.name]))
+        drawings[panel.name] = {"element": element, "wide": is_wide(svg[panel.name])}
     return drawings
 
 

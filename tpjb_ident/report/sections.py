@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from rigdata.readers.series import Series
@@ -26,7 +25,6 @@ from tpjb_ident.columns import amount, channel_unit, degrees, place_of, size, sp
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.conditions import SEVERITIES, Condition, untrusted
-from tpjb_ident.diagnosis.plan import CampaignPlan
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.tables import Formula
 from tpjb_ident.report.drawing.picture import (
@@ -47,7 +45,6 @@ from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.page import Section, Table, plain_templates
 from tpjb_ident.report.plots.coefficients import coefficient, frf
 from tpjb_ident.report.plots.records import coherence, coherence_spectrum, orbit, spectra
-from tpjb_ident.report.plots.residuals import isolability
 from tpjb_ident.report.plots.static_tests import clearance_and_locus, load_deflection, pad_projection, pivot_stiffness
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.results.point_result import PointResult
@@ -73,11 +70,8 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
         return facts | {"Source": campaign.description}
     counts = Counter(KINDS_IN_WORDS.get(run.kind, run.kind) for run in campaign.runs)
     kinds = ", ".join(f"{count} {kind}" for kind, count in counts.items())
-    measured = ", ".join(text for text in (campaign.date, campaign.by) if text)
-    return facts | {
-        "Runs": f"{len(campaign.runs)} ({kinds})",
-        "Measured": measured or "date and by are not stated",
-    }
+    measured = ", ".join(filter(None, (campaign.date, campaign.by))) or "date and by are not stated"
+    return facts | {"Runs": f"{len(campaign.runs)} ({kinds})", "Measured": measured}
 
 
 def set_points(keys: Sequence[tuple[float, float, float, float, str]]) -> dict[str, str]:
@@ -104,8 +98,8 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
         return None
     p = solved[len(solved) // 2]
     cells, point = p.stiffness.cells(), p.point
-    rows = [[entry, cells[i], cells[4 + i]] for i, entry in enumerate(ENTRIES)]
-    columns = ["", *(f"{kind.symbol.upper()}, {kind.display_unit}" for kind in (STIFFNESS, DAMPING))]
+    rows = list(zip(ENTRIES, cells[:4], cells[4:], strict=True))
+    columns = ["", f"K, {STIFFNESS.display_unit}", f"C, {DAMPING.display_unit}"]
     place = place_of(point.static_load, point.excitation_hz)
     shaft = spinning(point.shaft_speed_hz, point.rotation)
     return Table(f"Measured at {place}, shaft at {shaft}; 95 % intervals", columns, rows)
@@ -129,7 +123,7 @@ def coefficient_cells(frame: pd.DataFrame, kinds: Sequence[Coefficient], side: s
 
 def flags_line(flags: Iterable[Iterable[Condition]], points: int) -> str:
     """The flags of a result with how often each is there, gravest first; "" where it has no points."""
-    counts = Counter(itertools.chain.from_iterable(flags))
+    counts = Counter(itertools.chain(*flags))
     gravest_first = sorted(counts, key=lambda flag: SEVERITIES.index(flag.severity))
     texts = [f"{flag} ({counts[flag]})" if counts[flag] > 1 else flag for flag in gravest_first]
     bad = sum(counts[flag] for flag in untrusted(counts))
@@ -142,15 +136,10 @@ def set_up_section(comparison: Comparison) -> Section:
     """Sensors with their calibration, bearing and oil, and what was run."""
     campaign = comparison.campaign
     tables = _bearing_tables(comparison.bearing)
-    if not isinstance(campaign, TableSource):
-        tables = [_sensor_table(tuple(campaign.channels.values())), *tables, _run_matrix(campaign.runs)]
-    return Section("Set-up", tables=tables)
-
-
-def _sensor_table(channels: Sequence[Channel]) -> Table:
-    """Channels with their calibration."""
+    if isinstance(campaign, TableSource):
+        return Section("Set-up", tables=tables)
     rows = []
-    for channel in channels:
+    for channel in campaign.channels.values():
         unit, scale, _ = channel_unit(channel.quantity)
         if not unit:
             continue
@@ -160,7 +149,7 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
         uncertainty = "not stated" if channel.uncertainty is None else f"{100 * channel.uncertainty:.2g} %"
         rows.append([channel.name, channel.quantity, place, calibration, uncertainty])
     columns = ["channel", "quantity", "direction or pad", "calibration", "uncertainty (1 standard deviation)"]
-    return Table("Sensors", columns, rows)
+    return Section("Set-up", tables=[Table("Sensors", columns, rows), *tables, _run_matrix(campaign.runs)])
 
 
 def _by_pad(values: Iterable[str]) -> str:
@@ -189,34 +178,39 @@ def _run_matrix(runs: Sequence[Run]) -> Table:
     """Operating points with their number of runs."""
     counts: Counter[tuple[str, ...]] = Counter()
     for run in runs:
-        p = run.point
-        several = run.kind in {"locus", "dry_pivot"}
+        p, rate = run.point, "–"
         load = f"{p.static_load / size('load'):.6g}" if p.static_load else "–"
-        direction = "several" if several else f"{p.static_load_direction_deg:g}"
+        direction = "several" if run.kind in ("locus", "dry_pivot") else f"{p.static_load_direction_deg:g}"
         shaft = f"{p.shaft_speed_hz:g} ({60 * p.shaft_speed_hz:.6g})"
         excitation = f"{p.excitation_hz:g}" if p.excitation else "–"
-        kind = KINDS_IN_WORDS.get(run.kind, run.kind)
-        rate = "–"
         with suppress(RigDataError):  # a record that cannot be read: `check` tells
             rate = f"{run.sample_rate:g}"
-        counts[kind, load, direction, shaft, excitation, rate] += 1
+        counts[KINDS_IN_WORDS.get(run.kind, run.kind), load, direction, shaft, excitation, rate] += 1
     columns = ["kind", f"load, {symbol('load')}", "load direction, °", "shaft speed, Hz (rpm)", "excitation, Hz"]
     return Table("Runs", [*columns, "rate, Hz", "runs"], [[*key, str(n)] for key, n in counts.items()])
 
 
 def evidence_section(campaign: Campaign, result: Identification) -> Section:
     """Orbit, spectra, coherence of one run in the middle of the campaign; h over frequency; coherence of all points."""
-    panels = _stiffness_panels(result)
+    panels = _run_panels(campaign, result) if result.points else []
+    series = longest_series(result.to_frame(), "frequency") if result.points else None
+    if series is not None:
+        title = f"Dynamic stiffness h over frequency, {constant_along(series, 'frequency')}"
+        panels.append(Panel("h-over-frequency", title, frf, result))
+    for number, band in enumerate(result.bands, start=1):
+        key = band.key()
+        title = (f"Dynamic stiffness h over the band, {amount(key['static_load_N'], 'load')}, "
+                 f"shaft at {spinning(key['shaft_speed_Hz'], key['rotation'])}, {key['excitation']}")  # fmt: skip
+        panels.append(Panel(f"h-over-band-{number}", title, frf, band))
     if result.points:
-        title = "Force that the displacements do not explain"
-        panels = [*_run_panels(campaign, result), *panels, Panel("coherence-points", title, coherence, result)]
+        panels.append(Panel("coherence-points", "Force that the displacements do not explain", coherence, result))
     return Section("Raw evidence of one run", panels=panels)
 
 
 def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
     """Of the first run of the middle point that is whole."""
     point = result.points[len(result.points) // 2]
-    for run in (r for r in campaign.of_kind("dynamic") if r.id in point.runs):
+    for run in map(campaign.run, point.runs):
         try:
             label = f"run {run.id}, {place_of(point.point.static_load, point.point.excitation_hz)}"
             return [
@@ -229,21 +223,6 @@ def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
         except (RigDataError, ValueError):  # a damaged or short run: the next one shows the same
             continue
     return []
-
-
-def _stiffness_panels(result: Identification) -> list[Panel]:
-    """The dynamic stiffness h itself, over the excitation frequencies of sines and over every band."""
-    panels = []
-    series = longest_series(result.to_frame(), "frequency") if result.points else None
-    if series is not None:
-        title = f"Dynamic stiffness h over frequency, {constant_along(series, 'frequency')}"
-        panels.append(Panel("h-over-frequency", title, frf, result))
-    for number, band in enumerate(result.bands, start=1):
-        key = band.key()
-        title = (f"Dynamic stiffness h over the band, {amount(key['static_load_N'], 'load')}, "
-                 f"shaft at {spinning(key['shaft_speed_Hz'], key['rotation'])}, {key['excitation']}")  # fmt: skip
-        panels.append(Panel(f"h-over-band-{number}", title, frf, band))
-    return panels
 
 
 def budget_table(result: Identification) -> Table:
@@ -279,16 +258,12 @@ def coefficient_sections(table: pd.DataFrame) -> list[Section]:
     return sections
 
 
-def pivot_panels(curves: Sequence[PivotCurve], formula: Formula | None = None) -> list[Panel]:
+def pivot_panels(curves: Sequence[PivotCurve], formula: Formula | None) -> list[Panel]:
     """Draw the tangent stiffness of every pad, its load steps, and how they were projected."""
-    if not curves:
-        return []
-    bands = "Pivot tangent stiffness over load, 95 % bands"
-    steps = "Load steps and fitted laws, pivot and housing together"
     across = "Load and displacement vectors, and what of them lies on each pad's direction"
     return [
-        Panel("pivot-stiffness", bands, pivot_stiffness, curves, formula),
-        Panel("pivot-steps", steps, load_deflection, curves),
+        Panel("pivot-stiffness", "Pivot tangent stiffness over load, 95 % bands", pivot_stiffness, curves, formula),
+        Panel("pivot-steps", "Load steps and fitted laws, pivot and housing together", load_deflection, curves),
         Panel("pivot-projection", across, pad_projection, curves),
     ]
 
@@ -306,14 +281,9 @@ def position_panels(
     """
     if polygon is None and measured is None:
         return []
-    polygons = None if polygon is None else {"measured": polygon} | {f"run {p.run}": p for p in others}
+    polygons = {} if polygon is None else {"measured": polygon} | {f"run {p.run}": p for p in others}
     figure = functools.partial(clearance_and_locus, polygons, measured, predicted, drawing=drawn)
     return [Panel("locus-and-clearance", "Shaft centre locus inside the clearance polygon", figure)]
-
-
-def isolability_panels(plans: Mapping[str, CampaignPlan]) -> list[Panel]:
-    """Draw the isolability matrix of every plan."""
-    return [Panel(name.replace("_", "-"), f"Isolability, {name}", isolability, plan) for name, plan in plans.items()]
 
 
 #: A picture of more channels could not be read.
@@ -322,14 +292,10 @@ _ROW, _WIDTH = 1.35, 4.6
 _POINTS = 4000
 
 
-def quick_look(title: str, series: Sequence[Series], spectra: Mapping[str, Spectrum]) -> Panel:
-    """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
-    figure = functools.partial(_quick_look, list(series)[:_MOST], spectra, title=printable(title))
-    return Panel("quick-look", title, figure)
-
-
 @plot
-def _quick_look(series: Sequence[Series], spectra: Mapping[str, Spectrum]) -> Figure:
+def quick_look(series: Sequence[Series], spectra: Mapping[str, Spectrum]) -> Figure:
+    """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
+    series = series[:_MOST]
     figure, grid = new_pictures(len(series), 2, width=_WIDTH, height=_ROW)
     for (over_time, spectrum), channel in zip(grid, series, strict=True):
         label(over_time, "time, s", printable(", ".join(filter(None, (channel.name, channel.unit)))))
@@ -342,6 +308,6 @@ def _quick_look(series: Sequence[Series], spectra: Mapping[str, Spectrum]) -> Fi
         over_time.locator_params(axis="y", nbins=3)
         spectrum.yaxis.set_major_locator(LogLocator(numticks=4))
         spectrum.minorticks_off()
-        for axes in (over_time, spectrum):
-            axes.margins(x=0.0)
+        over_time.margins(x=0.0)
+        spectrum.margins(x=0.0)
     return figure

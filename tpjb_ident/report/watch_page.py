@@ -26,9 +26,7 @@ _WORDS = {"look": "good, with a remark", "replaced": "replaced by a repeat"}
 _WAITING = ("to run", "being written")
 
 
-def write_watch_page(
-    folder: Path, snapshot: Snapshot, refresh: int, origin: Mapping[str, Any], bearing: Any = None
-) -> None:
+def write_watch_page(folder: Path, snapshot: Snapshot, refresh: int, origin: Mapping[str, Any], bearing: Any) -> None:
     """Write ``watch.html``, whole or not at all, with its figures inside; the next command comes after the last run."""
     landed = snapshot.count("good", "look", "repeat", "replaced")
     points = [p for p in snapshot.measured.points if not lacking(p)]
@@ -62,48 +60,40 @@ def coverage_table(snapshot: Snapshot) -> Table:
         good = sum(s.counts for s in group)
         again = sum(s.state == "repeat" for s in group)
         missing = sum(s.state in _WAITING for s in group)
-        rows.append([name, str(good), str(again), str(missing)])
+        rows.append([name, *map(str, (good, again, missing))])
     return Table("How far the plan is", ["", "good", "to repeat", "to run"], rows)
 
 
 def _sections(snapshot: Snapshot, bearing: Any) -> list[Section]:
-    measured, runs = snapshot.measured, [status.run for status in snapshot.states]
+    measured = snapshot.measured
     so_far = ["From the good runs so far. They change while runs come in; tpjb identify has the last word."]
     points = points_table(measured.points)
+    panels, identification = [], measured.identification
+    if identification is not None and identification.points:
+        table = identification.to_frame().dropna(subset=list(STIFFNESS.columns))
+        for over in ("load", "frequency"):
+            if longest_series(table, over) is not None:
+                title, bearings = f"Direct stiffness over {over}, 95 % intervals", {identification.campaign: table}
+                panels.append(Panel(f"k-over-{over}", title, direct_coefficients, bearings, "k", over))
     pivots = [pivot_stiffness_table(measured.curves, None)] if measured.curves else []
     clearances = []
     if measured.polygon is not None:
         clearances.append(clearance_table(measured.polygon, np.array([p.assembled_clearance for p in bearing.pads])))
     waiting = []
     for status in snapshot.states:
+        run = status.run
         if status.state in _WAITING:
-            run = status.run
             waiting.append([run.id, run.kind, described(run), run.file])
     to_come = Table("Runs to come", ["run", "kind", "set points", "file"], waiting)
-    known = measured.points or measured.refusals
+    notes = [*so_far, *measured.refusals] if measured.points or measured.refusals else []
     return [
         Section("What the plan leaves out, and remarks", [*snapshot.lacks, *map(str, snapshot.problems)]),
-        Section(
-            "Stiffness and damping so far", [*so_far, *measured.refusals] if known else [], _panels(snapshot), [points]
-        ),
+        Section("Stiffness and damping so far", notes, panels, [points]),
         Section("Pivots so far", tables=pivots),
         Section("Clearance", tables=clearances),
-        Section("Records", tables=[records_table(snapshot, [run.id for run in runs])]),
+        Section("Records", tables=[records_table(snapshot, [status.run.id for status in snapshot.states])]),
         Section("Still to run", tables=[to_come]),
     ]
-
-
-def _panels(snapshot: Snapshot) -> list[Panel]:
-    identification = snapshot.measured.identification
-    if identification is None or not identification.points:
-        return []
-    table = identification.to_frame().dropna(subset=list(STIFFNESS.columns))
-    panels = []
-    for over in ("load", "frequency"):
-        if longest_series(table, over) is not None:
-            title, bearings = f"Direct stiffness over {over}, 95 % intervals", {identification.campaign: table}
-            panels.append(Panel(f"k-over-{over}", title, direct_coefficients, bearings, "k", over))
-    return panels
 
 
 def points_table(points: Sequence[PointResult]) -> Table:

@@ -47,7 +47,10 @@ def compared(first: Path, second: Path, file: str, tolerance: float) -> Differen
     size, where = 0.0, ""
     for place in before | now:
         a, b = before.get(place), now.get(place)
-        if (off := _off(a, b, _half_width(before, place))) > size:
+        base = place.removesuffix("_lo").removesuffix("_hi")
+        low, high = before.get(f"{base}_lo"), before.get(f"{base}_hi")
+        half = 0.5 * (high - low) if isinstance(low, float) and isinstance(high, float) else 0.0
+        if (off := _off(a, b, half if math.isfinite(half) else 0.0)) > size:
             size, where = off, f"{place}: {_shown(a)}, now {_shown(b)}"
     return Difference(file, "differs" if size > tolerance else "numbers", size, where)
 
@@ -57,17 +60,17 @@ def _content(path: Path) -> Any:
     if path.suffix == ".csv" and path.stem in TABLES:
         rows = read_table(path).to_dict("records")
         return {f"row {number}": row for number, row in enumerate(rows, start=1)}
-    parse = _DOCUMENTS.get(path.suffix)
-    return None if parse is None else parse(path.read_text("utf-8"))
+    return _DOCUMENTS[path.suffix](path.read_text("utf-8")) if path.suffix in _DOCUMENTS else None
 
 
 def _values(content: Any, place: str = "") -> Iterator[tuple[str, Any]]:
     """Every value of a document with its place."""
-    if not isinstance(content, dict | list):
+    if isinstance(content, list):
+        content = dict(enumerate(content))
+    if not isinstance(content, dict):
         yield place, content
         return
-    parts = content.items() if isinstance(content, dict) else enumerate(content)
-    for key, value in parts:
+    for key, value in content.items():
         if key not in _ASIDE:
             yield from _values(value, f"{place}.{key}".lstrip("."))
 
@@ -80,13 +83,6 @@ def _off(a: object, b: object, width: float) -> float:
         return 0.0
     off = abs(a - b) / max(abs(a), abs(b), width, _LEAST_SCALE)
     return off if math.isfinite(off) else math.inf
-
-
-def _half_width(values: dict[str, Any], place: str) -> float:
-    base = place.removesuffix("_lo").removesuffix("_hi")
-    low, high = values.get(f"{base}_lo"), values.get(f"{base}_hi")
-    width = high - low if isinstance(low, float) and isinstance(high, float) else 0.0
-    return 0.5 * width if math.isfinite(width) else 0.0
 
 
 def _shown(value: object) -> str:

@@ -40,7 +40,11 @@ def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Ite
                     staging = _new_folder(target, out)
                 with contextlib.suppress(FileNotFoundError):
                     locks.enter_context(locked(staging))
-            _clear_abandoned(target)
+            # what killed runs into the same folder have left beside it goes
+            for abandoned in target.parent.glob(f".{glob.escape(target.name)}.part-*") if fcntl is not None else ():
+                # held by a run that is alive, or gone by now; whoever else clears it at the same time may be quicker
+                with contextlib.suppress(OSError), locked(abandoned, wait=False):
+                    shutil.rmtree(abandoned, ignore_errors=True)
             yield staging
             staging.chmod(0o755)
             flush(staging)
@@ -78,13 +82,6 @@ def _new_folder(target: Path, out: Path) -> Path:
         return Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.part-"))
     except OSError as error:
         raise BadInputError(f"--out {out}: cannot be made ({error.strerror or error}). Give another folder.") from error
-
-
-def _clear_abandoned(target: Path) -> None:
-    """Delete what killed runs into the same folder have left beside it."""
-    for abandoned in target.parent.glob(f".{glob.escape(target.name)}.part-*") if fcntl is not None else ():
-        with contextlib.suppress(OSError), locked(abandoned, wait=False):  # held by a run that is alive, or gone by now
-            shutil.rmtree(abandoned, ignore_errors=True)  # whoever else clears it at the same time may be quicker
 
 
 def _bring(staging: Path, target: Path, command: str) -> None:

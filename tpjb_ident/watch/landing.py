@@ -110,12 +110,12 @@ def _by_content(campaign: Campaign, path: Path, file: str) -> Run | None:
 def _fits(run: Run, force: FloatArray, rate: float) -> bool:
     point = run.point
     # the housing is pulled the way the film carries the shaft: cells read the load on the shaft, reversed or not
-    planned = point.static_load * directions(np.array([point.static_load_direction]))[0]
+    planned = point.static_load * directions(point.static_load_direction)
     mean = force.mean(axis=0)
     if min(np.linalg.norm(mean - planned), np.linalg.norm(mean + planned)) > _NEAR_LOAD * point.static_load:
         return False
     oscillation = force - mean
-    size = float(np.sqrt((oscillation**2).sum(axis=1).mean()))
+    size = np.sqrt((oscillation**2).sum(axis=1).mean())
     if run.kind != "dynamic":
         return size < 0.02 * point.static_load
     along = np.linalg.svd(oscillation, full_matrices=False)[2][0]

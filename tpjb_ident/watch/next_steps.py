@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -63,22 +64,18 @@ def judge_states(
             state: State = "repeat" if any(map(_forces_repeat, findings)) else "look" if grave else "good"
             status = replace(status, state=state, findings=tuple(findings))
         states.append(status)
-    return _replaced(states), common
+    # a bad run is replaced by a later one of the same test that is better
+    done = [status for status in states if status.counts]
+    for number, status in enumerate(states):
+        better = [d for d in done if _test(d.run) == _test(status.run) and d.landed >= status.landed]
+        if status.state == "repeat" and better:
+            states[number] = replace(status, state="replaced")
+    return states, common
 
 
 def _forces_repeat(finding: Finding) -> bool:
     severity = finding.problem.severity
     return severity == "error" or (severity == "warning" and finding.key.startswith(_LOST_SAMPLES))
-
-
-def _replaced(states: Sequence[RunStatus]) -> list[RunStatus]:
-    """A bad run is replaced by a later one of the same test that is better."""
-    done = [s for s in states if s.counts]
-    updated = []
-    for status in states:
-        better = [d for d in done if _test(d.run) == _test(status.run) and d.landed >= status.landed]
-        updated.append(replace(status, state="replaced") if status.state == "repeat" and better else status)
-    return updated
 
 
 def _test(run: Run) -> tuple[object, ...]:
@@ -105,11 +102,13 @@ def next_steps(
     states: Sequence[RunStatus],
     common: Sequence[Sequence[Finding]],
     points: Sequence[PointResult],
-    within: float | None = None,
+    within: float | None,
 ) -> list[Step]:
     """Everything to do, most urgent first."""
     stop, stopped = _stop(states)
-    at = _current_run(states)
+    turning = [status for status in reversed(states) if status.landed and status.run.kind in _TURNING]
+    # the running test that landed last: what the rig stands at
+    at = max(turning, key=lambda status: status.landed).run if turning else None
     repairs = []
     for group in common:
         problem, runs = group[0].problem, tuple(dict.fromkeys(str(f.problem.run) for f in group))
@@ -122,12 +121,6 @@ def next_steps(
         *_more(states, points, within),
         *_next(states, at),
     ]
-
-
-def _current_run(states: Sequence[RunStatus]) -> Run | None:
-    """The running test that landed last: what the rig stands at."""
-    turning = [status for status in reversed(states) if status.landed and status.run.kind in _TURNING]
-    return max(turning, key=lambda status: status.landed).run if turning else None
 
 
 def _set_up(run: Run) -> tuple[float, float, float]:
@@ -163,7 +156,7 @@ def located(problem: Problem) -> str:
 
 def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
     """A fault of one channel in the last records in a row: the next one will have it too."""
-    landed = sorted((s for s in states if s.landed), key=lambda s: s.landed)[::-1]
+    landed = sorted(filter(lambda s: s.landed, states), key=lambda s: s.landed)[::-1]
     steps: list[Step] = []
     stopped: set[str] = set()
     for finding in landed[0].findings if landed else ():
@@ -203,7 +196,13 @@ def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: fl
     unfinished = {s.run.point for s in states if s.state in ("to run", "being written", "repeat")}
     steps = []
     for point in points:
-        widest, name, random_alone = _widest(point)
+        direct, solved = list(_DIRECT.values()), point.stiffness
+        mean = np.repeat(np.abs(solved.vector[direct]).reshape(2, 2).mean(axis=1), 2)
+        # what is not known at all is told elsewhere
+        known = np.nan_to_num(solved.half_width()[direct] / mean, nan=-1.0, posinf=-1.0)
+        worst = known.argmax()
+        widest, name = known[worst], list(_DIRECT)[worst]
+        random_alone = (solved.half_width(systematic=False)[direct] / mean)[worst]
         if point.point in unfinished or not widest > within:
             continue
         place = place_of(point.point.static_load, point.point.excitation_hz)
@@ -222,24 +221,12 @@ def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: fl
 _DIRECT = {"kxx": 0, "kyy": 3, "cxx": 4, "cyy": 7}
 
 
-def _widest(point: PointResult) -> tuple[float, str, float]:
-    """Half interval of the direct coefficient known worst, as a share of their mean, and its random part."""
-    est, direct = point.stiffness, list(_DIRECT.values())
-    mean = np.repeat(np.abs(est.vector[direct]).reshape(2, 2).mean(axis=1), 2)
-    shares, random = est.half_width()[direct] / mean, est.half_width(systematic=False)[direct] / mean
-    known = np.where(np.isfinite(shares), shares, -1.0)  # what is not known at all is told elsewhere
-    worst = int(known.argmax())
-    return float(known[worst]), list(_DIRECT)[worst], float(random[worst])
-
-
 def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
     waiting = [s.run for s in states if s.state == "to run"]
     if not waiting:
         unfinished = [s for s in states if s.state in ("repeat", "being written")]
         return [] if unfinished else [Step("next", "Every run of the plan has landed.")]
-    same = []
-    if at is not None:
-        same = [run for run in waiting if run.kind in _TURNING and _set_up(run) == _set_up(at)]
+    same = [run for run in waiting if at is not None and run.kind in _TURNING and _set_up(run) == _set_up(at)]
     run = (same or waiting)[0]
     more = f"{len(same) - 1} more at this load" if len(same) > 1 else f"{len(waiting) - 1} more in the plan"
     change = "" if same or at is None else " (new set-up)"
@@ -249,17 +236,17 @@ def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
 def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:
     """What a plan leaves out that the results will want."""
     lacks = []
-    directions_of: dict[OperatingPoint, set[float | None]] = {}
+    directions_of: dict[OperatingPoint, set[float | None]] = defaultdict(set)
     for run in runs:
         if run.kind == "dynamic":
-            directions_of.setdefault(run.point, set()).add(run.excitation_direction)
+            directions_of[run.point].add(run.excitation_direction)
     lonely = [p for p, directions in directions_of.items() if len(directions) == 1 and None not in directions]
     if lonely:
         first = listed([place_of(p.static_load, p.excitation_hz) for p in lonely], 3, "; ")
         lacks.append(f"{len(lonely)} operating points have one excitation direction ({first}): K and C need two.")
     pads = {run.pad for run in runs if run.kind == "dry_pivot"}
     without = [f"#{pad}" for pad in range(1, n_pads + 1) if pad not in pads]
-    if n_pads and without:
+    if without:
         lacks.append(f"No dry load steps on pad {', '.join(without)}: its pivot's stiffness stays unknown.")
     if not any(run.kind == "clearance" for run in runs):
         lacks.append("No clearance sweep: positions count from the probes' zero, and clearances stay the drawing's.")

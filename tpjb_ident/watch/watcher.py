@@ -99,19 +99,18 @@ class Watcher:
         unlisted = [path for path in records_below(self.folder) if path.resolve() not in listed]
         within = [path for path in (*planned.values(), *unlisted) if self._is_within(path, problems)]
         stable, written = self.files.look(within)
-        state = (self._manifest, tuple(problems), tuple(stable.items()), tuple(written))
+        state = self._manifest, tuple(problems), tuple(stable.items()), tuple(written)
         if state == self._last:
             return None
         done = frozenset(run.id for run in campaign.runs if planned[run.file] in stable)
         placed = []
         for path in filter(stable.__contains__, unlisted):
-            mark = stable[path], self._manifest
             make = functools.partial(place_record, campaign, path, done)
-            placed.append(self._unless_changed(path, mark, make))
+            placed.append(self._unless_changed(path, (stable[path], self._manifest), make))
         runs = [*campaign.runs, *(record.run for record in placed if record.run is not None)]
         new = self._observe(runs, stable)
         # a record that changed while it was read is looked at again: the next look must not take this one for it
-        self._last = state if all(file_state(p) == s for p, s in stable.items()) else ()
+        self._last = state if {path: file_state(path) for path in stable} == stable else ()
         return self._snapshot(campaign, runs, placed, problems, {p.resolve() for p in written}, new)
 
     def _unless_changed(self, key: object, mark: object, make: Callable[[], Any]) -> Any:
@@ -125,7 +124,7 @@ class Watcher:
         try:
             inside(self.folder, path.relative_to(self.folder).as_posix(), path.name, "")
         except RigDataError as error:
-            problems.extend(error.problems)
+            problems += error.problems
             return False
         return True
 
@@ -143,15 +142,15 @@ class Watcher:
         state = file_state(self.folder / MANIFEST_NAME)
         if self._campaign is not None and state == self._manifest:
             return self._campaign, []
+        problems = []
         try:
             self._campaign, self._manifest = load_campaign(self.folder), state
         except RigDataError as error:
             if self._campaign is None:
                 raise
             what = "cannot be read as it is; the watch goes on with the last one that could be"
-            problem = Problem("warning", MANIFEST_NAME, "", what, "Finish editing it")
-            return self._campaign, [problem, *error.problems]
-        return self._campaign, []
+            problems = [Problem("warning", MANIFEST_NAME, "", what, "Finish editing it"), *error.problems]
+        return self._campaign, problems
 
     def _observe(self, runs: list[Run], stable: dict[Path, FileState]) -> list[str]:
         """Read what is new; forget what is gone. Ids of the runs with news."""
@@ -228,9 +227,9 @@ class Watcher:
                 mark = frozenset((run.id, self._records[run.id].mark) for run in runs)
                 former = self._made.get(name, (None, (None, "")))[1][0]
                 make = functools.partial(_unless_refused, f"{kind} runs", measure, former)
-                results[name], refusal = self._unless_changed(name, mark, make)
+                result, refusal = self._unless_changed(name, mark, make)
+                results |= {name: result} if result is not None else {}
                 refusals += [refusal] if refusal else []
-        results = {name: result for name, result in results.items() if result is not None}
         return Measured(**results, refusals=tuple(refusals))
 
 

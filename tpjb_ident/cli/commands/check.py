@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rigdata.problem import Problem, RigDataError, gathered
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.columns import Column, words
 from tpjb_ident.conditions import SEVERITIES
@@ -16,8 +18,6 @@ from tpjb_ident.rounding import counted
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
-    from rigdata.problem import Problem
-    from rigdata.run import Run
 
 
 def span(*values: float) -> str:
@@ -35,9 +35,7 @@ def check(c: Command, campaign: Path) -> None:
 
     Reads all records. Writes check.json. Exit code 2 if there is an error that makes a run unusable.
     """
-    from rigdata import RigDataError
     from rigdata.campaign import campaign_place
-    from rigdata.problem import gathered
     from tpjb_ident.check.campaign import check_campaign
 
     if not campaign.exists():
@@ -46,11 +44,9 @@ def check(c: Command, campaign: Path) -> None:
     source = None
     with c.progress(f"reading {path.name}") as show:
         problems = check_campaign(path, lambda done, total: show("runs", done, total))
-        try:
+        with suppress(RigDataError):  # what it says is among the problems already
             source = c.open(path)
-        except RigDataError:  # what it says is among the problems already
-            pass
-        else:
+        if source is not None:
             problems += _drawing_problems(c, source, problems)
             problems.sort(key=lambda p: SEVERITIES.index(p.severity))
     summary = check_summary(c, source.id if source else path.name, problems, source)
@@ -61,7 +57,19 @@ def check(c: Command, campaign: Path) -> None:
     for problem in gathered(problems):
         c.print(f"{problem.severity}: {problem}")
     if source is not None:
-        _show_coverage(c, source)
+        rows = []
+        for kind in dict.fromkeys(run.kind for run in source.runs):
+            runs = source.of_kind(kind)
+            places = {run.pad if kind == "dry_pivot" else run.point.key for run in runs}
+            figures = []
+            for run in runs:
+                rate = math.nan
+                with suppress(RigDataError):  # a record that cannot be read is among the problems already
+                    rate = run.sample_rate
+                figures.append((rate, *run.point.static_key[:3], run.point.excitation_hz or math.nan))
+            rows.append([kind, len(runs), len(places), *zip(*figures, strict=True)])
+        columns = [*words("kind"), "runs", "points, pads", *(Column(title, span) for title in RANGES)]
+        c.show(f"{source.id}: what it covers", columns, rows)
     if any("open (??)" in p.what for p in problems):
         c.next("init", path if path.is_dir() else path.parent, "--update")
     elif path.is_dir() and not (path / "campaign.toml").exists():
@@ -97,7 +105,6 @@ def _drawing_problems(c: Command, campaign: Campaign, problems: list[Problem]) -
     if not campaign.bearing_text:
         return []
     from model.bearing import BearingError
-    from rigdata.problem import Problem
     from tpjb_ident.compare.static_tests import bearing_problems
 
     try:
@@ -107,26 +114,3 @@ def _drawing_problems(c: Command, campaign: Campaign, problems: list[Problem]) -
         what, _, remedy = str(error).partition("\n")[0].removeprefix(file).lstrip(",: ").partition(". ")
         cure = f"{remedy} Or give --bearing FILE where one is needed".strip()
         return [Problem("warning", file, "", what.rstrip("."), cure)]
-
-
-def _show_coverage(c: Command, campaign: Campaign) -> None:
-    """Print what the campaign holds: runs, points, rates and the range that they cover."""
-    rows = []
-    for kind in dict.fromkeys(run.kind for run in campaign.runs):
-        runs = campaign.of_kind(kind)
-        places = {run.pad if kind == "dry_pivot" else run.point.key for run in runs}
-        rows.append([kind, len(runs), len(places), *zip(*map(_figures, runs), strict=True)])
-    columns = [*words("kind"), "runs", "points, pads", *(Column(title, span) for title in RANGES)]
-    c.show(f"{campaign.id}: what it covers", columns, rows)
-
-
-def _figures(run: Run) -> tuple[float, ...]:
-    """Of a run, for `RANGES`; the rate is NaN where the record cannot be read, which is among the problems already."""
-    from rigdata import RigDataError
-
-    p = run.point
-    try:
-        rate = run.sample_rate
-    except RigDataError:
-        rate = math.nan
-    return rate, *p.static_key[:3], p.excitation_hz or math.nan

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -55,6 +54,7 @@ def compare(
         return
     from tpjb_ident.compare.comparison import VARIANTS, CompareSettings, compare_campaign, model_side
     from tpjb_ident.compare.predictions import counts_from_measured
+    from tpjb_ident.compare.summary import agreements, closest, is_off
     from tpjb_ident.compare.tables import compare_table, read_predictions, with_predictions
     from tpjb_ident.runtime.executors import background_job
 
@@ -75,7 +75,12 @@ def compare(
                 share = parse_share(reading_error, "--reading-error")
                 result = compare_table(coefficients, drawing, settings, share, show)
             result = with_predictions(result, tables)
-            _note_next(c, result, campaign, typed)
+            best = closest(agreements(result.table))
+            if best is None or not is_off(best):
+                if campaign is not None:
+                    c.next("export", campaign, "--to", "ross")
+            elif drawing is not None:
+                c.next("diagnose", *typed)
             write_comparison(c, result, show)
     show_comparison(c, result)
     refuse_comparison(result)
@@ -153,18 +158,6 @@ def show_comparison(c: Command, result: Comparison) -> None:
     columns = [*words("pivots"), *DIRECT, "inside"]
     with c.conclusion(summary_sentences(result)):
         c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, rows)
-
-
-def _note_next(c: Command, result: Comparison, campaign: Path | None, source: Sequence[object]) -> None:
-    """Note the command that comes next: a diagnosis where the model is off, an export where it is not."""
-    from tpjb_ident.compare.summary import agreements, closest, is_off
-
-    best = closest(agreements(result.table))
-    if best is not None and is_off(best):
-        if result.bearing is not None:
-            c.next("diagnose", *source)
-    elif campaign is not None:
-        c.next("export", campaign, "--to", "ross")
 
 
 def refuse_comparison(result: Comparison) -> None:

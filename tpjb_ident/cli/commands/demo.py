@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import rigdata
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.commands.check import check_summary
 from tpjb_ident.cli.commands.compare import refuse_comparison, show_comparison, write_comparison
 from tpjb_ident.rounding import counted
-
-if TYPE_CHECKING:
-    from tpjb_ident.compare.comparison import Comparison
+from tpjb_ident.runtime.executors import background_job
 
 
 @command("tpjb demo", "tpjb demo --out /tmp/look")
@@ -26,7 +23,6 @@ def demo(c: Command) -> None:
     printed formula, recorded with noise and glitches.
     """
     from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, model_side
-    from tpjb_ident.runtime.executors import background_job
 
     path = Path(rigdata.__path__[0]) / "samples" / "demo.h5"
     c.options = {"campaign": path, "thermal": "adiabatic", "pivots": ["rigid", "kirk", "measured"], "method": "mm-eiv"}
@@ -41,8 +37,12 @@ def demo(c: Command) -> None:
             c.json("check.json", summary)
             result = compare_campaign(campaign, bearing, progress=show, model=model)
             c.table("prediction", result.predictions["measured"])
+            import numpy as np
+
             truth = json.loads(path.with_name("demo.truth.json").read_text("utf-8"))
-            error = 100 * _largest_error(result, truth)
+            true = np.array([[p["K_apparent"], p["C_apparent"]] for p in truth["points"]])
+            measured = np.array([[p.stiffness.k, p.stiffness.c] for p in result.identification.points])
+            error = 100 * np.abs(np.diagonal(measured / true - 1.0, axis1=-2, axis2=-1)).max()
             note = f"The records are computed: identified direct coefficients are within {error:.2f} % of the truth."
             c.next("init", "FOLDER-OF-YOUR-RECORDS")
             write_comparison(c, result, show, note)
@@ -53,12 +53,3 @@ def demo(c: Command) -> None:
     c.print("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
     c.next("view", c.target)
     refuse_comparison(result)
-
-
-def _largest_error(result: Comparison, truth: dict[str, Any]) -> float:
-    """How far the identified direct coefficients are from what was put into the computed records, as a share."""
-    import numpy as np
-
-    true = np.array([[p["K_apparent"], p["C_apparent"]] for p in truth["points"]])  # in the order of the points
-    identified = np.array([[p.stiffness.k, p.stiffness.c] for p in result.identification.points])
-    return float(np.abs(np.diagonal(identified / true - 1.0, axis1=-2, axis2=-1)).max())

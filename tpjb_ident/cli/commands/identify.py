@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +23,6 @@ from tpjb_ident.runtime.executors import cores, forks
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
-    from tpjb_ident.phasors.run_data import PhasorSettings
     from tpjb_ident.runs.run_jobs import RunStore
 
 #: Records [bytes] above which several processes are quicker than one though each has to import everything, runs above
@@ -58,8 +57,16 @@ def identify(
     """
     if scheduler is not None and workers is not None:
         raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
+    from tpjb_ident.phasors.run_data import VECTOR_QUANTITIES, PhasorSettings
+
     source = c.open(campaign)
-    phasors = _phasor_settings(lines, delay or ())
+    excited = parse_values(lines, "speed", "--lines") if lines is not None else ()
+    delays = {}
+    for text in delay or ():
+        quantity, _, time = text.partition("=")
+        refuse_unknown(quantity, VECTOR_QUANTITIES, "--delay")
+        delays[quantity] = parse_value(time, "time", f"--delay {quantity}")
+    phasors = PhasorSettings(excitation_lines=tuple(omega / (2 * math.pi) for omega in excited), delays=delays)
     settings = replace(identify_settings(c, source), phasors=phasors, keep_weights=False)
     from tpjb_ident.identification.identify import identify as run_identification
     from tpjb_ident.runtime.executors import open_workers
@@ -111,16 +118,3 @@ def _worth_starting(campaign: Campaign) -> tuple[int | None, None, str | None]:
         return None, None, None
     many = forks() and len(campaign.of_kind("dynamic")) > WORTH_COPIES
     return min(cores(), MOST_COPIES) if many else 1, None, "fork"
-
-
-def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
-    """Build `PhasorSettings` from ``--lines`` and ``--delay``."""
-    from tpjb_ident.phasors.run_data import VECTOR_QUANTITIES, PhasorSettings
-
-    excited = () if lines is None else parse_values(lines, "speed", "--lines")
-    times = {}
-    for text in delays:
-        quantity, _, time = text.partition("=")
-        refuse_unknown(quantity, VECTOR_QUANTITIES, "--delay")
-        times[quantity] = parse_value(time, "time", f"--delay {quantity}")
-    return PhasorSettings(excitation_lines=tuple(omega / (2 * math.pi) for omega in excited), delays=times)

@@ -7,6 +7,7 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,8 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
     rig can know ??. Records are only read. A campaign.toml that is there already stays as it is; with --update it is
     carried on: what you typed stays, open places and guesses are made anew, new records become runs.
     """
+    from model.bearing import BearingError
+    from model.bearing_file import load_bearing
     from rigdata.manifest.fields import MARK, open_paths, open_summary
     from rigdata.survey.draft import column_names, updated_manifest
 
@@ -54,7 +57,9 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
     bearing = bearing or (stated[0].name if len(stated) == 1 else None)
     exports, problems = _read_exports(c, folder, column_names(before) if update else ())
     drawing = (folder if bearing else c.target) / (bearing or BEARING)
-    angles = _pivot_angles(drawing)
+    angles: list[float] = []
+    with suppress(BearingError):  # it cannot be read yet
+        angles = [pad.pivot_angle for pad in load_bearing(drawing).pads] if drawing.is_file() else []
     if update:
         text, changes = updated_manifest(before, exports, angles)
         channels: list[list[str]] = []
@@ -130,17 +135,6 @@ def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[
     if not exports:
         raise BadInputError("\n".join(texts[:5]))
     return exports, texts
-
-
-def _pivot_angles(bearing: Path) -> list[float]:
-    """Angles of the pads [rad] by the bearing file; none where it cannot be read yet."""
-    from model.bearing import BearingError
-    from model.bearing_file import load_bearing
-
-    try:
-        return [pad.pivot_angle for pad in load_bearing(bearing).pads] if bearing.is_file() else []
-    except BearingError:
-        return []
 
 
 def _bearing_draft(guesses: Survey) -> str:

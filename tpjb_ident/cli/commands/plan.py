@@ -49,7 +49,8 @@ def plan(
     from model.setup import Setup
     from tpjb_ident.diagnosis import plan as planning
     from tpjb_ident.diagnosis.from_python import planned_layout
-    from tpjb_ident.report.sections import isolability_panels
+    from tpjb_ident.report.figure import Panel
+    from tpjb_ident.report.plots.residuals import isolability
 
     points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, drawing))
     tests = planned_layout(drawing, points, (locus, dry, push, temperatures))
@@ -64,9 +65,11 @@ def plan(
             c.table("data_sets", table)
             plans |= {f"isolability_{name}": part for name, part in parts.items()}
         c.table("effects", result.to_frame())
+        panels = []
         for name, part in plans.items():
             c.table(name, part.matrix())
-        c.draw(isolability_panels(plans))
+            panels.append(Panel(name.replace("_", "-"), f"Isolability, {name}", isolability, part))
+        c.draw(panels)
         c.json("plan.json", result.to_dict())
     _show(c, result)
     c.next("simulate", bearing)

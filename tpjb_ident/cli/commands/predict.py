@@ -16,12 +16,7 @@ from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.executors import background_job, forks
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from model.bearing import Bearing
     from model.options import Options
-    from rigdata.operating_point import OperatingPoint
-    from tpjb_ident.compare.predictions import ModelSettings
 
 #: Points that take less time than pandas to load.
 FEW = 20
@@ -58,8 +53,22 @@ def predict(
     settings = model_settings(c, pivot_choice(c), drawing)
     settings = replace(settings, options=parse_physics(physics, housing_temperature))
     points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, drawing))
+    from tpjb_ident.compare.predictions import predict_points
+
     with c.results():
-        frame = _predicted(c, drawing, points, settings)
+        rows = None
+        if len(points) <= FEW and forks():  # solved in a copy of this process while pandas loads here: 0.7 of the time
+            with background_job(predict_points, drawing, points, settings) as job, c.progress("predicting"):
+                import pandas as pd
+                import pyarrow.parquet  # noqa: F401  (what the table is written with)
+
+                rows = job()
+        if rows is None:
+            with c.progress("predicting") as show:
+                rows = predict_points(drawing, points, settings, show)
+        import pandas as pd
+
+        frame = pd.DataFrame(rows)
         c.table("prediction", frame)
     bad = (~frame["converged"]).sum()
     state = f"{bad} did NOT converge" if bad else "all converged"
@@ -74,25 +83,6 @@ def predict(
     mesh_error = frame["mesh_error"].max()
     if mesh_error > _COARSE:
         raise NotTrustedError(f"the mesh error reaches {100 * mesh_error:.0f} % of a direct coefficient.")
-
-
-def _predicted(c: Command, bearing: Bearing, points: list[OperatingPoint], settings: ModelSettings) -> pd.DataFrame:
-    """Table of all points; a few are solved in a copy of this process while pandas loads here: 0.7 of the time."""
-    from tpjb_ident.compare.predictions import predict_points
-
-    rows = None
-    if len(points) <= FEW and forks():
-        with background_job(predict_points, bearing, points, settings) as job, c.progress("predicting"):
-            import pandas as pd
-            import pyarrow.parquet  # noqa: F401  (what the table is written with)
-
-            rows = job()
-    if rows is None:
-        with c.progress("predicting") as show:
-            rows = predict_points(bearing, points, settings, show)
-    import pandas as pd
-
-    return pd.DataFrame(rows)
 
 
 def parse_physics(names: str | None, housing: str | None) -> Options:

@@ -33,8 +33,12 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
     by number, pictures and pages by their bytes. Exit code 0 where nothing beyond the tolerance differs, 3 where
     something does, 2 where an input is gone or changed. With --out, rerun.json lists every file.
     """
+    from typer.main import get_command
+
+    from tpjb_ident.cli.commands.app import app
     from tpjb_ident.runtime.differences import compared
 
+    group: Any = get_command(app)
     folder = record if record.is_dir() else record.parent
     if not record.is_dir() and record.name != RECORD:
         raise BadInputError(f"{record}: is no {RECORD}. Give that of an output folder, or the folder.")
@@ -55,7 +59,16 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
         for number, (name, entry) in enumerate(repeated.items()):
             again = Path(scratch) / str(number)
             c.doing(f"{name} again")
-            _run_again(name, entry, folder, again)
+            program = group.commands[name.split(" ")[0]]
+            typed = [f"--out={again}", "--quiet", *_typed(program.params, entry, folder)]
+            try:
+                code = program.main(typed, prog_name="tpjb", standalone_mode=False)
+            except typer.Exit as end:
+                code = end.exit_code
+            except Exception as error:  # what the parser says of options that this version does not have
+                raise BadInputError(f"{name}: cannot be repeated ({error}). Run it by hand.") from error
+            if code not in (None, 0, 3):
+                raise TpjbError(f"{name}: ended with exit code {code}, see above; nothing was compared.")
             for file in outputs_of(entry):
                 if reason := contradiction(folder / file):
                     c.warn(f"{folder / file}: {reason}")
@@ -72,25 +85,6 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
             c.json("rerun.json", {"schema": "tpjb-rerun/1", "folder": folder.name, "files": files})
     if different:
         raise NotTrustedError(f"{folder}: {len(different)} of {len(pairs)} files:\n{listed(different, 8, chr(10))}")
-
-
-def _run_again(name: str, entry: Mapping[str, Any], folder: Path, out: Path) -> None:
-    """Run the command of an entry as if it were typed again, its inputs where they are now."""
-    from typer.main import get_command
-
-    from tpjb_ident.cli.commands.app import app
-
-    program: Any = get_command(app)
-    program = program.commands[name.split(" ")[0]]
-    typed = _typed(program.params, entry, folder)
-    try:
-        code = program.main([f"--out={out}", "--quiet", *typed], prog_name="tpjb", standalone_mode=False)
-    except typer.Exit as end:
-        code = end.exit_code
-    except Exception as error:  # what the parser says of options that this version does not have
-        raise BadInputError(f"{name}: cannot be repeated ({error}). Run it by hand.") from error
-    if code not in (None, 0, 3):
-        raise TpjbError(f"{name}: ended with exit code {code}, see above; nothing was compared.")
 
 
 def _typed(parameters: Iterable[Any], entry: Mapping[str, Any], folder: Path) -> list[str]:

@@ -13,6 +13,7 @@ from tpjb_ident.cli.terminal import PRINTED
 from tpjb_ident.columns import Column, channel_unit, words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.rounding import counted
+from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
@@ -86,9 +87,10 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
         with c.results():
             c.table("channels", pd.DataFrame([channel_row(s, amplitude_spectrum(s.values, s.rate)) for s in series]))
             if picture:
+                from tpjb_ident.report.figure import Panel
                 from tpjb_ident.report.sections import quick_look
 
-                c.draw([quick_look(title, displayed, spectra)])
+                c.draw([Panel("quick-look", title, quick_look(displayed, spectra, title=printable(title)))])
 
 
 def _show_campaign(c: Command, campaign: Campaign) -> None:
@@ -99,9 +101,8 @@ def _show_campaign(c: Command, campaign: Campaign) -> None:
     rows = []
     for run in campaign.runs[:MOST_RUNS]:
         p = run.point
-        pad = run.pad and f"#{run.pad}"
         place = [p.static_load or None, p.static_load_direction_deg, p.shaft_speed_hz, p.excitation_hz or None]
-        rows.append([run.id, run.kind, *place, pad, p.rotation if p.shaft_speed else None])
+        rows.append([run.id, run.kind, *place, run.pad and f"#{run.pad}", p.rotation if p.shaft_speed else None])
     quantities = ["load {load}", "direction {angle}", "speed {frequency}", "exc. {frequency}"]
     c.show("runs", [*words("run", "kind"), *quantities, "pad", "rotation"], rows)
     if len(campaign.runs) > len(rows):
@@ -142,7 +143,7 @@ def channel_row(series: Series, spectrum: Spectrum) -> dict[str, Any]:
     from rigdata.survey.spectrum import strongest
 
     good = series.values[np.isfinite(series.values)]
-    mean, deviation, low, high = (good.mean(), good.std(), good.min(), good.max()) if len(good) else 4 * (math.nan,)
+    shown = good if len(good) else np.full(1, math.nan)
     frequencies = [line.frequency for line in strongest(*spectrum, 3)] + 3 * [math.nan]
     return {
         "channel": series.name,
@@ -150,10 +151,10 @@ def channel_row(series: Series, spectrum: Spectrum) -> dict[str, Any]:
         "samples": len(series),
         "missing": len(series) - len(good),
         "sample_rate_Hz": series.rate,
-        "mean": mean,
-        "standard_deviation": deviation,
-        "minimum": low,
-        "maximum": high,
+        "mean": shown.mean(),
+        "standard_deviation": shown.std(),
+        "minimum": shown.min(),
+        "maximum": shown.max(),
         **{f"line{i + 1}_Hz": frequencies[i] for i in range(3)},
     }
 

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rigdata.near_names import hint
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.inputs import model_settings, operating_points, pivot_choice, rotation_choice
 from tpjb_ident.cli.options import refuse_unknown
 from tpjb_ident.errors import BadInputError
-
-if TYPE_CHECKING:
-    from rigdata.virtual_rig import RigPlan
 
 PLANS = ("paper", "short")
 _NUMBERS = ("value", "start", "length")
@@ -52,15 +49,21 @@ def simulate(
     c.options |= {"format": c.options.pop("layout"), "fault": fault or []}
     drawing = c.bearing(bearing)
     settings = model_settings(c, pivot_choice(c), drawing)
-    from rigdata.virtual_rig import Fault, Instruments, Noise, VirtualRig, write_campaign
+    from rigdata.virtual_rig import Fault, Instruments, Noise, RigPlan, VirtualRig, write_campaign
     from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 
-    sense = rotation_choice(c, drawing)
-    tests = replace(_plan(plan, len(drawing.pads), load, excitation, speed), repeats=repeats).turning(rotation=sense)
+    refuse_unknown(plan, PLANS, "--plan")
+    pads = len(drawing.pads)
+    tests = RigPlan.like_paper(pads) if plan == "paper" else RigPlan.short(pads)
+    points = operating_points(load or "5 kN", "-90 deg", speed, excitation or "25 Hz")
+    tests = tests.turning(shaft_speed=points[0].shaft_speed)  # of every run with a shaft that turns
+    if load is not None or excitation is not None:
+        tests = replace(tests, dynamic=tuple(points))
+    tests = replace(tests, repeats=repeats).turning(rotation=rotation_choice(c, drawing))
     largest = max(point.static_load for point in tests.dynamic)
     rig = VirtualRig(
         truth=rig_truth(drawing, settings, bearing.read_text("utf-8-sig")),
-        instruments=erring_instruments(Instruments.like_paper(len(drawing.pads), seed, largest), settings.effects),
+        instruments=erring_instruments(Instruments.like_paper(pads, seed, largest), settings.effects),
         noise=Noise.like_samples().scaled(noise) if noise > 0 else Noise.none(),
         seed=seed,
         campaign=name,
@@ -73,18 +76,6 @@ def simulate(
         truth.write(c.folder / "truth.json")
     c.print(f"{name}: {len(rig.runs)} runs, seed {seed}, in {c.target / file}, the truth in truth.json beside it")
     c.next("check", c.target / file)
-
-
-def _plan(plan: str, pads: int, load: str | None, excitation: str | None, speed: str) -> RigPlan:
-    """The plan with the tests asked for, every run with a shaft that turns at the speed asked for."""
-    from rigdata.virtual_rig import RigPlan
-
-    refuse_unknown(plan, PLANS, "--plan")
-    rig_plan = RigPlan.like_paper(pads) if plan == "paper" else RigPlan.short(pads)
-    points = operating_points(load or "5 kN", "-90 deg", speed, excitation or "25 Hz")
-    rig_plan = rig_plan.turning(shaft_speed=points[0].shaft_speed)
-    is_typed = load is not None or excitation is not None
-    return replace(rig_plan, dynamic=tuple(points)) if is_typed else rig_plan
 
 
 def _fault_arguments(text: str) -> dict[str, Any]:

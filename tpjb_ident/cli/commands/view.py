@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.identification import identified
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.interrupts import heard
 from tpjb_ident.runtime.output_folder import former_runs
@@ -16,7 +17,6 @@ from tpjb_ident.schema import TABLES
 if TYPE_CHECKING:
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
-    from tpjb_ident.view.server import Session
 
 
 @command("tpjb view {DEMO}", "tpjb view tpjb-compare-out")
@@ -43,7 +43,13 @@ def view(
         session = Session(name=place.resolve().name, tables=_tables(c, place))
         c.next("verify", source)
     else:
-        session = _campaign_session(c, source)
+        campaign = c.open(source)
+        session = Session(name=campaign.id, campaign=campaign)
+        if campaign.of_kind("dynamic"):
+            session.identify = functools.partial(identified, c, campaign)
+            if c.has_bearing(campaign):
+                session.bearing = c.bearing_of(campaign)
+                session.pivots = {"rigid": "rigid", "kirk": "kirk", **_measured_laws(c, campaign, session.bearing)}
         c.next("check", source)
     with contextlib.ExitStack() as links:
 
@@ -59,21 +65,6 @@ def view(
         except KeyboardInterrupt:
             heard()
             c.note("closed.")
-
-
-def _campaign_session(c: Command, source: Path) -> Session:
-    from tpjb_ident.view.server import Session
-
-    campaign = c.open(source)
-    session = Session(name=campaign.id, campaign=campaign)
-    if campaign.of_kind("dynamic"):
-        from tpjb_ident.cli.identification import identified
-
-        session.identify = functools.partial(identified, c, campaign)
-        if c.has_bearing(campaign):
-            session.bearing = c.bearing_of(campaign)
-            session.pivots = {"rigid": "rigid", "kirk": "kirk", **_measured_laws(c, campaign, session.bearing)}
-    return session
 
 
 def _tables(c: Command, folder: Path) -> dict[str, Any]:

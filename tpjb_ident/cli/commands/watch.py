@@ -54,7 +54,7 @@ def watch(
             if snapshot is not None:
                 printed = _show_news(c, snapshot, printed)
                 try:
-                    _write_results(c, snapshot, watcher, 0 if once else max(2, round(pause)))
+                    _write_results(c, snapshot, watcher.bearing, 0 if once else max(2, round(pause)))
                 except (BadInputError, OSError) as error:
                     if latest is None or once:
                         raise
@@ -97,34 +97,30 @@ def _open_watcher(c: Command, folder: Path, settle: float, within: float | None)
     return Watcher(folder, NewFiles(settle), drawing, RunStore(c.target / KEPT), within)
 
 
-def _write_results(c: Command, snapshot: Snapshot, watcher: Watcher, refresh: int) -> None:
+def _write_results(c: Command, snapshot: Snapshot, bearing: Any, refresh: int) -> None:
     """Write page, state and coefficients into the output folder, all of them or none."""
     from tpjb_ident.report.watch_page import write_watch_page
 
     c.inputs = dict(snapshot.hashes)
     with c.results():
-        write_watch_page(c.folder, snapshot, refresh, c.origin, watcher.bearing)
+        write_watch_page(c.folder, snapshot, refresh, c.origin, bearing)
         if snapshot.measured.identification is not None:
             c.table("coefficients", snapshot.measured.identification.to_frame())
-        c.json("watch.json", _state_document(snapshot))
-
-
-def _state_document(snapshot: Snapshot) -> dict[str, Any]:
-    """Content of watch.json."""
-    runs = []
-    for s in snapshot.states:
-        run = {key: getattr(s.run, key) for key in ("id", "kind", "file")}
-        state = {key: getattr(s, key) for key in ("state", "landed", "planned")}
-        runs.append({**run, **state, "findings": [asdict(finding.problem) for finding in s.findings]})
-    return {
-        "schema": "tpjb-watch/1",
-        "campaign": snapshot.campaign.id,
-        "steps": [asdict(step) for step in snapshot.steps],
-        "lacks": list(snapshot.lacks),
-        "runs": runs,
-        "unnamed": [{"file": u.file, "like": u.like, "why": u.why} for u in snapshot.placed],
-        "problems": [str(p) for p in snapshot.problems],
-    }
+        runs = []
+        for s in snapshot.states:
+            run = {key: getattr(s.run, key) for key in ("id", "kind", "file")}
+            state = {key: getattr(s, key) for key in ("state", "landed", "planned")}
+            runs.append({**run, **state, "findings": [asdict(finding.problem) for finding in s.findings]})
+        document = {
+            "schema": "tpjb-watch/1",
+            "campaign": snapshot.campaign.id,
+            "steps": list(map(asdict, snapshot.steps)),
+            "lacks": snapshot.lacks,
+            "runs": runs,
+            "unnamed": [{"file": u.file, "like": u.like, "why": u.why} for u in snapshot.placed],
+            "problems": list(map(str, snapshot.problems)),
+        }
+        c.json("watch.json", document)
 
 
 def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:

@@ -117,8 +117,14 @@ def plot(draw: Callable[..., Figure]) -> Callable[..., Figure]:
     @in_house_style
     def drawn(*arguments: Any, title: str | None = None, **options: Any) -> Figure:
         figure = draw(*arguments, **options)
-        if title:
-            _add_title(figure, title)
+        if title:  # above all panels, for which the figure grows
+            width, height = figure.get_size_inches()
+            taller = height + 1.6 * _LINE
+            for axes in figure.axes:
+                corners = axes.get_position(original=True).get_points()
+                axes.set_position(Bbox(corners * [1.0, height / taller]))
+            figure.set_size_inches(width, taller)
+            figure.suptitle(title, y=1.0 - 0.06 / taller, wrap=True)
         return figure
 
     signature = inspect.signature(draw)
@@ -167,17 +173,6 @@ def new_pictures(
     for axes in grid.flat:
         axes.yaxis.set_major_formatter(_Millions())
     return figure, grid
-
-
-def _add_title(figure: Figure, title: str) -> None:
-    """Put a title above all panels, for which the figure grows."""
-    width, height = figure.get_size_inches()
-    taller = height + 1.6 * _LINE
-    for axes in figure.axes:
-        corners = axes.get_position(original=True).get_points()
-        axes.set_position(Bbox(corners * [1.0, height / taller]))
-    figure.set_size_inches(width, taller)
-    figure.suptitle(title, y=1.0 - 0.06 / taller, wrap=True)
 
 
 class _Millions(ScalarFormatter):
@@ -290,11 +285,11 @@ def longest_series(table: pd.DataFrame, over: str) -> pd.DataFrame | None:
     """
     column, quantity, _ = _AXES[over]
     fixed = ["excitation_Hz" if over == "load" else "static_load_N", *STATIC_KEY[1:]]
-    best, length = None, 1
-    for _, group in table.groupby([name for name in fixed if name in table], sort=True):
-        if group[column].nunique() > length:
-            best, length = group, group[column].nunique()
-    return None if best is None else best.sort_values(column, kind="stable").assign(at=best[column] / size(quantity))
+    groups = [group for _, group in table.groupby([name for name in fixed if name in table])]
+    best = max(groups, key=lambda group: group[column].nunique(), default=table)
+    if best[column].nunique() < 2:
+        return None
+    return best.sort_values(column, kind="stable").assign(at=best[column] / size(quantity))
 
 
 def constant_along(series: pd.DataFrame, over: str) -> str:

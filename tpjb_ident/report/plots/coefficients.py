@@ -9,7 +9,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rigdata.arrays import FloatArray
 from tpjb_ident.columns import size, symbol
 from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.report.drawing.picture import (
@@ -88,20 +87,16 @@ def coefficient(comparison: Comparison | pd.DataFrame, name: str, over: str = "l
     if name in DIRECT:
         from_zero(axes)
     add_legend(axes)
-    if apart:
-        label(grid[1, 0], axis_label(over), "deviation, %")
-        _draw_deviations(grid[1, 0], series, measured["at"], shares)
+    if apart:  # predicted / measured - 1, as far as the closest prediction reaches
+        axes = grid[1, 0]
+        label(axes, axis_label(over), "deviation, %")
+        _draw_predictions(axes, series, "off")
+        axes.errorbar(measured["at"], np.zeros(len(measured)), yerr=shares, **_BARS)
+        axes.margins(x=0.06)
+        reach = off.abs().groupby(series["pivots"]).max()
+        limit = 1.4 * max(np.max(shares), reach[reach > _EXACT].min() if (reach > _EXACT).any() else 1.0)
+        axes.set_ylim(-limit, limit)
     return figure
-
-
-def _draw_deviations(axes: Axes, series: pd.DataFrame, at: pd.Series, shares: FloatArray) -> None:
-    """Draw predicted / measured - 1 [%], as far as the closest prediction reaches."""
-    _draw_predictions(axes, series, "off")
-    axes.errorbar(at, np.zeros(len(at)), yerr=shares, **_BARS)
-    axes.margins(x=0.06)
-    reach = series["off"].abs().groupby(series["pivots"]).max()
-    limit = 1.4 * max(np.max(shares), reach[reach > _EXACT].min() if (reach > _EXACT).any() else 1.0)
-    axes.set_ylim(-limit, limit)
 
 
 def _draw_predictions(axes: Axes, series: pd.DataFrame, column: str) -> None:
@@ -145,12 +140,10 @@ def direct_coefficients(
     """
     kind = KINDS[part]
     figure, axes = new_picture(axis_label(over), f"{kind.quantity}, {kind.display_unit}")
-    drawn = False
     for number, (name, source) in enumerate(bearings.items()):
         series = longest_series(as_table(source), over)
         if series is None:
             continue
-        drawn = True
         rows = series.drop_duplicates("at")
         for entry in entries:
             colour = style_of(number)["color"]
@@ -158,7 +151,7 @@ def direct_coefficients(
             style |= {} if len(rows) >= CURVE else {"linestyle": "none"}
             value, errors = with_errors(rows, kind.column(entry), kind.display_scale)
             axes.errorbar(rows["at"], value, yerr=errors, **style, label=f"{name}, {part}{entry}")
-    if not drawn:
+    if not axes.lines:
         raise ValueError(f"no bearing was measured at two points over {over}: give a campaign with a series over it")
     axes.margins(x=0.06)
     if set(entries) <= {"xx", "yy"}:
@@ -212,18 +205,15 @@ def frf(
         axes.margins(x=0.05, y=0.1)
     add_legend(grid[0, 0])
     if over_band:
-        _draw_coherence(grid[2, 0], table)
+        axes = grid[2, 0]
+        label(axes, "frequency, Hz", "multiple coherence")
+        for number, axis in enumerate("xy"):
+            style = style_of(number) | {"marker": ""}
+            axes.plot(table["excitation_Hz"], table[f"coherence_{axis}"], **style, label=f"force along {axis}")
+        axes.set_ylim(min(0.9, 0.98 * table[["coherence_x", "coherence_y"]].min().min()), 1.01)
+        axes.margins(x=0.05)
+        add_legend(axes)
     return figure
-
-
-def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
-    label(axes, "frequency, Hz", "multiple coherence")
-    for number, axis in enumerate("xy"):
-        style = style_of(number) | {"marker": ""}
-        axes.plot(table["excitation_Hz"], table[f"coherence_{axis}"], **style, label=f"force along {axis}")
-    axes.set_ylim(min(0.9, 0.98 * table[["coherence_x", "coherence_y"]].min().min()), 1.01)
-    axes.margins(x=0.05)
-    add_legend(axes)
 
 
 def _frf_rows(source: Any) -> tuple[pd.DataFrame | None, FrequencyModel | None]:
@@ -244,14 +234,8 @@ def _frf_rows(source: Any) -> tuple[pd.DataFrame | None, FrequencyModel | None]:
     for entry, end in itertools.product(ENTRIES, ("", "_lo", "_hi")):  # h = K + i omega C
         columns[f"h{entry}_real_N_per_m{end}"] = rows[f"k{entry}_N_per_m{end}"]
         columns[f"h{entry}_imag_N_per_m{end}"] = rows[f"c{entry}_Ns_per_m{end}"] * omega
-    return rows[["excitation_Hz"]].assign(**columns), _model_of_sines(source, series)
-
-
-def _model_of_sines(source: Identification | pd.DataFrame, series: pd.DataFrame) -> FrequencyModel | None:
-    """The model that the frequencies of the series support; None where they refuse all, and for a table."""
-    wanted = tuple(series.iloc[0].reindex(list(STATIC_KEY)))
-    for group in getattr(source, "frequency_fits", list)():
-        fit = group.fits.get(group.supported)
-        if fit is not None and group.points[0].point.static_key == wanted:
-            return fit
-    return None
+    key, model = tuple(series.iloc[0].reindex(list(STATIC_KEY))), None
+    for group in getattr(source, "frequency_fits", list)():  # a table has none
+        if group.points[0].point.static_key == key:
+            model = model or group.fits.get(group.supported)
+    return rows[["excitation_Hz"]].assign(**columns), model

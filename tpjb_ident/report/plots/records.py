@@ -7,7 +7,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rigdata.arrays import FloatArray
 from rigdata.run import Run
 from rigdata.survey.spectrum import amplitude_spectrum
 from tpjb_ident.columns import size, symbol
@@ -159,29 +158,11 @@ def coherence_spectrum(run: Run, *, segment: float | None = None) -> Figure:
     piece = int(segment * rate) if segment else n // 8
     if piece < 16 or n < _FEWEST_SEGMENTS * piece // 2:
         raise ValueError(f"run {run.id} has {n} samples: too few for segments of {piece}; give a shorter segment")
-    frequency, value, averages = _multiple_coherence(force, move, rate, piece)
-    figure, axes = new_picture("frequency, Hz", "multiple coherence")
-    for number, (axis, row) in enumerate(zip(_AXES, value, strict=True)):
-        axes.plot(frequency, row, **style_of(number) | {"marker": ""}, label=f"{axis} force")
-    # under no coherence at all, two inputs and m averages: Beta(2, m - 2)
-    from scipy.special import betaincinv
-
-    chance = betaincinv(2, max(averages - 2, 1), _LEVEL)
-    axes.axhline(chance, color=INK, linestyle=":", linewidth=0.9, label="by chance, 95 %")
-    axes.set_ylim(0.0, 1.02)
-    _end_axis(axes, run, _TIMES * run.point.excitation_hz or 0.5 * rate)
-    add_legend(axes)
-    return figure
-
-
-def _multiple_coherence(
-    force: FloatArray, move: FloatArray, rate: float, piece: int
-) -> tuple[FloatArray, FloatArray, int]:
-    """Frequencies (m,) [Hz], coherence (2, m), and the number of independent averages."""
-    good = np.isfinite(force).all(axis=1) & np.isfinite(move).all(axis=1)
     signals = np.column_stack([move, force])
-    signals = np.where(np.asarray(good)[:, None], signals, signals[good].mean(axis=0))
+    good = np.asarray(np.isfinite(signals).all(axis=1))
+    signals = np.where(good[:, None], signals, signals[good].mean(axis=0))
     from scipy.signal import csd
+    from scipy.special import betaincinv
 
     frequency, cross = csd(signals.T[:, None], signals.T[None], rate, "hann", piece, detrend="constant")
     cross = np.moveaxis(cross, -1, 0)
@@ -189,8 +170,18 @@ def _multiple_coherence(
     explained = np.einsum("fij,fij->fj", joint.conj(), np.linalg.pinv(inputs, rcond=1e-10, hermitian=True) @ joint).real
     value = np.clip(explained / np.maximum(power, 1e-300), 0.0, 1.0)
     # half-overlapping Hann windows: about 11/9 of the pieces that fit side by side count as independent
-    pieces = (len(signals) - piece) // (piece - piece // 2) + 1
-    return frequency, value.T, max(math.floor(11.0 / 18.0 * pieces), 3)
+    pieces = (n - piece) // (piece - piece // 2) + 1
+    averages = max(math.floor(11.0 / 18.0 * pieces), 3)
+    figure, axes = new_picture("frequency, Hz", "multiple coherence")
+    for number, (axis, row) in enumerate(zip(_AXES, value.T, strict=True)):
+        axes.plot(frequency, row, **style_of(number) | {"marker": ""}, label=f"{axis} force")
+    # under no coherence at all, two inputs and m averages: Beta(2, m - 2)
+    chance = betaincinv(2, max(averages - 2, 1), _LEVEL)
+    axes.axhline(chance, color=INK, linestyle=":", linewidth=0.9, label="by chance, 95 %")
+    axes.set_ylim(0.0, 1.02)
+    _end_axis(axes, run, _TIMES * run.point.excitation_hz or 0.5 * rate)
+    add_legend(axes)
+    return figure
 
 
 _FLAGGED = 0.9
@@ -215,7 +206,7 @@ def coherence(identification: Identification | pd.DataFrame) -> Figure:
     if not len(table):
         raise ValueError("there is no operating point to draw")
     rows = table.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
-    unexplained = np.clip(1.0 - rows["coherence"].to_numpy(float), _SMALLEST, None)
+    unexplained = np.maximum(1.0 - rows["coherence"].to_numpy(float), _SMALLEST)
     width = max(4.6, 0.36 * len(rows) + 1.2)
     place = f"static load, {symbol('load')}, and excitation, Hz"
     figure, axes = new_picture(place, "1 - coherence", width=width, height=3.4)

@@ -2,11 +2,9 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -124,31 +122,27 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame) -> Figure:
     figure, grid = new_pictures(len(models), 1, width=width, height=_HEIGHT)
     limit = max(frame["z"].abs().max(), 3.0 * _LINEAR)
     norm = SymLogNorm(linthresh=_LINEAR, linscale=0.6, vmin=-limit, vmax=limit, base=10)
+    ticks = [t for t in (-1000, -100, -30, -10, -2, 0, 2, 10, 30, 100, 1000) if abs(t) <= limit]
     for (axes,), model in zip(grid, models, strict=True):
-        _draw_map(axes, frame[frame["model"] == model], points, norm, MODEL_LABELS.get(model, str(model)))
+        rows = frame[frame["model"] == model]
+        cells = rows.pivot_table(index="entry", columns=list(points), values="z", dropna=False)
+        table = cells.reindex(index=COEFFICIENTS, columns=pd.MultiIndex.from_frame(points)).to_numpy()
+        size = np.sqrt(np.nanmean(table**2))
+        heading = f"{MODEL_LABELS.get(model, model)}: root mean square {size:.3g} sigma"
+        label(axes, f"static load, {symbol('load')}, and excitation, Hz", "", heading)
+        image = axes.imshow(table, cmap=DIVERGING, norm=norm)
+        axes.grid(False)
+        axes.set_yticks(range(len(COEFFICIENTS)), COEFFICIENTS)
+        set_point_ticks(axes, points)
+        axes.axhline(3.5, color=INK, linewidth=0.8)
+        for (i, j), z in np.ndenumerate(table):
+            if np.isfinite(z):
+                colour, text = "white" if abs(norm(z) - 0.5) > 0.3 else _ON_COLOUR, plain(z, 0 if abs(z) >= 9.95 else 1)
+                axes.text(j, i, text, ha="center", va="center", fontsize=SMALL, color=colour)
+        bar = add_colour_bar(axes, image, "(measured - predicted) / sigma")
+        bar.set_yticks(ticks, [plain(t, 0) for t in ticks])
+        bar.minorticks_off()
     return figure
-
-
-def _draw_map(axes: Axes, frame: pd.DataFrame, points: pd.DataFrame, norm: Any, name: str) -> None:
-    cells = frame.pivot_table(index="entry", columns=list(points), values="z", dropna=False)
-    table = cells.reindex(index=COEFFICIENTS, columns=pd.MultiIndex.from_frame(points)).to_numpy()
-    size = np.sqrt(np.nanmean(table**2))
-    label(axes, f"static load, {symbol('load')}, and excitation, Hz", "", f"{name}: root mean square {size:.3g} sigma")
-    image = axes.imshow(table, cmap=DIVERGING, norm=norm)
-    axes.grid(False)
-    axes.set_yticks(range(len(COEFFICIENTS)), COEFFICIENTS)
-    set_point_ticks(axes, points)
-    axes.axhline(3.5, color=INK, linewidth=0.8)
-    for (i, j), z in np.ndenumerate(table):
-        if np.isfinite(z):
-            colour = "white" if abs(norm(z) - 0.5) > 0.3 else _ON_COLOUR
-            axes.text(
-                j, i, plain(z, 0 if abs(z) >= 9.95 else 1), ha="center", va="center", fontsize=SMALL, color=colour
-            )
-    bar = add_colour_bar(axes, image, "(measured - predicted) / sigma")
-    ticks = [t for t in (-1000, -100, -30, -10, -2, 0, 2, 10, 30, 100, 1000) if abs(t) <= norm.vmax]
-    bar.set_yticks(ticks, [plain(t, 0) for t in ticks])
-    bar.minorticks_off()
 
 
 #: Coefficients that are drawn: those that disagree most.
@@ -190,15 +184,13 @@ def residual_series(
     figure, axes = new_picture(axis_label(over), "(measured - predicted) / sigma", width=5.2, height=3.4)
     axes.axhspan(-2, 2, color=RULE, alpha=0.6, linewidth=0)
     for number, entry in enumerate(chosen):
-        style = style_of(number)
-        colour = style["color"]
+        style = dict(style_of(number))
         for k, model in enumerate(models):
             rows = series[(series["entry"] == entry) & (series["model"] == model)]
-            line = style_of(len(models) - 1 - k)["linestyle"] if len(rows) >= CURVE else "none"
-            face = colour if model == models[-1] else PAPER
+            style["linestyle"] = style_of(len(models) - 1 - k)["linestyle"] if len(rows) >= CURVE else "none"
+            face = style["color"] if model == models[-1] else PAPER
             name = f"{entry}, {MODEL_LABELS.get(model, model)}"
-            axes.plot(rows["at"], rows["z"], color=colour, marker=style["marker"], linestyle=line,
-                      markerfacecolor=face, markersize=4.5, label=name)  # fmt: skip
+            axes.plot(rows["at"], rows["z"], **style, markerfacecolor=face, markersize=4.5, label=name)
     add_legend(axes)
     return figure
 
@@ -216,9 +208,9 @@ def gap(
     source : Diagnosis, Verdict or mapping
         Or ``gap_by_observable`` of ``diagnosis.json``: ``{"kxx": {"heldout_before": 9.1, "heldout_after": 1.0}}``.
     """
-    # a diagnosis holds a verdict, whose own `verdict` is a word
-    verdict: Any = source if hasattr(source, "gap_by_observable") else getattr(source, "verdict", None)
-    gaps = source if isinstance(source, Mapping) else verdict.gap_by_observable
+    if isinstance(source, Diagnosis):
+        source = source.verdict
+    gaps = source if isinstance(source, Mapping) else source.gap_by_observable
     if not gaps:
         raise ValueError("there is no gap by observable to draw")
     before, after = (np.array([gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))

@@ -27,7 +27,6 @@ from tpjb_ident.report.drawing.picture import (
     PAPER,
     RULE,
     SMALL,
-    Style,
     add_legend,
     from_zero,
     label,
@@ -138,11 +137,9 @@ def pad_projection(curves: Sequence[PivotCurve]) -> Figure:
         _draw_vectors(places, curve, moves, curve.displacement_direction.angle)
     label(forces, f"horizontal load, {symbol('load')}", f"vertical load, {symbol('load')}", "static load")
     label(places, f"x, {symbol('length')}", f"y, {symbol('length')}", "displacement, shaft against housing")
-    marks: Style = {"marker": "o", "linestyle": "none", "color": INK}
-    handles = [
-        Line2D([], [], **marks, markerfacecolor="none", label="measured"),
-        Line2D([], [], **marks, label="on the pad's direction"),
-    ]
+    handles = []
+    for face, name in (("none", "measured"), (INK, "on the pad's direction")):
+        handles.append(Line2D([], [], marker="o", linestyle="none", color=INK, markerfacecolor=face, label=name))
     for axes in (forces, places):
         reach = 1.3 * max(np.max(np.abs(line.get_xydata())) for line in axes.get_lines())
         axes.set(xlim=(-reach, reach), ylim=(-reach, reach))
@@ -198,7 +195,14 @@ def pivot_stiffness(
     figure, axes = new_picture(f"load on the pad, {symbol('load')}", f"tangent stiffness, {symbol('stiffness')}")
     shown = grid / size("load")
     for curve in curves:
-        _draw_stiffness(axes, curve, grid)
+        style = style_of(curve.pad - 1) | {"marker": ""}
+        value, outside = curve.stiffness(grid) / size("stiffness"), curve.is_extrapolated(grid)
+        measured = np.where(outside, np.nan, [value, *(end / size("stiffness") for end in curve.stiffness_band(grid))])
+        axes.fill_between(shown, *measured[1:], color=style["color"], alpha=0.2, linewidth=0)
+        axes.plot(shown, measured[0], **style, linewidth=1.7, label=f"pad #{curve.pad}")
+        # one point of overlap, so that the two lines meet
+        extrapolated = np.where(outside | np.roll(outside, 1) | np.roll(outside, -1), value, np.nan)
+        axes.plot(shown, extrapolated, color=style["color"], linestyle=(0, (1, 2)), linewidth=0.9)
     if formula is not None:
         printed = np.array([formula(curves[0].pad, float(load)) for load in grid]) / size("stiffness")
         axes.plot(shown, printed[:, 1], color=INK, label="Kirk, tangent")
@@ -211,19 +215,6 @@ def pivot_stiffness(
         axes.text(start, 0.02, " extrapolated", transform=axes.get_xaxis_transform(), fontsize=SMALL, color=GREY)
     add_legend(axes)
     return figure
-
-
-def _draw_stiffness(axes: Axes, curve: PivotCurve, grid: FloatArray) -> None:
-    style = style_of(curve.pad - 1) | {"marker": ""}
-    value, band = curve.stiffness(grid) / size("stiffness"), curve.stiffness_band(grid)
-    outside = curve.is_extrapolated(grid)
-    shown, low, high = (np.where(outside, np.nan, part) for part in (value, *(b / size("stiffness") for b in band)))
-    load = grid / size("load")
-    axes.fill_between(load, low, high, color=style["color"], alpha=0.2, linewidth=0)
-    axes.plot(load, shown, **style, linewidth=1.7, label=f"pad #{curve.pad}")
-    # one point of overlap, so that the two lines meet
-    extrapolated = np.where(outside | np.roll(outside, 1) | np.roll(outside, -1), value, np.nan)
-    axes.plot(load, extrapolated, color=style["color"], linestyle=(0, (1, 2)), linewidth=0.9)
 
 
 _TWO_SIGMA = 2.4477  # radius of the 95 % region of two normal variables, in standard deviations
@@ -256,25 +247,31 @@ def clearance_and_locus(
     ValueError
         When there is nothing to draw.
     """
-    named = {} if polygons is None else polygons if isinstance(polygons, Mapping) else {"measured": polygons}
+    named = polygons or {}
+    if not isinstance(named, Mapping):
+        named = {"measured": named}
     if not named and locus is None and not predicted and drawing is None:
         raise ValueError("nothing to draw: give polygons, a locus, predicted positions or a drawing")
     figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", width=4.6, height=4.8)
     if drawing is not None:
-        angles, clearances = (np.asarray(values) for values in drawing)
+        angles, clearances = map(np.asarray, drawing)
         order = np.argsort(angles % (2 * np.pi))  # its pads stand in any order
         _draw_closed(axes, corners(angles[order], clearances[order]), "--", color=GREY, label="clearance, drawing")
     for number, (name, polygon) in enumerate(named.items()):
         if not np.isfinite(polygon.corners).all():
             continue
-        line = {"color": style_of(number)["color"] if number else INK, "linestyle": style_of(number)["linestyle"]}
-        text = "clearance, measured" if name == "measured" else f"clearance, {name}"
-        _draw_closed(axes, polygon.corners, **line, linewidth=1.5, label=text)
+        line = style_of(number) | {"marker": ""} | ({} if number else {"color": INK})
+        _draw_closed(axes, polygon.corners, **line, linewidth=1.5, label=f"clearance, {name}")
         _draw_closed(axes, corners(polygon.fitted_angle, polygon.clearance_pushed), **line, linewidth=0.6)
-    if named:
-        _draw_numbers(axes, next(iter(named.values())))
-    styles = model_styles(list(predicted or {}))
-    for name, places in (predicted or {}).items():
+    for polygon in list(named.values())[:1]:  # number of each pad, just inside its side
+        for k, (angle, clearance) in enumerate(zip(polygon.angles, polygon.clearance, strict=True), 1):
+            if np.isfinite(clearance):
+                toward = directions(angle)
+                axes.annotate(f"#{k}", tuple(clearance / size("length") * toward), tuple(-10.0 * toward),
+                              textcoords="offset points", ha="center", va="center", fontsize=SMALL)  # fmt: skip
+    predicted = predicted or {}
+    styles = model_styles(list(predicted))
+    for name, places in predicted.items():
         _draw_closed(axes, places, **styles[name] | {"marker": ""}, label=MODEL_LABELS.get(name, name))
     if locus is not None:
         _draw_locus(axes, locus)
@@ -287,15 +284,6 @@ def clearance_and_locus(
 def _draw_closed(axes: Axes, points: FloatArray, *form: str, **look: Any) -> None:
     """Draw points (n, 2) [m] with a line that ends where it began."""
     axes.plot(*(np.vstack([points, points[:1]]) / size("length")).T, *form, **look)
-
-
-def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
-    """Number of each pad, just inside its side."""
-    for k, (angle, clearance) in enumerate(zip(polygon.angles, polygon.clearance, strict=True), 1):
-        if np.isfinite(clearance):
-            toward = directions(angle)
-            axes.annotate(f"#{k}", tuple(clearance / size("length") * toward), tuple(-10.0 * toward),
-                          textcoords="offset points", ha="center", va="center", fontsize=SMALL)  # fmt: skip
 
 
 def _draw_locus(axes: Axes, locus: Locus) -> None:
