@@ -27,6 +27,7 @@ from tpjb_ident.compare.predictions import (
     refuse_counted_twice,
 )
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
+from tpjb_ident.compare.static_tests import implausible_pivots
 from tpjb_ident.compare.summary import _clearance_sentence, _extrapolation_sentence
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError
@@ -222,3 +223,14 @@ def test_a_comparison_says_what_it_left_out_and_predicts_as_if_it_were_not_there
     stiffness = [list(result.predictions["measured"][list(STIFFNESS.columns)].iloc[0]) for result in (given, plain)]
     assert stiffness[0] == pytest.approx(stiffness[1])
     assert any("without pivot_flexibility" in remark for remark in given.remarks)
+
+
+@pytest.mark.parametrize(("scale", "extent"), [(1.0, ""), (1e-3, "0.0005 to 0.001 times"), (22.0, "11 to 22 times")])
+def test_curves_that_no_pivot_of_the_bearing_has_are_told_by_the_formula(scale, extent):
+    curves = [
+        SimpleNamespace(pad=pad, valid_to=5000.0, stiffness=lambda load, pad=pad: scale * 1e9 / pad) for pad in (1, 2)
+    ]
+    texts = implausible_pivots(curves, lambda pad, load: (2e9, 1e9))
+    assert len(texts) == bool(extent)
+    assert all(text.startswith(f"pad #1, pad #2: {extent}") for text in texts)
+    assert implausible_pivots(curves, None) == []

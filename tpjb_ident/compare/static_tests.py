@@ -18,7 +18,10 @@ from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.refusals import usable_runs
+from tpjb_ident.pivot.tables import Formula
 
+#: Measured stiffness over the formula's beyond which a scale is wrong: pivots are softer, a third to a tenth in places.
+_STIFFNESS = (0.03, 3.0)
 #: Measured over drawn clearance beyond which the probes' scale is wrong, or the bearing file is another bearing's.
 _SCALE = (0.5, 2.0)
 
@@ -48,6 +51,22 @@ def measure_static(
     locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
     excluded += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]
     return StaticTests(curves, clearance, locus, tuple(excluded), tuple(polygons[1:]))
+
+
+def implausible_pivots(curves: Sequence[PivotCurve], formula: Formula | None) -> list[str]:
+    """What to say of curves that no pivot of the bearing can have: a unit or a sensitivity is wrong."""
+    if formula is None:
+        return []
+    ratios = {}
+    for curve in curves:
+        ratio = float(curve.stiffness(curve.valid_to)) / formula(curve.pad, curve.valid_to)[1]
+        if not _STIFFNESS[0] < ratio < _STIFFNESS[1]:
+            ratios[f"pad #{curve.pad}"] = ratio
+    if not ratios:
+        return []
+    extent = " to ".join(dict.fromkeys(f"{end:.2g}" for end in (min(ratios.values()), max(ratios.values()))))
+    what = f"{extent} times as stiff as Kirk's formula: a unit or a sensitivity of cells or probes is wrong"
+    return [f"{', '.join(ratios)}: {what}, or it is another bearing's file"]
 
 
 def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Problem] = ()) -> list[Problem]:

@@ -21,7 +21,7 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     import pandas as pd
 
     from tpjb_ident.clearance.measure import pairs_frame
-    from tpjb_ident.compare.static_tests import measure_static
+    from tpjb_ident.compare.static_tests import bearing_problems, measure_static
     from tpjb_ident.report.comparison_page import clearance_table
     from tpjb_ident.report.sections import position_panels
 
@@ -49,7 +49,8 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
         c.print(f"locus: {str(static.locus).partition('; ')[0]}")
     for polygon in polygons:
         c.print(str(polygon))
-    c.judge({name: part.status for name, part in parts.items()} | {"left out": static.left_out})
+    wrong = [str(problem) for problem in bearing_problems(source, drawing) if problem.severity == "error"]
+    c.judge({name: part.status for name, part in parts.items()} | {"left out": static.left_out}, wrong)
     if static.clearance is None and source.of_kind("clearance"):
         raise NotTrustedError(
             "no clearance run can be used: positions count from the probes' zero, not from the centre."

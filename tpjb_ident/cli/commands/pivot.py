@@ -12,7 +12,7 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     Writes pivot_curves and pivot_pads (.csv, .parquet), pivots.toml, which `tpjb predict --pivots` reads, and figures.
     """
     from tpjb_ident.compare.predictions import printed_formula
-    from tpjb_ident.compare.static_tests import bearing_problems
+    from tpjb_ident.compare.static_tests import bearing_problems, implausible_pivots
     from tpjb_ident.pivot.fit import fit_pivots
     from tpjb_ident.pivot.tables import pads_table, pivot_table, write_pivots
     from tpjb_ident.report.comparison_page import pivot_stiffness_table
@@ -31,8 +31,12 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     c.print(f"{source.id}: {len(curves)} of {len(tested)} pads with dry tests have a pivot curve.")
     c.show_table(pivot_stiffness_table(curves, formula), source.id)
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
-    for problem in bearing_problems(source, drawing):  # what is wrong with the probes is wrong with the curves
-        c.warn(str(problem))
     without = tested - {curve.pad for curve in curves}
     refused = [f"pad #{pad}: has no curve, its records were refused" for pad in sorted(without)]
+    refused += implausible_pivots(curves, formula)
+    for problem in bearing_problems(source, drawing):  # what is wrong with the probes is wrong with the curves
+        if problem.severity == "error":
+            refused.append(str(problem))
+        else:
+            c.warn(str(problem))
     c.judge({f"pad #{curve.pad}": curve.status for curve in curves}, refused)
