@@ -328,7 +328,8 @@ def band_conditions(point: BandPoint, solved: BandSolution, b: int) -> Condition
     unknown = int((~bare.known(solved.omega[usable])).sum()) if len(bare.omega) else 0
     blind = point.method == "hv" and len(usable) > 0
     coherent = float(np.median([solved.classic[k].coherence.min() for k in usable])) if len(usable) else 1.0
-    least = MIN_COHERENCE if blind else _LEAST_COHERENCE
+    # a record of blows is quiet for the most part: its noise is no fault
+    least = MIN_COHERENCE if blind else _LEAST_COHERENCE * (point.kind != "impact")
     text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {coherent:.3f})"
     return merged(
         fit_conditions(0.0 if alike or few else condition, np.empty(0), len(point.runs)),
