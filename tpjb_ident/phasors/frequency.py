@@ -177,9 +177,7 @@ def _line_slip(result: RunPhasors, line: int | None, places: list[int] | slice =
     return 0.0 if advance is None else advance.slip
 
 
-def tuned(
-    run: Run, result: RunPhasors, driven: tuple[float, ...], speed: float, settings: PhasorSettings
-) -> Tuning | None:
+def tuned(run: Run, result: RunPhasors, driven: tuple[float, ...], settings: PhasorSettings) -> Tuning | None:
     """Compare a first fit with what it assumed; None where it was good enough."""
     span = result.start[-1] - result.start[0] + result.length
     slips = np.array([_line_slip(result, i) for i in range(len(result.lines.excitation))])
@@ -196,7 +194,8 @@ def tuned(
         low, high = follow.speed.min(), follow.speed.max()
         conditions += (Condition(DRIFT, f"shaft speed between {low:.4g} and {high:.4g} Hz; followed by window"),)
     rate = run.sample_rate
-    lines = known_lines(exact, speed + turning, rate, settings.mains, result.lines.found, run.length / rate)
+    speed = result.lines.speed + turning
+    lines = known_lines(exact, speed, rate, settings.mains, result.lines.found, run.length / rate)
     return Tuning(lines, follow, conditions, settled)
 
 

@@ -271,7 +271,7 @@ class _RunFit:
         self._add_unexpected()
         self._add_near()
         for _ in range(_TUNINGS):
-            better = tuned(run, self.result, self.driven, self.speed, settings)
+            better = tuned(run, self.result, self.driven, settings)
             if better is None:
                 break
             self.conditions += better.conditions
@@ -289,7 +289,7 @@ class _RunFit:
         self.run = run
         self._fit_windows(first.lines)
         self.conditions = tuple(c for c in self.conditions if c != DRIFT)
-        better = tuned(run, self.result, self.driven, first.lines.speed, self.settings)
+        better = tuned(run, self.result, self.driven, self.settings)
         if better is not None:
             self.conditions += better.conditions
             quick = retuned(self.result, better.lines) if better.follow is None else None
