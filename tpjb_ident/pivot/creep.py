@@ -21,18 +21,37 @@ from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.dry_record import DryRecord, pooled_noise, smooth_columns
 
-_PLAUSIBLE = 0.03  # share of the deflection that liners and joints creep: what holds hardly show is not made large
+# share of the deflection that liners and joints creep: what holds hardly show is not made large; the same of a joint
+# that only one pad has
+_PLAUSIBLE, _OF_ONE = 0.03, 0.2
 _TIMES = (0.3, 1.0, 3.0, 10.0)  # time constants over the usual length of a hold
 # standard errors from which it is creep, by the noise, which takes creep for drift, and by how the runs differ
 _LEAST, _ALIKE = 3.0, 5.0
 _ROUNDS = 4
 
 
-def without_creep(records: Sequence[DryRecord], noise: NoiseModel) -> tuple[list[DryRecord], NoiseModel, Conditions]:
-    """Records less the creep that their holds show alike, their noise, and a condition.
+def without_creep(
+    records: Sequence[DryRecord], noise: NoiseModel
+) -> tuple[list[DryRecord], NoiseModel, dict[int, Conditions]]:
+    """Records less the creep that all holds show alike, else those of a pad; their noise, and conditions by pad.
 
     Without creep they are given back as they are.
     """
+    pads = {record.pad: [other for other in records if other.pad == record.pad] for record in records}
+    less, noise, shared = _less_alike(records, noise, _PLAUSIBLE)
+    if shared:
+        return less, noise, dict.fromkeys(pads, shared)
+    found, less = {}, []
+    for pad, members in pads.items():
+        crept, _, found[pad] = _less_alike(members, noise, _OF_ONE)
+        less += crept
+    return less, pooled_noise(less) if any(found.values()) else noise, found
+
+
+def _less_alike(
+    records: Sequence[DryRecord], noise: NoiseModel, plausible: float
+) -> tuple[list[DryRecord], NoiseModel, Conditions]:
+    """Records less the creep that they share, their noise, and a condition."""
     held = [record for record in records if record.holds]
     if not held:
         return list(records), noise, ()
@@ -43,7 +62,7 @@ def without_creep(records: Sequence[DryRecord], noise: NoiseModel) -> tuple[list
     for _ in range(_ROUNDS):  # what noise there is shows when the creep is off: until then it takes much for drift
         sums = np.array([_held_to_light(record, noise, times) for record in held])
         information, pull = np.maximum(sums[:, 0], 1e-300), sums[:, 1]
-        total = information.sum(axis=0) + _PLAUSIBLE**-2
+        total = information.sum(axis=0) + plausible**-2
         share = pull.sum(axis=0) / total
         scatter = np.sum(information * (pull / information - share) ** 2, axis=0) / max(len(held) - 1, 1)
         error = np.sqrt(np.maximum(scatter, 1.0) / total)

@@ -257,7 +257,9 @@ def fit_pivots(
     for record in sorted(used, key=lambda record: record.pad):
         pads[record.pad].append(replace(record, good=~bad_blocks(record, noise)))
     curves = _fit_pads(list(pads.values()), structure_behind(records))
-    return tuple(replace(curve, status=(*curve.status, *creeps, *refused_runs(problems))) for curve in curves)
+    return tuple(
+        replace(curve, status=(*curve.status, *creeps[curve.pad], *refused_runs(problems))) for curve in curves
+    )
 
 
 def _read(campaign: Campaign, angles: FloatArray) -> tuple[list[DryRecord], list[Problem]]:
