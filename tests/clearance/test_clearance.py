@@ -18,8 +18,9 @@ from tests.clearance.cases import ANGLES, CLEARANCE, OtherRun, bearing_centre, r
 from tpjb_ident.clearance import measure
 from tpjb_ident.clearance.measure import _inseparable, coldest_first, measure_clearance, measure_run, pairs_frame
 from tpjb_ident.clearance.polygon import find_centre
+from tpjb_ident.clearance.probe_errors import probe_errors
 from tpjb_ident.clearance.sweep import _settled
-from tpjb_ident.compare.static_tests import bearing_problems
+from tpjb_ident.compare.static_tests import _turned_probes, bearing_problems
 from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot.fit import fit_pivots
 
@@ -73,6 +74,22 @@ def test_pads_that_stand_further_out_than_they_are_bored_have_negative_preload(w
     assert all(re.search(r"negative preload: #3 -0\.03\d$", p.what) for p in named)
     polygon = measure_clearance(source, ANGLES, curves)
     assert polygon.negative_preloads([80e-6, 80e-6, 86e-6, 80e-6, 80e-6]) == ""
+
+
+@pytest.mark.parametrize(("turned", "severity"), [((0.0, 0.0), ""), ((7.0, 0.0), "warning"), ((0.0, -24.0), "error")])
+def test_a_probe_that_stands_elsewhere_is_told_by_the_sides(whole, measured, turned, severity):
+    source, _ = whole
+    (run,) = (run for run in source.runs if run.id == measured[0].run)
+    axes = np.array([probe.axis for probe in run.of("displacement")])
+    position = np.linalg.solve(directions(axes), directions(axes + np.radians(turned)))
+    normals = directions(ANGLES) @ np.linalg.inv(position)
+    shown = replace(measured[0], as_read=None, fitted_angle=np.arctan2(normals[:, 1], normals[:, 0]))
+    errors = probe_errors(shown, axes.tolist())
+    assert np.degrees(errors.imag) == pytest.approx(turned, abs=0.3)
+    assert errors.real == pytest.approx(0.0, abs=0.01)
+    problems = _turned_probes(run, shown)
+    assert [p.severity for p in problems] == ([severity] if severity else [])
+    assert all(f"stands {sum(turned):+.1f} deg off its stated axis" in p.what for p in problems)
 
 
 def test_two_push_loads_give_the_radial_stiffness_and_a_hot_sweep_what_the_bearing_grew(whole, measured, opened):

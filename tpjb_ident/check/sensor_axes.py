@@ -11,10 +11,11 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.problem import RigDataError
-from rigdata.vector import directions, wrapped
+from rigdata.vector import directions
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.clearance.measure import coldest_first, measure_run
-from tpjb_ident.clearance.polygon import SIDES, TILT_SPREAD
+from tpjb_ident.clearance.polygon import SIDES
+from tpjb_ident.clearance.probe_errors import probe_errors, usual_error
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 
@@ -24,9 +25,8 @@ _TELLING, _MIN_RUNS = 30.0, 4
 _ALIKE, _UNUSUAL = 0.01, 0.05
 #: Deviations from which a run loses weight, and standard errors from which a sensor is off.
 _BEND, _CLEAR = 1.5, 4.0
-#: Pads from which the sides tell gains and axes; by how much pads stand elsewhere than stated [rad]; what is plausible
-#: of gains and turns, one deviation; steps to their most probable values.
-_MIN_PADS, _PADS, _PLAUSIBLE, _STEPS = 4, 0.01, 0.3, 8
+#: Pads from which the sides tell gains and axes.
+_MIN_PADS = 4
 
 
 def check_cells(observations: Sequence[Observation]) -> None:
@@ -93,37 +93,8 @@ def check_probes(sweeps: Sequence[Observation], dry: Sequence[Observation]) -> N
     except RigDataError:  # said by its own check
         return
     if len(probes) == 2:
-        fitted = polygon.as_read[1] if polygon.as_read else polygon.fitted_angle
-        # without the sides' prior, which takes machined ones for granted
-        precision = np.maximum(polygon.fitted_angle_se**-2 - TILT_SPREAD**-2, 1e-3 * TILT_SPREAD**-2)
-        tilt = (fitted - polygon.angles) * (1 + TILT_SPREAD**-2 / precision)
-        gain, *turns = _of_sides(polygon.angles, tilt, precision**-0.5, [p.axis or 0.0 for p in probes])
-        # which of two gains is off the sides do not tell: each may be by all of it
-        logarithms = np.array([gain, -gain]) + 1j * np.array(turns)
+        logarithms = probe_errors(polygon, [probe.axis or 0.0 for probe in probes])
         _ask([observation], observation.names("displacement"), logarithms, SIDES)
-
-
-def _of_sides(angles: FloatArray, tilt: FloatArray, error: FloatArray, axes: Sequence[float]) -> list[float]:
-    """Gain of the first of two probes over the second's, and the turns of both [rad], of which sides are turned alike.
-
-    Positions come out as D^-1 R p, with D of the stated axes, R of the true ones and their gains; a side's normal turns
-    as its inverse transpose does. `angles`, `tilt`, `error` (n,) [rad] of the pads and of their sides beside them.
-    """
-    told = np.isfinite(tilt)
-    weight, normals, stated = 1 / np.hypot(error[told], _PADS), directions(angles[told]), np.asarray(axes)
-
-    def left(numbers: FloatArray) -> FloatArray:
-        true = directions(stated + numbers[1:]) * [[1 + numbers[0]], [1.0]]
-        turned = normals @ np.linalg.inv(np.linalg.solve(directions(stated), true))
-        off = wrapped(angles[told] + tilt[told] - np.arctan2(turned[:, 1], turned[:, 0]))
-        return np.append(weight * off, numbers / _PLAUSIBLE)
-
-    numbers = np.zeros(3)
-    for _ in range(_STEPS):
-        slopes = np.stack([(left(numbers + step) - left(numbers - step)) / 2e-6 for step in 1e-6 * np.eye(3)], axis=1)
-        numbers = np.clip(numbers - np.linalg.lstsq(slopes, left(numbers), rcond=None)[0], -0.7, 0.7)
-    clear = np.abs(numbers) > _CLEAR * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
-    return [float(np.log1p(numbers[0])) * clear[0], *(numbers * clear)[1:].tolist()]
 
 
 def _pad_directions(runs: Sequence[Observation]) -> list[float]:
@@ -143,8 +114,8 @@ def _ask(observations: Sequence[Observation], names: Sequence[str], logarithms: 
     """Report sensors (m,) that are off against the others and the witness, each of which counts as one."""
     if not np.isfinite(logarithms).all():
         return
-    usual = [np.median([*numbers, 0.0]) for numbers in (logarithms.real, logarithms.imag)]
-    for name, gain, turn in zip(names, logarithms.real - usual[0], logarithms.imag - usual[1]):
+    errors = logarithms - usual_error(logarithms)
+    for name, gain, turn in zip(names, errors.real, errors.imag):
         angle = float(np.degrees(turn))
         for observation in observations:
             report = observation.report

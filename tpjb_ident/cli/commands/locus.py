@@ -49,7 +49,12 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
         c.print(f"locus: {str(static.locus).partition('; ')[0]}")
     for polygon in polygons:
         c.print(str(polygon))
-    wrong = [str(problem) for problem in bearing_problems(source, drawing) if problem.severity == "error"]
+    wrong = []
+    for problem in bearing_problems(source, drawing):
+        if problem.severity == "error":
+            wrong.append(str(problem))
+        elif problem.place.startswith("channel "):  # the conditions of the polygon say the others
+            c.warn(str(problem))
     c.judge({name: part.status for name, part in parts.items()} | {"left out": static.left_out}, wrong)
     if static.clearance is None and source.of_kind("clearance"):
         raise NotTrustedError(
