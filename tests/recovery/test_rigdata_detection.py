@@ -84,7 +84,7 @@ ONE_RUN = {
     "short channel": (Fault("short_channel", RUN, "X1A"), "error", "dataset X1A", "the others have 2000"),
     "group missing": (Fault("missing_file", RUN), "error", "", "group is missing"),
     "no samples": (Fault("empty_file", RUN), "error", "time", "only 0 samples"),
-    "csv: time gap": (Fault("time_gap", RUN, start=0.5, length=0.2), "warning", "", "about 200 samples lost"),
+    "csv: time gap": (Fault("time_gap", RUN, start=0.5, length=0.2), "warning", "channel X1A", "200 of 2000"),
     "csv: jitter": (Fault("time_jitter", RUN), "warning", "", "jitters"),
     "csv: column twice": (Fault("duplicate_column", RUN, "X1A"), "error", "", "'X1A' is in columns 2, 14"),
     "csv: last line cut": (Fault("truncated_line", RUN), "warning", "", "cut off"),

@@ -25,8 +25,9 @@ from tpjb_ident.pivot.dry_record import DryRecord, pooled_noise, smooth_columns
 # that only one pad has
 _PLAUSIBLE, _OF_ONE = 0.03, 0.2
 _TIMES = (0.3, 1.0, 3.0, 10.0)  # time constants over the usual length of a hold
-# standard errors from which it is creep, by the noise, which takes creep for drift, and by how the runs differ
-_LEAST, _ALIKE = 3.0, 5.0
+# standard errors from which it is creep, by the noise, which takes creep for drift, and by how the runs differ; of one
+# pad by the noise of the others
+_LEAST, _ALIKE, _ALONE = 3.0, 5.0, 4.0
 _ROUNDS = 4
 
 
@@ -38,18 +39,19 @@ def without_creep(
     Without creep they are given back as they are.
     """
     pads = {record.pad: [other for other in records if other.pad == record.pad] for record in records}
-    less, noise, shared = _less_alike(records, noise, _PLAUSIBLE)
+    less, noise, shared = _less_alike(records, noise, _PLAUSIBLE, _LEAST)
     if shared:
         return less, noise, dict.fromkeys(pads, shared)
     found, less = {}, []
     for pad, members in pads.items():
-        crept, _, found[pad] = _less_alike(members, noise, _OF_ONE)
+        others = [record for record in records if record.pad != pad]  # whose noise no creep of this pad is part of
+        crept, _, found[pad] = _less_alike(members, pooled_noise(others) if others else noise, _OF_ONE, _ALONE)
         less += crept
     return less, pooled_noise(less) if any(found.values()) else noise, found
 
 
 def _less_alike(
-    records: Sequence[DryRecord], noise: NoiseModel, plausible: float
+    records: Sequence[DryRecord], noise: NoiseModel, plausible: float, least: float
 ) -> tuple[list[DryRecord], NoiseModel, Conditions]:
     """Records less the creep that they share, their noise, and a condition."""
     held = [record for record in records if record.holds]
@@ -67,7 +69,7 @@ def _less_alike(
         scatter = np.sum(information * (pull / information - share) ** 2, axis=0) / max(len(held) - 1, 1)
         error = np.sqrt(np.maximum(scatter, 1.0) / total)
         best = np.argmax(share / error)
-        if share[best] < max(_LEAST * error[best], _ALIKE * math.sqrt(scatter[best] / total[best])):
+        if share[best] < max(least * error[best], _ALIKE * math.sqrt(scatter[best] / total[best])):
             break
         weight = special.softmax(0.5 * np.where(share > 0.0, (share / error) ** 2, 0.0))
         less = []
