@@ -252,12 +252,12 @@ def operators_at(
 ) -> PadOperators:
     """Operators at several convections of the free faces, the first axis of `expansion` and `flux`."""
     mesh = sector_mesh(geometry, density)
-    key = storage_key((geometry, density, even, convections))
-    is_stored = density != COARSE  # those are sooner solved, and many
-    arrays = load_arrays(key, ("compliance", "expansion", "flux")) if is_stored else None
+    # coarse ones are sooner solved, and many
+    key = "" if density == COARSE else storage_key((geometry, density, even, convections))
+    arrays = load_arrays(key, ("compliance", "expansion", "flux")) if key else None
     if arrays is None:
         arrays = _solve(geometry, mesh, even, convections)
-        if is_stored:
+        if key:
             save_arrays(key, arrays)
     arrays["compliance"].setflags(write=False)
     return PadOperators(mesh.theta, mesh.z, **arrays)

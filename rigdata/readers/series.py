@@ -198,13 +198,13 @@ def table(contents: Contents, record: RecordFile) -> Contents:
         if len(usable) not in (0, len(time)):  # missing times are set between their neighbours
             time = np.interp(np.arange(len(time)), usable, time[usable])
         places = _places(time)
-        whole = np.arange(places[-1] + 1 if len(places) else 0)
-        time = time if len(whole) == len(time) else np.interp(whole, places, time)
+        if places is not None:
+            time = np.interp(np.arange(places[-1] + 1), places, time)
         for i in members:
             values, group = series[i].values[rows], series[i].group
-            if len(whole) != len(values):
-                values = np.full(len(whole), np.nan)
-                values[places] = series[i].values[rows]
+            if places is not None:
+                values, present = np.full(len(time), np.nan), values
+                values[places] = present
             values = to_temporary_file(values)
             series[i] = replace(series[i], values=values, time=time, group=group if is_shared else column.name or group)
     ordered = [column for i, column in enumerate(series) if i not in clocks or names[i] in channels]
@@ -213,16 +213,17 @@ def table(contents: Contents, record: RecordFile) -> Contents:
     return replace(contents, series=ordered, clocks={names[i]: series[i].unit for i in clocks})
 
 
-def _places(time: FloatArray) -> IntArray:
-    """Places (n,) of rows on an even grid of times (n,) that a logger left rows out of; else one by one.
+def _places(time: FloatArray) -> IntArray | None:
+    """Places (n,) of rows on an even grid of times (n,) that a logger left rows out of; None where it left out none.
 
     A row that is left out is a reading without a value: what is known of gaps is known of either.
     """
     steps = np.diff(time) * rate_of_time(time)
     whole = np.rint(steps)
-    if len(time) and np.all((whole >= 1) & (np.abs(steps - whole) < _EVEN)) and whole.sum() < 2 * len(time):
-        return np.append(0, np.cumsum(whole)).astype(np.intp)
-    return np.arange(len(time))
+    is_even = np.all((whole >= 1) & (np.abs(steps - whole) < _EVEN))
+    if not is_even or not len(steps) < whole.sum() < 2 * len(time):
+        return None
+    return np.append(0, np.cumsum(whole)).astype(np.intp)
 
 
 def _slow_columns(series: Sequence[Series], record: RecordFile) -> list[Series]:

@@ -20,7 +20,7 @@ from tpjb_ident.clearance.measure import _inseparable, coldest_first, measure_cl
 from tpjb_ident.clearance.polygon import find_centre
 from tpjb_ident.clearance.probe_errors import probe_errors
 from tpjb_ident.clearance.sweep import _settled
-from tpjb_ident.compare.static_tests import _turned_probes, bearing_problems
+from tpjb_ident.compare.static_tests import bearing_problems, turned_probes
 from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot.fit import fit_pivots
 
@@ -87,7 +87,7 @@ def test_a_probe_that_stands_elsewhere_is_told_by_the_sides(whole, measured, tur
     errors = probe_errors(shown, axes.tolist())
     assert np.degrees(errors.imag) == pytest.approx(turned, abs=0.3)
     assert errors.real == pytest.approx(0.0, abs=0.01)
-    problems = _turned_probes(run, shown)
+    problems = turned_probes(run, shown)
     assert [p.severity for p in problems] == ([severity] if severity else [])
     assert all(f"stands {sum(turned):+.1f} deg off its stated axis" in p.what for p in problems)
 

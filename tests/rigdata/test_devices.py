@@ -223,6 +223,8 @@ def test_gaps_in_a_short_record_leave_its_rate_as_it_is():
     time = np.arange(len(rows)) / 2000.0
     assert rate_of_time(time[rows]) == rate_of_time(time) == 2000.0
     assert rate_of_time(np.round(time, 3)[rows]) == pytest.approx(2000.0, rel=2e-3)
+    assert np.isnan(rate_of_time(-time))
+    assert np.isnan(rate_of_time(0.0 * time))
 
 
 def test_a_time_dataset_of_another_length(tmp_path):

@@ -15,7 +15,7 @@ from rigdata.vector import directions
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.clearance.measure import coldest_first, measure_run
 from tpjb_ident.clearance.polygon import SIDES
-from tpjb_ident.clearance.probe_errors import probe_errors, usual_error
+from tpjb_ident.clearance.probe_errors import MIN_PADS, beside_the_usual, probe_errors
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 
@@ -25,8 +25,6 @@ _TELLING, _MIN_RUNS = 30.0, 4
 _ALIKE, _UNUSUAL = 0.01, 0.05
 #: Deviations from which a run loses weight, and standard errors from which a sensor is off.
 _BEND, _CLEAR = 1.5, 4.0
-#: Pads from which the sides tell gains and axes.
-_MIN_PADS = 4
 
 
 def check_cells(observations: Sequence[Observation]) -> None:
@@ -84,7 +82,7 @@ def check_probes(sweeps: Sequence[Observation], dry: Sequence[Observation]) -> N
     angles = _pad_directions(dry)
     usable = {observation.run.id: observation for observation in sweeps if not observation.report.cells_doubted}
     first = coldest_first([observation.run for observation in usable.values()])[:1]
-    if len(angles) < _MIN_PADS or not first:
+    if len(angles) < MIN_PADS or not first:
         return
     observation = usable[first[0].id]
     probes = observation.of("displacement")
@@ -114,7 +112,7 @@ def _ask(observations: Sequence[Observation], names: Sequence[str], logarithms: 
     """Report sensors (m,) that are off against the others and the witness, each of which counts as one."""
     if not np.isfinite(logarithms).all():
         return
-    errors = logarithms - usual_error(logarithms)
+    errors = beside_the_usual(logarithms)
     for name, gain, turn in zip(names, errors.real, errors.imag):
         angle = float(np.degrees(turn))
         for observation in observations:

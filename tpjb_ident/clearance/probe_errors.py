@@ -16,6 +16,8 @@ from tpjb_ident.clearance.polygon import TILT_SPREAD
 #: By how much pads stand elsewhere than stated [rad]; what is plausible of gains and turns, one deviation; steps to
 #: their most probable values, and standard errors from which one is off.
 _PADS, _PLAUSIBLE, _STEPS, _CLEAR = 0.01, 0.3, 8, 4.0
+#: Pads from which the sides tell gains and axes.
+MIN_PADS = 4
 
 
 def probe_errors(polygon: ClearancePolygon, axes: Sequence[float]) -> ComplexArray:
@@ -46,6 +48,6 @@ def probe_errors(polygon: ClearancePolygon, axes: Sequence[float]) -> ComplexArr
     return np.array([gain, -gain]) + 1j * numbers[1:]
 
 
-def usual_error(errors: ComplexArray) -> complex:
-    """What most of some sensors are off by, where a witness that is not counts as one."""
-    return complex(np.median([*errors.real, 0.0]), np.median([*errors.imag, 0.0]))
+def beside_the_usual(errors: ComplexArray) -> ComplexArray:
+    """Errors of sensors (m,) less what most are off by, where a witness that is not off counts as one."""
+    return errors - complex(np.median([*errors.real, 0.0]), np.median([*errors.imag, 0.0]))

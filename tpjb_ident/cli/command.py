@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rigdata.problem import RigError
+from rigdata.problem import Problem, RigError
 from tpjb_ident.cli.options import DEMO, ROCKER, option
 from tpjb_ident.cli.terminal import Progress, Terminal
 from tpjb_ident.columns import in_us_units, use_units
@@ -171,6 +171,16 @@ class Command(Terminal):
         from tpjb_ident.report.figure import save_panels
 
         save_panels(panels, self.folder / "figures")
+
+    def warn_of(self, problems: Sequence[Problem]) -> list[str]:
+        """Warn of problems; give back those that are errors, for `judge`."""
+        errors = []
+        for problem in problems:
+            if problem.severity == "error":
+                errors.append(str(problem))
+            else:
+                self.warn(str(problem))
+        return errors
 
     def judge(self, parts: Mapping[str, Sequence[Condition]], missing: Sequence[str] = ()) -> None:
         """Note the conditions of named parts, each once; end with exit code 3 if one forbids trust, or parts miss."""

@@ -15,15 +15,15 @@ from rigdata.run import Run
 from tpjb_ident.clearance.locus import Locus, measure_locus
 from tpjb_ident.clearance.measure import ClearancePolygon, coldest_first, measure_run
 from tpjb_ident.clearance.polygon import SIDES
-from tpjb_ident.clearance.probe_errors import probe_errors, usual_error
+from tpjb_ident.clearance.probe_errors import MIN_PADS, beside_the_usual, probe_errors
 from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.refusals import usable_runs
 from tpjb_ident.pivot.tables import Formula
 
-#: Angle of a probe off its axis [deg] from which it is told, and from which nothing is to be trusted; pads that tell.
-_TURNED, _MIN_PADS = (3.0, 20.0), 4
+#: Angle of a probe off its axis [deg] from which it is told, and from which nothing is to be trusted: `check`'s limits.
+_TURNED = (3.0, 20.0)
 #: Measured stiffness over the formula's beyond which a scale is wrong: pivots are softer, a third to a tenth in places.
 _STIFFNESS = (0.03, 3.0)
 #: Measured over drawn clearance beyond which the probes' scale is wrong, or the bearing file is another bearing's.
@@ -82,7 +82,6 @@ def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Prob
             problems.append(Problem("error", run.file, "pad", fault, "Correct pad in the manifest", run.id))
     refused = {problem.run for problem in former if problem.severity == "error"}
     tells_gains = not any(SIDES in problem.what for problem in former)
-    drawn = np.mean([pad.assembled_clearance for pad in bearing.pads])
     for run in campaign.of_kind("clearance"):
         if run.id in refused:
             continue
@@ -92,30 +91,38 @@ def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Prob
             problems += [Problem("warning", p.file, p.place, p.what, p.cure, run.id) for p in error.problems]
             continue
         channels = f"channels {' and '.join(channel.name for channel in run.of('displacement'))}"
-        measured = np.nanmean(polygon.clearance)
         for condition in polygon.status:
             if condition == "probe-gains-differ" and tells_gains:
                 cure = "Check the sensitivities of both probes"
                 problems.append(Problem("warning", run.file, channels, condition.detail, cure, run.id))
-        problems += _turned_probes(run, polygon) if tells_gains else []
+        problems += turned_probes(run, polygon) if tells_gains else []
         negative = polygon.negative_preloads([pad.pad_clearance for pad in bearing.pads])
         if negative:
             cure = "Check pad_clearance, and how these pads are seated: unloaded, they flutter"
             problems.append(Problem("warning", run.file, "preload", negative, cure, run.id))
-        if not _SCALE[0] * drawn < measured < _SCALE[1] * drawn:
-            what = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
-            cure = "Check the sensitivities of the probes, and whether it is this bearing's file"
-            problems.append(Problem("error", run.file, channels, what, cure, run.id))
+        problems += wrong_scale(run, polygon, bearing)
     return problems
 
 
-def _turned_probes(run: Run, polygon: ClearancePolygon) -> list[Problem]:
+def wrong_scale(run: Run, polygon: ClearancePolygon, bearing: Bearing) -> list[Problem]:
+    """A clearance that is a multiple of the drawing's: the probes' scale is wrong, or it is another bearing's file."""
+    measured, drawn = np.nanmean(polygon.clearance), np.mean([pad.assembled_clearance for pad in bearing.pads])
+    if _SCALE[0] * drawn < measured < _SCALE[1] * drawn:
+        return []
+    channels = f"channels {' and '.join(channel.name for channel in run.of('displacement'))}"
+    what = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
+    cure = "Check the sensitivities of the probes, and whether it is this bearing's file"
+    return [Problem("error", run.file, channels, what, cure, run.id)]
+
+
+def turned_probes(run: Run, polygon: ClearancePolygon) -> list[Problem]:
     """Probes that do not stand where they are said to, by the sides of the polygon that a sweep shows."""
     probes = run.of("displacement")
-    if len(probes) != 2 or len(polygon.angles) < _MIN_PADS:
+    if len(probes) != 2 or len(polygon.angles) < MIN_PADS:
         return []
-    errors, problems = probe_errors(polygon, [probe.axis or 0.0 for probe in probes]), []
-    for probe, turn in zip(probes, np.degrees((errors - usual_error(errors)).imag), strict=True):
+    errors = beside_the_usual(probe_errors(polygon, [probe.axis or 0.0 for probe in probes]))
+    problems = []
+    for probe, turn in zip(probes, np.degrees(errors.imag), strict=True):
         if abs(turn) > _TURNED[0]:
             what = f"stands {turn:+.1f} deg off its stated axis by {SIDES}: pivot curves and clearances are off with it"
             severity: Severity = "error" if abs(turn) > _TURNED[1] else "warning"

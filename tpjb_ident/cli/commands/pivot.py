@@ -34,9 +34,5 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     without = tested - {curve.pad for curve in curves}
     refused = [f"pad #{pad}: has no curve, its records were refused" for pad in sorted(without)]
     refused += implausible_pivots(curves, formula)
-    for problem in bearing_problems(source, drawing):  # what is wrong with the probes is wrong with the curves
-        if problem.severity == "error":
-            refused.append(str(problem))
-        else:
-            c.warn(str(problem))
+    refused += c.warn_of(bearing_problems(source, drawing))  # what is wrong with the probes is wrong with the curves
     c.judge({f"pad #{curve.pad}": curve.status for curve in curves}, refused)
