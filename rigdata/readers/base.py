@@ -126,14 +126,24 @@ class RunReader(RecordFile):
         """Seconds (stop - start,) of the times that the file holds under `clock`."""
         raise NotImplementedError
 
-    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of channels of one device, (stop - start,) each."""
+    def _stored(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings of channels of one device as the file holds them, (stop - start,) each."""
         raise NotImplementedError
 
+    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings of channels of one device, (stop - start,) each; NaN in rows that a logger left out."""
+        places = self._grid(names[0]).places if names else None
+        if places is None:
+            return self._stored(names, start, stop)
+        first, last = np.searchsorted(places, (start, stop))
+        rows = np.full((len(names), stop - start), np.nan)
+        rows[:, places[first:last] - start] = self._stored(names, first, last)
+        return list(rows)
+
     def _grid(self, name: str = "") -> Grid:
-        """Channels at the times of `name`; without one those of the run's own device."""
+        """Channels at the times of `name`, which may be their clock; without one those of the run's own device."""
         grids = self._layout().grids
-        return next((grid for grid in grids if name in grid.channels), grids[0])
+        return next((grid for grid in grids if name and name in (grid.clock, *grid.channels)), grids[0])
 
     def devices(self) -> tuple[Device, ...]:
         """Channels that are sampled together."""
@@ -189,9 +199,12 @@ class RunReader(RecordFile):
     def device_time(self, name: str, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,) of a channel's samples: the file's, else counted from its device's rate."""
         grid = self._grid(name)
-        if grid.clock:
+        if not grid.clock:
+            return grid.begin + np.arange(start, stop) / grid.rate
+        if grid.places is None:
             return self._clock_times(grid.clock, start, stop)
-        return grid.begin + np.arange(start, stop) / grid.rate
+        times = self._clock_times(grid.clock, 0, len(grid.places))
+        return np.interp(np.arange(start, stop), grid.places, times)
 
     def _along(self, name: str, start: int, stop: int) -> FloatArray:
         """Readings of another device along the run's own times, for those who look at all channels together.

@@ -98,7 +98,7 @@ class FileReader(RunReader):
                 remedy = "Sort or split the run, or export without times"
                 faults[name] = self.refuse(f"channel {name}", fault, remedy)
                 continue
-            clock = next((key for key, shared in times.items() if _alike(shared, time)), str(len(times) + 1))
+            clock = next((key for key, shared in times.items() if _alike(shared, time)), f"times {len(times) + 1}")
             times.setdefault(clock, time)
             if len(times) > _MOST_TIMES:
                 raise self.refuse("", f"has more than {_MOST_TIMES} different times", "Split the run")
@@ -129,8 +129,7 @@ class FileReader(RunReader):
     def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
         return np.array(self._layout().times[clock][start:stop])
 
-    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of channels of one device, (stop - start,) each."""
+    def _stored(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         layout = self._layout()
         for name in names:
             if name not in layout.values:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import OVERFLOW, UNDESCRIBED, Channels
 from rigdata.device import RATE_MISS, rate_of_time
 from rigdata.problem import Problem
@@ -31,8 +31,6 @@ _TIME = re.compile(rf"(?:(?i:{_WORDS})\b|t\s*[\[(]|(?:(?i:{_WORDS})|t)(?:_(?:{_U
 _TIME_UNIT = re.compile(rf"[\[(/,\s_]({_UNITS})\s*[\])]?$")
 #: Two clocks whose samples differ by this share of a step count as one.
 SAME_STEP = 0.01
-#: Steps of an even grid are whole within this.
-_EVEN = 0.2
 
 
 @dataclass(frozen=True)
@@ -197,33 +195,13 @@ def table(contents: Contents, record: RecordFile) -> Contents:
         usable = np.flatnonzero(np.abs(time) < OVERFLOW)
         if len(usable) not in (0, len(time)):  # missing times are set between their neighbours
             time = np.interp(np.arange(len(time)), usable, time[usable])
-        places = _places(time)
-        if places is not None:
-            time = np.interp(np.arange(places[-1] + 1), places, time)
         for i in members:
-            values, group = series[i].values[rows], series[i].group
-            if places is not None:
-                values, present = np.full(len(time), np.nan), values
-                values[places] = present
-            values = to_temporary_file(values)
+            values, group = to_temporary_file(series[i].values[rows]), series[i].group
             series[i] = replace(series[i], values=values, time=time, group=group if is_shared else column.name or group)
     ordered = [column for i, column in enumerate(series) if i not in clocks or names[i] in channels]
     if is_shared or not clocks:
         ordered = _slow_columns(ordered, record)
     return replace(contents, series=ordered, clocks={names[i]: series[i].unit for i in clocks})
-
-
-def _places(time: FloatArray) -> IntArray | None:
-    """Places (n,) of rows on an even grid of times (n,) that a logger left rows out of; None where it left out none.
-
-    A row that is left out is a reading without a value: what is known of gaps is known of either.
-    """
-    steps = np.diff(time) * rate_of_time(time)
-    whole = np.rint(steps)
-    is_even = np.all((whole >= 1) & (np.abs(steps - whole) < _EVEN))
-    if not is_even or not len(steps) < whole.sum() < 2 * len(time):
-        return None
-    return np.append(0, np.cumsum(whole)).astype(np.intp)
 
 
 def _slow_columns(series: Sequence[Series], record: RecordFile) -> list[Series]:

@@ -18,7 +18,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (115.28, 13_743),
     "model": (75.20, 10_161),
-    "rigdata": (58.99, 7_983),
+    "rigdata": (59.14, 7_990),
     "diagnosis": (38.21, 4_698),
     "cli": (21.79, 2_987),
     "report": (22.37, 2_885),

@@ -41,8 +41,8 @@ _MAX_MEMBERS, _LISTED = 4096, 20
 _RATE = "sample_rate_hz"
 #: Key of an open group among the opened members; no dataset can have this name.
 _GROUP = "/"
-#: Samples of a time dataset that tell its rate.
-_LOOK = 100_000
+#: Samples of a time dataset that tell its rate, and which rows a logger left out.
+_LOOK = 2**26
 #: Bytes of unpacked chunks that the library keeps per dataset.
 _LEAST_CACHE, _MOST_CACHE = 2**20, 2**25
 _MAX_TEXT = 8 * 2**20
@@ -222,8 +222,7 @@ class Hdf5Reader(RunReader):
         with self._group() as group:
             return self._seconds(group, clock, start, stop)
 
-    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of channels of one device; only the chunks of the slice are read."""
+    def _stored(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         if stop - start > MAX_REQUEST:
             raise self.refuse("", f"{stop - start} samples asked for at once", "Read the run in slices")
         with self._group() as group:
