@@ -70,15 +70,12 @@ class Unknowns:
             return None
 
 
-def prediction(forward: Forward, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray) -> FloatArray | None:
-    """Job: the prediction at a point."""
+def prediction(
+    forward: Forward, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray, patient: bool = False
+) -> FloatArray | None:
+    """Job: the prediction at a point; patient: whatever it takes to find an equilibrium."""
+    forward.cache.patient = patient
     return Unknowns(problem, faults).predict(forward, theta)
-
-
-def patient_prediction(forward: Forward, *asked: Any) -> FloatArray | None:
-    """Job: the same, whatever it takes to find an equilibrium."""
-    forward.cache.patient = True
-    return prediction(forward, *asked)
 
 
 def derivatives(

@@ -10,7 +10,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Fault
-from tpjb_ident.diagnosis.comparison.unknowns import patient_prediction, prediction
+from tpjb_ident.diagnosis.comparison.unknowns import prediction
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap, noise_floor
@@ -130,7 +130,7 @@ def as_stated(run: Map, fit: Fit, theta: FloatArray) -> FloatArray | None:
     place = _neutral(_without_terms(fit, theta)[0], fit.unknowns.tolerances)
     (exact,) = run(prediction, [(fit.faults, place)])
     if exact is None:  # a verdict hangs on it
-        (exact,) = run(patient_prediction, [(fit.faults, place)])
+        (exact,) = run(prediction, [(fit.faults, place, True)])
     return None if exact is None else np.asarray(exact * fit.problem.sigma)
 
 
