@@ -153,8 +153,8 @@ def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray]:
 def pressed_beyond(laws: Sequence[PivotLaw], loads: FloatArray) -> tuple[Condition, ...]:
     """Name the pads that press measured pivots harder than the dry tests did: `loads` (n,) [N]."""
     tested = np.array([getattr(law, "valid_to", math.inf) for law in laws])
-    beyond = (np.flatnonzero(loads > tested) + 1).tolist()
-    return (named(BEYOND_TEST, beyond),) if beyond else ()
+    numbers = (np.flatnonzero(loads > tested) + 1).tolist()
+    return (named(BEYOND_TEST, numbers),) if numbers else ()
 
 
 def ask_laws(laws: Sequence[PivotLaw], rows: FloatArray, loads: FloatArray) -> None:
@@ -183,8 +183,8 @@ def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> FormulaPivot
         load_scale = 0.25 * line * (pivot.housing_diameter - pivot.pivot_diameter)
         return FormulaPivot((ROCKER, 0.5 * line, load_scale, 1.0), name, secant_vibrations)
     if pivot.kind == "spherical":
-        give = (9.0 / (2.0 * modulus**2 * pivot.sphere_diameter)) ** (1.0 / 3.0)
-        return FormulaPivot((SPHERICAL, give, 0.0, 1.0), name, secant_vibrations)
+        coefficient = (9.0 / (2.0 * modulus**2 * pivot.sphere_diameter)) ** (1.0 / 3.0)
+        return FormulaPivot((SPHERICAL, coefficient, 0.0, 1.0), name, secant_vibrations)
     return RIGID_PIVOT
 
 

@@ -30,10 +30,10 @@ def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray
         band, before, journal = operator.factor[i], operator.before[i], operator.journal[i]
         old, new = fields[i], fields[i + 1]
         for k in range(n):
-            beside = 0.0  # a journal that is a kelvin warm for the third field
+            coupling = 0.0  # a journal that is a kelvin warm for the third field
             if (k + 1) % cells == 0:
-                beside = journal[k // cells, 0] + journal[k // cells, 1]
-            values = _plus((sources[i, k], 0.0, beside), before[k, 0], old, k)
+                coupling = journal[k // cells, 0] + journal[k // cells, 1]
+            values = _plus((sources[i, k], 0.0, coupling), before[k, 0], old, k)
             for side in range(4):
                 step = (1 if side < 2 else cells) * (2 * (side % 2) - 1)
                 values = _plus(values, before[k, 1 + side], old, min(max(k + step, 0), n - 1))
