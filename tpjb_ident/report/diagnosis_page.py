@@ -196,8 +196,9 @@ def write_diagnosis_report(
 def _gap_table(verdict: Verdict) -> Table:
     rows = []
     for name, words in _GAPS.items():
-        is_repeat = name.endswith("after") and not verdict.effects  # where nothing was added, both are the same
-        if not is_repeat and (name in verdict.gap or not name.startswith("touched")):
+        if name.endswith("after") and not verdict.effects:
+            continue  # where nothing was added, both are the same
+        if name in verdict.gap or not name.startswith("touched"):
             rows.append([words, fixed(verdict.gap.get(name, math.nan), 2)])
     return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows)
 
@@ -300,6 +301,5 @@ def _evidence_sections(verdict: Verdict) -> list[Section]:
 def _row(tolerance: Assumption) -> list[str]:
     """A tolerance in the units that people read; a ratio in per cent."""
     unit, scale = shown_unit(tolerance.unit)
-    far = signed(tolerance.deviation) if tolerance.deviation else ""
-    width = f"{tolerance.stated / scale:.3g} {unit}"
-    return [label_in_words(tolerance.name), width, tolerance.source, _fitted(tolerance), far]
+    words = [label_in_words(tolerance.name), f"{tolerance.stated / scale:.3g} {unit}", tolerance.source]
+    return [*words, _fitted(tolerance), signed(tolerance.deviation) if tolerance.deviation else ""]

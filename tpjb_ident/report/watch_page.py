@@ -102,9 +102,8 @@ def points_table(points: Sequence[PointResult]) -> Table:
     for p in points:
         reason, solved = lacking(p), p.stiffness.cells()
         cells = ["–" if reason else solved[i] for i in (0, 3, 4, 7)]
-        flags = reason or ", ".join(q.sentence() for q in p.quality)
         place = [f"{p.point.static_load / size('load'):.6g}", f"{p.point.excitation_hz:g}", str(p.n_records)]
-        rows.append([*place, *cells, flags])
+        rows.append([*place, *cells, reason or ", ".join(q.sentence() for q in p.quality)])
     direct = [f"{name}, {symbol('stiffness' if name[0] == 'k' else 'damping')}" for name in DIRECT]
     columns = [f"load, {symbol('load')}", "excitation, Hz", "records", *direct, "flags"]
     return Table("Direct coefficients so far, 95 % intervals", columns, rows)
@@ -117,6 +116,7 @@ def records_table(snapshot: Snapshot, runs: Collection[str]) -> Table:
     rows = []
     for s in landed:
         remarks = [located(f.problem) for f in s.findings if f.problem.severity != "note"][:3]
-        remarks += [f"not in the manifest; {reasons[s.run.id]}"] if s.run.id in reasons else []
+        if s.run.id in reasons:
+            remarks.append(f"not in the manifest; {reasons[s.run.id]}")
         rows.append([s.landed[11:19], s.run.id, described(s.run), _WORDS.get(s.state, s.state), "; ".join(remarks)])
     return Table("Newest first", ["time", "run", "set points", "verdict", "why"], rows)
