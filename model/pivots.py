@@ -267,13 +267,13 @@ def measured_pivots(
         if number in laws:
             raise BearingError(f"{source}, pad {number}: has two [[pads]] tables. Keep one of them.")
         laws[number] = law
-    wanted = pads or max(laws)
-    missing = sorted(set(range(1, wanted + 1)) - set(laws))
-    if missing or max(laws) > wanted:
+    count = pads or max(laws)
+    missing = sorted(set(range(1, count + 1)) - set(laws))
+    if missing or max(laws) > count:
         raise BearingError(
-            f"{source}: has pads {sorted(laws)}, needs 1 to {wanted}. Measure pad #{(missing or [wanted])[0]} too."
+            f"{source}: has pads {sorted(laws)}, needs 1 to {count}. Measure pad #{(missing or [count])[0]} too."
         )
-    return tuple(laws[k] for k in range(1, wanted + 1))
+    return tuple(laws[k] for k in range(1, count + 1))
 
 
 #: Keys of a pivots.toml, of all and of a pad.

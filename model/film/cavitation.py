@@ -161,8 +161,8 @@ def _starved(film: FedFilm) -> int:
     """
     changed, p, faces = 0, film.work.pressure, film.faces
     for j in range(len(film.supply)):
-        asked = faces.couette[0, j] - faces.conductance[0, j] * (p[1, j] - p[0, j])
-        lacking = asked > film.supply[j]
+        demand = faces.couette[0, j] - faces.conductance[0, j] * (p[1, j] - p[0, j])
+        lacking = demand > film.supply[j]
         if lacking != film.work.ruptured[0, j]:
             film.work.ruptured[0, j] = lacking
             changed += 1

@@ -104,22 +104,22 @@ def conduct(
     fields, face = np.zeros((*answer[0].shape, 3)), np.empty(missing.shape)
     held = (film, operator, pad, fields, face)
     change = gmres(_warmed, held, times(pad[1], missing.reshape(-1)), tolerance)
-    more = _conducted(film, operator, times(pad[0], change), fields, face)
-    if not math.isfinite(more):
+    heat = _conducted(film, operator, times(pad[0], change), fields, face)
+    if not math.isfinite(heat):
         return 0.0
     answer[0][:] += fields[:, :, 0]
     answer[1][:] += face
-    return more
+    return heat
 
 
 @inner
 def _warmed(
     held: tuple[_Solved, CrossOperator, tuple[FloatArray, FloatArray, FloatArray], FloatArray, FloatArray],
-    asked: FloatArray,
+    rise: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """A change of the pad's coarser nodes, about the one that is asked for, and what the film leaves of it."""
     film, operator, (flux, to_coarse, guess), fields, face = held
-    change = times(guess, asked)
+    change = times(guess, rise)
     _conducted(film, operator, times(flux, change), fields, face)
     return change, change - times(to_coarse, face.reshape(-1))
 

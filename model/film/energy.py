@@ -126,14 +126,14 @@ def heat_step(
 
 @inner
 def warm(
-    grid: FilmGrid, work: FilmWork, running: Running, asked: FloatArray, limits: tuple[float, float], shift: FloatArray
+    grid: FilmGrid, work: FilmWork, running: Running, rise: FloatArray, limits: tuple[float, float], shift: FloatArray
 ) -> tuple[float, float, float]:
-    """Change a film's temperature by a share of what is asked for, no more than a limit.
+    """Change a film's temperature by a share of the rise that is asked for, no more than a limit.
 
     Returns the largest change asked for [K], and the change of the film's force.
     """
-    change = largest(asked.reshape(-1))
-    work.temperature[:] += limited_share(change, limits) * asked
+    change = largest(rise.reshape(-1))
+    work.temperature[:] += limited_share(change, limits) * rise
     radial, tangential = pressure_change(grid, work, running.speed, running.oil, shift)
     return change, radial, tangential
 

@@ -59,10 +59,10 @@ def heat_impedance(
             pressure.reshape(-1)[grid.node] = frozen + answer
             fields = np.zeros((1, *shape), dtype=np.complex128)
             march(grid, work, running, loss, fields, _gain(film, thicker, warmer, pressure))
-            asked, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
+            increment, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
             warmer = fields[0]
             _pressure(film, warmer, omega, answer)
-            if asked < settled * size:
+            if increment < settled * size:
                 out[:, axis] = force_of(grid, grid.area, answer.reshape((-1, 1)))[:, 0]
                 break
     return out

@@ -35,8 +35,8 @@ def least_share(grid: FilmGrid, work: FilmWork, da: float, db: float, extra: Flo
     for i in range(work.thickness.shape[0]):
         change = -(da * grid.cos[i] + db * grid.sin[i])
         for j in range(work.thickness.shape[1]):
-            more = extra[i, j] if extra.size > 0 else 0.0
-            worst = min(worst, (change + more) / work.thickness[i, j])
+            addition = extra[i, j] if extra.size > 0 else 0.0
+            worst = min(worst, (change + addition) / work.thickness[i, j])
     return worst
 
 

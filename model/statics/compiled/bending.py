@@ -63,20 +63,20 @@ def bend_pads(bodies: BodyStack | None, problem: Problem) -> float:
     state, pads = problem.state, problem.pads.table
     if bodies is None or state.bent.size == 0:
         return 0.0
-    asked = np.zeros((len(pads), state.bent[0].size))
+    deformation = np.zeros((len(pads), state.bent[0].size))
     if len(bodies.shapes) > 0:
-        _ask_bodies(bodies, problem, asked)
+        _ask_bodies(bodies, problem, deformation)
     share = 0.0
     for m in range(len(pads)):
         if pads[m].solved:
-            change = asked[m] - state.bent[m].reshape(-1)
+            change = deformation[m] - state.bent[m].reshape(-1)
             tilted = _close_loop(bodies, problem, m, change)
             share = max(share, max(largest(change), tilted) / pads[m].least)
     return share
 
 
 @inner
-def _ask_bodies(bodies: BodyStack, problem: Problem, asked: FloatArray) -> None:
+def _ask_bodies(bodies: BodyStack, problem: Problem, deformation: FloatArray) -> None:
     """Deformation (pads, nodes) that pressure and temperature ask for; pads of one shape in one product [m]."""
     pads, works, state, supply = problem.pads.table, problem.works, problem.state, problem.case.supply
     lines = bodies.gather.shape[1]
@@ -101,7 +101,7 @@ def _ask_bodies(bodies: BodyStack, problem: Problem, asked: FloatArray) -> None:
             by_column = moved[m].reshape((columns, lines))
             for i in range(stations):
                 for j in range(columns):
-                    asked[m, i * columns + j] = product(by_column[j], bodies.spread[k, i])
+                    deformation[m, i * columns + j] = product(by_column[j], bodies.spread[k, i])
 
 
 @inner
@@ -133,7 +133,7 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
     if case.axial:
         constants[bending, 0], matrix[bending, bending] = _axial_moment(grid, work, problem, m, response[bending])
         shapes[:, :, bending] = axial_shape(grid)
-    asked = constants[:, 0].copy()
+    amplitudes = constants[:, 0].copy()
     wedge = (pad.clearance, pad.wedge[0], pad.wedge[1])
     slopes = shape_slopes(grid, work, conductances(grid, work, wedge), shapes)
     _answer(response, slopes, matrix, -1.0, 0)
@@ -145,7 +145,7 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
         pad.felt_stiffness[:] += felt[:, r : r + 1] * constants[r, 1:]
     pad.amplitude[:bending] = constants[:bending]
     flat = shapes.reshape((len(change), count))[:, :bending]
-    state.mismatch[m].reshape(-1)[:] = change - times(flat, asked)
+    state.mismatch[m].reshape(-1)[:] = change - times(flat, amplitudes)
     if not case.axial:
         return 0.0
     pad.axial_step[:] = constants[bending]

@@ -122,10 +122,10 @@ def settle_cross_temperatures(problem: Problem, across: Across, relaxation: floa
         if pad.solved:
             (grid, work), cross = film_of(problem, m), _film(across.films, m)
             running, weights = case.running, (inlets[m], journal)
-            asked = _warm(cross, across.fields[m], across.faces[m], weights, limits)
+            increment = _warm(cross, across.fields[m], across.faces[m], weights, limits)
             across.outlet[m] = outlets[m, 0] + outlets[m, 1] * inlets[m] + outlets[m, 2] * journal
-            more = cross_pressure_change(grid, work, cross, running.speed, running.oil, state.shift[m])
-            change = note_heat(pad, asked, more, change)
+            force_change = cross_pressure_change(grid, work, cross, running.speed, running.oil, state.shift[m])
+            change = note_heat(pad, increment, force_change, change)
     state.figures[JOURNAL] = journal
     return change
 
@@ -141,11 +141,11 @@ def _warm(
     """Change a film's temperatures by a share of what is asked for, no more than a limit; returns the largest [K]."""
     inlet, journal = weights
     cells = cross.temperature.reshape(fields.shape[:2])
-    asked = fields[:, :, 0] + inlet * fields[:, :, 1] + journal * fields[:, :, 2] - cells
+    increment = fields[:, :, 0] + inlet * fields[:, :, 1] + journal * fields[:, :, 2] - cells
     face = faces[0] + inlet * faces[1] + journal * faces[2] - cross.face
-    change = np.maximum(largest(asked.reshape(-1)), largest(face.reshape(-1)))
+    change = np.maximum(largest(increment.reshape(-1)), largest(face.reshape(-1)))
     share = limited_share(change, limits)
-    cells += share * asked
+    cells += share * increment
     cross.face[:] += share * face
     return change
 

@@ -53,12 +53,12 @@ def heat_films(problem: Problem, relaxation: float) -> float:
 
 
 @inner
-def note_heat(pad: np.record, asked: float, more: tuple[float, float], change: float) -> float:
+def note_heat(pad: np.record, heating: float, force_change: tuple[float, float], change: float) -> float:
     """Note which change of temperature [K] a film asks for, and its force then [N]; the largest change so far."""
-    pad.heating = asked
-    pad.corrected[0] = pad.force[0] + more[0]
-    pad.corrected[1] = pad.force[1] + more[1]
-    return np.maximum(change, asked)  # a NaN is not to be lost
+    pad.heating = heating
+    pad.corrected[0] = pad.force[0] + force_change[0]
+    pad.corrected[1] = pad.force[1] + force_change[1]
+    return np.maximum(change, heating)  # a NaN is not to be lost
 
 
 @inner
@@ -89,8 +89,8 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
         if pad.solved:
             _answer(bodies, problem, m, answers[m], outlets[m], uptake[m])
         if case.fresh < math.inf and case.mixing > 0.0:  # who gets less oil has another film
-            more = case.mixing * abs(flows[m, 1] - pad.passed) / (case.fresh * case.length)
-            change = max(change, HEAT_PER_FORCE * more)
+            excess = case.mixing * abs(flows[m, 1] - pad.passed) / (case.fresh * case.length)
+            change = max(change, HEAT_PER_FORCE * excess)
         pad.passed = flows[m, 1]
     inlets, journal = balance_heat(pads.order, (flows, outlets, uptake), pads.table["solved"], case.supply, case.mixing)
     for m in range(n):
@@ -98,11 +98,11 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
         pad.inlet, pad.heating = inlets[m], 0.0
         if not pad.solved:
             continue
-        asked = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
+        increment = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
         if case.journal:
-            asked += journal * answers[m, 2]
+            increment += journal * answers[m, 2]
         (grid, work), limits = film_of(problem, m), (relaxation, HEATING_STEP)
-        result = warm(grid, work, case.running, asked, limits, state.shift[m])
+        result = warm(grid, work, case.running, increment, limits, state.shift[m])
         change = note_heat(pad, result[0], result[1:], change)
     if case.journal:
         state.figures[JOURNAL] = journal

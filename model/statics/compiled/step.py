@@ -72,9 +72,9 @@ def grow_and_bend(problem: Problem, relaxation: float, change: float) -> float:
                     area += product(weight, np.ones(len(weight)))
                     warmth += product(weight, problem.works.temperature[m].reshape(-1))
             warmth = warmth / area if area > 0.0 else pads[0].inlet
-        asked = warmth - figures[GROWN]
-        figures[GROWING] = relaxation * min(max(asked, -HEATING_STEP), HEATING_STEP)
-        change = max(change, abs(asked))
+        increment = warmth - figures[GROWN]
+        figures[GROWING] = relaxation * min(max(increment, -HEATING_STEP), HEATING_STEP)
+        change = max(change, abs(increment))
     for m in range(len(pads)):
         pad = pads[m]
         pad.felt[:], pad.felt_stiffness[:] = pad.corrected, pad.stiffness
