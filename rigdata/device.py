@@ -90,12 +90,12 @@ def _without_gaps(time: FloatArray) -> FloatArray:
     return np.append(0.0, np.cumsum(np.where(gaps, steps[~gaps].mean(), steps)))
 
 
-def timed_grid(length: int, clock: str, time: FloatArray, label: str, stated: float | None) -> Grid:
+def timed_grid(length: int, clock: str, time: FloatArray, label: str, nominal_rate: float | None) -> Grid:
     """The grid of a time column, by its first times (n,) [s] or all; of a stated rate where these tell none."""
     rate, begin = rate_of_time(time), float(time[0]) if len(time) else 0.0
     places = _places(time) if len(time) == length else None
     length = length if places is None else int(places[-1]) + 1
-    return Grid(length, clock, rate if rate > 0 else stated or rate, label, begin, places=places)
+    return Grid(length, clock, rate if rate > 0 else nominal_rate or rate, label, begin, places=places)
 
 
 def _places(time: FloatArray) -> IntArray | None:
@@ -104,11 +104,11 @@ def _places(time: FloatArray) -> IntArray | None:
     A row that is left out is a reading without a value: what is known of gaps is known of either.
     """
     steps = np.diff(time) * rate_of_time(time)
-    whole = np.rint(steps)
-    is_even = np.all((whole >= 1) & (np.abs(steps - whole) < _EVEN))
-    if not is_even or not len(steps) < whole.sum() < 2 * len(time):
+    counts = np.rint(steps)
+    is_even = np.all((counts >= 1) & (np.abs(steps - counts) < _EVEN))
+    if not is_even or not len(steps) < counts.sum() < 2 * len(time):
         return None
-    return np.append(0, np.cumsum(whole)).astype(np.intp)
+    return np.append(0, np.cumsum(counts)).astype(np.intp)
 
 
 def planned(
@@ -137,14 +137,14 @@ def planned(
     counts = Counter(timing.length for timing in untimed.values())
     usual = max(counts, key=lambda length: (counts[length], length), default=0)
     for name, timing in untimed.items():
-        same = [grid for grid in shared if grid.length == timing.length]
+        matches = [grid for grid in shared if grid.length == timing.length]
         if timing.times is not None:
             faults[name] = f"has {timing.length} samples, its time column {timing.times}"
-        elif same:
-            max(same, key=lambda grid: grid.rate).channels.append(name)
+        elif matches:
+            max(matches, key=lambda grid: grid.rate).channels.append(name)
         elif shared or timing.length != usual:
-            others = max((grid.length for grid in shared), default=usual)
-            faults[name] = f"has {timing.length} samples and no times, the others have {others}"
+            samples = max((grid.length for grid in shared), default=usual)
+            faults[name] = f"has {timing.length} samples and no times, the others have {samples}"
         else:
             grids.setdefault((usual, ""), Grid(usual, "", run_rate or np.nan)).channels.append(name)
     for name, rate in rates.items():

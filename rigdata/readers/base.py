@@ -181,13 +181,13 @@ class RunReader(RecordFile):
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         """Raw readings of `names` along the run's own times, (stop - start,) each."""
-        faults, apart = self._layout().faults, self.apart()
+        faults, separate_names = self._layout().faults, self.apart()
         for name in names:
             if name in faults:
                 raise faults[name]
-        own = [name for name in names if name not in apart]
-        readings = dict(zip(own, self.read_device(own, start, stop), strict=True))
-        for name in apart.intersection(names):
+        main_names = [name for name in names if name not in separate_names]
+        readings = dict(zip(main_names, self.read_device(main_names, start, stop), strict=True))
+        for name in separate_names.intersection(names):
             readings[name] = self._along(name, start, stop)
         return [readings[name] for name in names]
 
@@ -234,9 +234,9 @@ class RunReader(RecordFile):
         """An error for every channel whose unit in the file is another than its unit in the manifest."""
         problems = []
         for name, unit in units.items():
-            channel, stated = self.channels.get(name), unit.strip()
-            if channel is not None and stated and _differ(stated, channel):
-                fault = f"the file states {stated!r}, the manifest unit = {channel.unit!r}"
+            channel, file_unit = self.channels.get(name), unit.strip()
+            if channel is not None and file_unit and _differ(file_unit, channel):
+                fault = f"the file states {file_unit!r}, the manifest unit = {channel.unit!r}"
                 remedy = "Correct unit in the manifest, or the units of the file if those are wrong"
                 problems.append(self.problem("error", f"channel {name}", fault, remedy))
         return problems
@@ -275,13 +275,13 @@ def _meaning(unit: str, quantity: str) -> tuple[object, float]:
     return reading_zero(quantity, unit, None), reading_gain(quantity, unit, None)
 
 
-def _differ(stated: str, channel: Channel) -> bool:
+def _differ(file_unit: str, channel: Channel) -> bool:
     """Whether the unit that a file states makes another number of a reading than the manifest's."""
     quantity = channel.quantity
     if quantity not in DIMENSIONS:
         return False
     try:
-        (kind, factor), (other_kind, other) = _meaning(stated, quantity), _meaning(channel.unit, quantity)
+        (kind, factor), (other_kind, channel_factor) = _meaning(file_unit, quantity), _meaning(channel.unit, quantity)
     except UnitError:
         return False
-    return kind != other_kind or not math.isclose(factor, other, rel_tol=_SAME)
+    return kind != other_kind or not math.isclose(factor, channel_factor, rel_tol=_SAME)

@@ -144,9 +144,9 @@ class FileReader(RunReader):
         return (*layout.problems, *self._notes(members, (*layout.values, *layout.unread), layout.units))
 
 
-def _alike(time: FloatArray, other: FloatArray) -> bool:
+def _alike(time: FloatArray, reference: FloatArray) -> bool:
     """Whether two channels are sampled at the same times."""
-    if time is other or len(time) != len(other):
-        return time is other
-    step = (other[-1] - other[0]) / max(len(other) - 1, 1) if len(other) else 0.0
-    return bool(np.all(np.abs(time - other) <= SAME_STEP * step))
+    if time is reference or len(time) != len(reference):
+        return time is reference
+    step = (reference[-1] - reference[0]) / max(len(reference) - 1, 1) if len(reference) else 0.0
+    return bool(np.all(np.abs(time - reference) <= SAME_STEP * step))

@@ -135,9 +135,9 @@ def is_time(name: str) -> bool:
 
 def time_unit(name: str, unit: str) -> str:
     """Unit of a time column: stated, or in its name (``time_ms``, ``Zeit [ms]``); "" where there is none."""
-    stated = unit.strip().strip("[]()")
+    symbol = unit.strip().strip("[]()")
     in_name = _TIME_UNIT.search(name.strip())
-    return stated if stated in TIME_FACTORS else in_name[1] if in_name else ""
+    return symbol if symbol in TIME_FACTORS else in_name[1] if in_name else ""
 
 
 def seconds(column: Series) -> FloatArray:
@@ -182,14 +182,14 @@ def table(contents: Contents, record: RecordFile) -> Contents:
                 groups[i].append(i)
             continue
         if clock is not None and len(series[clock]) != len(series[i]):
-            clock = next((other for other in clocks if len(series[other]) == len(series[i])), None)
+            clock = next((candidate for candidate in clocks if len(series[candidate]) == len(series[i])), None)
         groups[clock if series[i].time is None else None].append(i)
     lengths = {len(series[i]) for i in groups.pop(None) if series[i].time is None}
     is_shared = len(clocks) == 1 and len(series[clocks[0]]) not in lengths
     for clock, members in groups.items():
         column = series[clock or 0]
-        known = channels.get(column.name)
-        time = seconds(column) if known is None else known.to_si(column.values)
+        channel = channels.get(column.name)
+        time = seconds(column) if channel is None else channel.to_si(column.values)
         rows = slice(None) if is_shared else _filled_rows([time, *(series[i].values for i in members)])
         time = time[rows]
         usable = np.flatnonzero(np.abs(time) < OVERFLOW)

@@ -69,8 +69,8 @@ def implausible_pivots(curves: Sequence[PivotCurve], formula: Formula | None) ->
     if not ratios:
         return []
     extent = " to ".join(dict.fromkeys(f"{end:.2g}" for end in (min(ratios.values()), max(ratios.values()))))
-    what = f"{extent} times as stiff as Kirk's formula: a unit or a sensitivity of cells or probes is wrong"
-    return [f"{', '.join(ratios)}: {what}, or it is another bearing's file"]
+    fault = f"{extent} times as stiff as Kirk's formula: a unit or a sensitivity of cells or probes is wrong"
+    return [f"{', '.join(ratios)}: {fault}, or it is another bearing's file"]
 
 
 def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Problem] = ()) -> list[Problem]:
@@ -110,9 +110,9 @@ def wrong_scale(run: Run, polygon: ClearancePolygon, bearing: Bearing) -> list[P
     if _SCALE[0] * drawn < measured < _SCALE[1] * drawn:
         return []
     channels = f"channels {' and '.join(channel.name for channel in run.of('displacement'))}"
-    what = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
+    fault = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
     cure = "Check the sensitivities of the probes, and whether it is this bearing's file"
-    return [Problem("error", run.file, channels, what, cure, run.id)]
+    return [Problem("error", run.file, channels, fault, cure, run.id)]
 
 
 def turned_probes(run: Run, polygon: ClearancePolygon) -> list[Problem]:
@@ -124,8 +124,8 @@ def turned_probes(run: Run, polygon: ClearancePolygon) -> list[Problem]:
     problems = []
     for probe, turn in zip(probes, np.degrees(errors.imag), strict=True):
         if abs(turn) > _TURNED[0]:
-            what = f"stands {turn:+.1f} deg off its stated axis by {SIDES}: pivot curves and clearances are off with it"
+            text = f"stands {turn:+.1f} deg off its stated axis by {SIDES}: pivot curves and clearances are off with it"
             severity: Severity = "error" if abs(turn) > _TURNED[1] else "warning"
             cure = "Check its axis and how it is mounted"
-            problems.append(Problem(severity, run.file, f"channel {probe.name}", what, cure, run.id))
+            problems.append(Problem(severity, run.file, f"channel {probe.name}", text, cure, run.id))
     return problems
