@@ -30,10 +30,12 @@ from tpjb_ident.estimate.equation import (
 )
 from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns, slopes_over_load
 from tpjb_ident.estimate.scatter import PHASES, AlongForce, ForceScatter, Residuals, Scatter, mixed_dof
+from tpjb_ident.estimate.score import LIKELY, Score, clear_limit
 from tpjb_ident.estimate.term import Additive, FilmTerm, Fitted, Term
 
-#: Standard deviation that a parameter has at least, in its unit.
-_LEAST = 1e-9
+#: Standard deviation that a parameter has at least, in its unit; what records that contradict it make of it, at most:
+#: units are such that readings change by no more than their size.
+_LEAST, _FARTHEST = 1e-9, 0.5
 
 
 class Table:
@@ -95,6 +97,10 @@ _UNTOLD = 1e-14
 _CHUNK = 4096
 
 
+#: How far off parameters are, by term and name.
+Distances = dict[tuple[str, str], float]
+
+
 @dataclass(frozen=True, repr=False)
 class Solution:
     """H of every point with its covariance by source; points of a shape are its groups, each with its k numbers."""
@@ -116,6 +122,8 @@ class Solution:
     factor: ComplexArray  #: (n, m): what multiplies the readings of every block
     shift: ComplexArray  #: (n, m), SI: what is in the readings beside the motion's part
     run_change: ComplexArray  #: (n, 2, 2), N/m: H of a run beside that of its point
+    contradicted: Distances  #: parameters that contradict what is stated of them
+    supposed: Distances  #: those of one term that may
     ran_away: bool = False  #: no point has an answer
 
     def blocks_of(self, group: int) -> BoolArray:
@@ -145,7 +153,8 @@ class Solution:
         """What the terms' tests say of the rig: it touches every point."""
         conditions = [condition for term in self.terms for condition in term.conditions(self.fitted[term.name])]
         text = "the runs together give no H, as where they are driven below their noise: it is the windows' alone"
-        return (*conditions, *holding((self.ran_away, "iteration-limit", text)))
+        # where a gain explains what an axis does as well, the gain is told
+        return tuple(dict.fromkeys((*conditions, *holding((self.ran_away, "iteration-limit", text)))))
 
 
 class Solver:
@@ -372,7 +381,25 @@ class Solver:
             spare,
             np.clip(self.scatter.variance[self.group] * fit.information, 0.0, 1.0),
             *self._apart(),
+            *self._contradictions(last),
         )
+
+    def _contradictions(self, last: Step) -> tuple[Distances, Distances]:
+        """How far off parameters are that contradict what is stated; and those of the likeliest term, if any may."""
+        clear: Distances = {}
+        likely: Distances = {}
+        if not self.answered.any():
+            return clear, likely
+        limit, clearest = clear_limit(self.scatter, self.blocks, len(self.rig.widened)), 0.0
+        for term in (term for term in self.shared.terms if term.tested):
+            chosen = np.flatnonzero(self.shared.chosen(term)[0])
+            stated = np.array([parameter.deviation for parameter in term.stated])
+            covariance = last.joint_covariance[np.ix_(chosen, chosen)] / np.outer(stated, stated)
+            score = Score.of(last.joint[chosen] / stated, covariance, last.precision[chosen] * stated**2)
+            clear |= _far(term, score.off(limit))
+            if score.clearest > clearest:
+                clearest, likely = score.clearest, _far(term, score.off(LIKELY))
+        return clear, likely
 
     def _apart(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Factor and shift of the blocks' readings (n, m), and how their H differs from their point's (n, 2, 2)."""
@@ -390,6 +417,12 @@ class Solver:
             shifts.append(shift)
             changes.append(change)
         return np.concatenate(factors), np.concatenate(shifts), np.concatenate(changes)
+
+
+def _far(term: Term, off: FloatArray) -> Distances:
+    """Distances (k,) of a term's parameters that exceed what is stated of them, from deviations to their units."""
+    named = zip(term.stated, off.tolist())
+    return {(term.name, p.name): min(size * p.deviation, _FARTHEST) for p, size in named if size > 1.0}
 
 
 @dataclass(frozen=True)

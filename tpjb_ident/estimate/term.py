@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.conditions import Conditions
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, State, film_change_rows
 
 if TYPE_CHECKING:
     from tpjb_ident.estimate.solve import Solution
 
-#: Standard deviations beyond which a parameter contradicts what is stated.
-_LIMIT = 3.0
+#: Stated deviations beyond which a parameter is named that the records contradict.
+_LIMIT = 2.0
 #: Largest logarithm of a factor.
 _LARGEST = 5.0
 #: Of a change of H that a film's lines show so much is allowed for: they are right within a fifth.
@@ -31,6 +31,8 @@ CHANGE_BY_ORBIT = 2.0
 CHANGE_AS_DEVIATION = 1 / 1.6
 #: Changes below this share are not worth telling [share of H].
 _LEAST_CHANGE = 2e-4
+#: Difference of sensors beyond any calibration: an axis, a sign or a cable is wrong.
+NO_GAIN = 0.2
 #: Condition of accelerometers that lead the cells: the housing's test finds it, the delay tells whether it stays.
 OUT_OF_STEP = "cells-and-accelerometers-out-of-phase"
 
@@ -48,6 +50,10 @@ class Parameter:
     unit: str
     deviation: float  #: prior standard deviation, in `unit`
     mean: float = 0.0
+
+    def at_least(self, deviation: float) -> Parameter:
+        """The parameter, known no better than this."""
+        return replace(self, deviation=max(self.deviation, deviation))
 
 
 @dataclass(frozen=True)
@@ -76,6 +82,12 @@ class Term:
         than the prior.
     never_estimated : bool
         Whether no record can tell them: their priors pass into the covariance, whatever the equations seem to say.
+    tested : bool
+        Whether its priors are what the manifest states, or usual of sound instruments: records may contradict them.
+    harmless : float
+        Deviation in their unit below which none is worth contradicting.
+    stated : tuple of Parameter
+        The parameters that are contradicted: as stated, or what is harmless.
     sentence, scale : str, float
         Said of every parameter `p` that the records tell, with its `value` and its `error` times the scale.
 
@@ -89,6 +101,8 @@ class Term:
     name = ""
     always_estimated = False
     never_estimated = False
+    tested = False
+    harmless = 0.0
     sentence = ""
     scale = 1.0
 
@@ -97,6 +111,9 @@ class Term:
         self.parameters: tuple[Parameter, ...] = ()
         self.points: tuple[int, ...] = ()
         self.prepare(rig, blocks)
+        self.stated = tuple(p.at_least(self.harmless) for p in self.parameters)
+        wide = [rig.widened.get((self.name, p.name), 0.0) for p in self.parameters]
+        self.parameters = tuple(p.at_least(size) for p, size in zip(self.parameters, wide))
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Take from rig and blocks what the term needs: its parameters, where it applies."""
@@ -143,6 +160,17 @@ class Term:
         if fitted is None or widened is None:
             return rig
         return replace(widened, contradicted={**rig.contradicted, self.name: self.conditions(fitted)})
+
+    def contradicted(self, fitted: Fitted) -> list[int]:
+        """Places of parameters that the records contradict, as they are where taken as uncertain as that."""
+        wide = [k for k, p in enumerate(self.stated) if (self.name, p.name) in self.rig.widened]
+        distance = [abs(fitted.value[k] - p.mean) / p.deviation for k, p in enumerate(self.stated)]
+        return [k for k in wide if distance[k] > _LIMIT] or wide
+
+    def farthest(self, fitted: Fitted, places: Sequence[int]) -> float:
+        """How far off the parameters at these places may be, in their unit."""
+        sizes = [self.rig.widened.get((self.name, self.stated[k].name), 0.0) for k in places]
+        return float(np.max([*sizes, *np.abs(fitted.value[list(places)])], initial=0.0))
 
     def standing_on(self, fitted: Fitted) -> ComplexArray | None:
         """Compliance of the springs under the housing (2, 2) [m/N], of the term that knows it."""
@@ -240,18 +268,9 @@ class FilmTerm(Additive):
         return np.einsum("nk,nkij->nij", numbers, changes)
 
 
-def exceeding(fitted: Fitted, parameters: tuple[Parameter, ...]) -> list[int]:
-    """Places of estimated parameters further from the mean than they scatter if the prior holds.
-
-    The value's variance is then the prior's less what the records leave; and it must stand above its own error.
-    """
-    places = []
-    for k, parameter in enumerate(parameters):
-        distance, error = abs(float(fitted.value[k]) - parameter.mean), float(fitted.deviation[k])
-        scatter = np.sqrt(max(parameter.deviation**2 - error**2, error**2))
-        if fitted.estimated[k] and distance > _LIMIT * scatter:
-            places.append(k)
-    return places
+def differing(share: float, text: str) -> Conditions:
+    """Sensors that contradict others of their quantity by a share of what they read."""
+    return (Condition("records-contradicted" if share > NO_GAIN else "probe-gains-differ", text),)
 
 
 def numbered(name: str, unit: str, deviations: Sequence[float]) -> tuple[Parameter, ...]:

@@ -1,0 +1,62 @@
+"""Priors held against the records: a parameter that is considered stays where the manifest has it, however wrong.
+
+At the solution the scores of a term's parameters say what the records alone, all other parameters as uncertain as they
+are stated, would make of them. Their directions that the records tell apart are tested each by itself: two coefficients
+that are wrong alike show in their sum, and neither in its own. Where that is further from the means than its error and
+what is stated allow, the next solve takes the parameters as uncertain as they are off.
+
+What a wrong parameter does to the runs passes for their scatter, and hides in it. So what is only likely is supposed,
+and the solve with it, whose scatter is without it, tells whether it is so.
+"""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+from scipy.special import ndtr, stdtrit
+
+from rigdata.arrays import FloatArray
+from tpjb_ident.estimate.equation import Blocks
+from tpjb_ident.estimate.scatter import Scatter
+
+#: Errors of what the records say from which it is likely; beyond which it is no chance, of a normal distribution.
+LIKELY, _CLEAR = 2.0, 4.5
+#: Stated deviations beyond which what is stated is wrong.
+_BEYOND = 3.5
+#: Information of the records over that of the priors below which it is rounding.
+_LEAST = 1e-9
+
+
+def clear_limit(scatter: Scatter, blocks: Blocks, spent: int) -> float:
+    """Errors beyond which it is no chance, by Student's t of what the runs' scatter is told by.
+
+    `spent`: parameters that were left free beside it. A parameter acts on two components of four. Where no force is
+    spare other equations tell, by their noise.
+    """
+    freedom = float(scatter.spare.sum()) / 2 or 2 * float(np.median(blocks.dof))
+    return float(stdtrit(max(freedom - spent, 1.0), ndtr(_CLEAR)))
+
+
+class Score(NamedTuple):
+    """What records say of a term's k parameters in directions of theirs, in deviations as stated."""
+
+    directions: FloatArray  #: (k, k), columns
+    distance: FloatArray  #: (k,): from the means
+    error: FloatArray  #: (k,)
+
+    @classmethod
+    def of(cls, joint: FloatArray, covariance: FloatArray, prior: FloatArray) -> Self:
+        """Of parameters estimated with priors of precision `prior` (k,): distance from the means and covariance."""
+        precision = np.linalg.inv(covariance)
+        told, directions = np.linalg.eigh(precision - np.diag(prior))
+        told = np.maximum(told, _LEAST)
+        return cls(directions, directions.T @ precision @ joint / told, told**-0.5)
+
+    def off(self, limit: float) -> FloatArray:
+        """How far off parameters are that contradict what is stated by so many errors, (k,); zero of the others."""
+        apart = np.abs(self.distance) > np.hypot(limit * self.error, _BEYOND)
+        return np.linalg.norm(self.directions * (apart * self.distance), axis=1)
+
+    @property
+    def clearest(self) -> float:
+        """Largest distance over its error."""
+        return float(np.abs(self.distance / self.error).max(initial=0.0))
