@@ -9,14 +9,18 @@ What a wrong parameter does to the runs passes for their scatter, and hides in i
 and the solve with it, whose scatter is without it, tells whether it is so.
 """
 
-from typing import NamedTuple, Self
+from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import BoolArray, FloatArray
+from tpjb_ident.estimate.arrowhead import Step
 from tpjb_ident.estimate.equation import Blocks
 from tpjb_ident.estimate.scatter import Scatter
+from tpjb_ident.estimate.term import Term
 
 #: Errors of what the records say from which it is likely; beyond which it is no chance, of a normal distribution.
 LIKELY, _CLEAR = 2.0, 4.5
@@ -24,6 +28,11 @@ LIKELY, _CLEAR = 2.0, 4.5
 _BEYOND = 3.5
 #: Information of the records over that of the priors below which it is rounding.
 _LEAST = 1e-9
+#: What records make of a parameter, at most: units are such that readings change by no more than its size.
+_FARTHEST = 0.5
+
+#: How far off parameters are, by term and name.
+Distances = dict[tuple[str, str], float]
 
 
 def clear_limit(scatter: Scatter, blocks: Blocks, spent: int) -> float:
@@ -39,24 +48,29 @@ def clear_limit(scatter: Scatter, blocks: Blocks, spent: int) -> float:
 class Score(NamedTuple):
     """What records say of a term's k parameters in directions of theirs, in deviations as stated."""
 
+    term: Term
     directions: FloatArray  #: (k, k), columns
     distance: FloatArray  #: (k,): from the means
     error: FloatArray  #: (k,)
 
-    @classmethod
-    def of(cls, joint: FloatArray, covariance: FloatArray, prior: FloatArray) -> Self:
-        """Of parameters estimated with priors of precision `prior` (k,): distance from the means and covariance."""
-        precision = np.linalg.inv(covariance)
-        told, directions = np.linalg.eigh(precision - np.diag(prior))
+    @staticmethod
+    def of(term: Term, chosen: BoolArray, last: Step) -> Score:
+        """By the last step, whose shared parameters `chosen` (q,) are the term's."""
+        stated = np.array([parameter.deviation for parameter in term.stated])
+        precision = np.linalg.inv(last.joint_covariance[np.ix_(chosen, chosen)]) * np.outer(stated, stated)
+        told, directions = np.linalg.eigh(precision - np.diag(last.precision[chosen] * stated**2))
         told = np.maximum(told, _LEAST)
-        return cls(directions, directions.T @ precision @ joint / told, told**-0.5)
+        distance = directions.T @ precision @ (last.joint[chosen] / stated) / told
+        return Score(term, directions, distance, told**-0.5)
 
-    def off(self, limit: float) -> FloatArray:
-        """How far off parameters are that contradict what is stated by so many errors, (k,); zero of the others."""
+    def off(self, limit: float) -> Distances:
+        """How far off the parameters are that contradict what is stated by so many errors."""
         apart = np.abs(self.distance) > np.hypot(limit * self.error, _BEYOND)
-        return np.linalg.norm(self.directions * (apart * self.distance), axis=1)
+        sizes = np.linalg.norm(self.directions * (apart * self.distance), axis=1).tolist()
+        named = zip(self.term.stated, sizes)
+        return {(self.term.name, p.name): min(size * p.deviation, _FARTHEST) for p, size in named if size > 1}
 
     @property
     def clearest(self) -> float:
         """Largest distance over its error."""
-        return float(np.abs(self.distance / self.error).max(initial=0.0))
+        return float(np.abs(self.distance / self.error).max())

@@ -30,12 +30,11 @@ from tpjb_ident.estimate.equation import (
 )
 from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns, slopes_over_load
 from tpjb_ident.estimate.scatter import PHASES, AlongForce, ForceScatter, Residuals, Scatter, mixed_dof
-from tpjb_ident.estimate.score import LIKELY, Score, clear_limit
+from tpjb_ident.estimate.score import LIKELY, Distances, Score, clear_limit
 from tpjb_ident.estimate.term import Additive, FilmTerm, Fitted, Term
 
-#: Standard deviation that a parameter has at least, in its unit; what records that contradict it make of it, at most:
-#: units are such that readings change by no more than their size.
-_LEAST, _FARTHEST = 1e-9, 0.5
+#: Standard deviation that a parameter has at least, in its unit.
+_LEAST = 1e-9
 
 
 class Table:
@@ -95,10 +94,6 @@ _LARGEST_STEP = 1.0
 _UNTOLD = 1e-14
 #: Blocks whose arrays are held at a time.
 _CHUNK = 4096
-
-
-#: How far off parameters are, by term and name.
-Distances = dict[tuple[str, str], float]
 
 
 @dataclass(frozen=True, repr=False)
@@ -386,20 +381,15 @@ class Solver:
 
     def _contradictions(self, last: Step) -> tuple[Distances, Distances]:
         """How far off parameters are that contradict what is stated; and those of the likeliest term, if any may."""
+        tested = [term for term in self.shared.terms if term.contradiction and self.answered.any()]
+        scores = [Score.of(term, self.shared.chosen(term)[0], last) for term in tested]
+        if not scores:
+            return {}, {}
         clear: Distances = {}
-        likely: Distances = {}
-        if not self.answered.any():
-            return clear, likely
-        limit, clearest = clear_limit(self.scatter, self.blocks, len(self.rig.widened)), 0.0
-        for term in (term for term in self.shared.terms if term.tested):
-            chosen = np.flatnonzero(self.shared.chosen(term)[0])
-            stated = np.array([parameter.deviation for parameter in term.stated])
-            covariance = last.joint_covariance[np.ix_(chosen, chosen)] / np.outer(stated, stated)
-            score = Score.of(last.joint[chosen] / stated, covariance, last.precision[chosen] * stated**2)
-            clear |= _far(term, score.off(limit))
-            if score.clearest > clearest:
-                clearest, likely = score.clearest, _far(term, score.off(LIKELY))
-        return clear, likely
+        limit = clear_limit(self.scatter, self.blocks, len(self.rig.widened))
+        for score in scores:
+            clear |= score.off(limit)
+        return clear, max(scores, key=lambda score: score.clearest).off(LIKELY)
 
     def _apart(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Factor and shift of the blocks' readings (n, m), and how their H differs from their point's (n, 2, 2)."""
@@ -417,12 +407,6 @@ class Solver:
             shifts.append(shift)
             changes.append(change)
         return np.concatenate(factors), np.concatenate(shifts), np.concatenate(changes)
-
-
-def _far(term: Term, off: FloatArray) -> Distances:
-    """Distances (k,) of a term's parameters that exceed what is stated of them, from deviations to their units."""
-    named = zip(term.stated, off.tolist())
-    return {(term.name, p.name): min(size * p.deviation, _FARTHEST) for p, size in named if size > 1.0}
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,6 @@ from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, State, film_
 if TYPE_CHECKING:
     from tpjb_ident.estimate.solve import Solution
 
-#: Stated deviations beyond which a parameter is named that the records contradict.
-_LIMIT = 2.0
 #: Largest logarithm of a factor.
 _LARGEST = 5.0
 #: Of a change of H that a film's lines show so much is allowed for: they are right within a fifth.
@@ -50,6 +48,7 @@ class Parameter:
     unit: str
     deviation: float  #: prior standard deviation, in `unit`
     mean: float = 0.0
+    harmless: float = 0.0  #: deviation below which none is worth contradicting, in `unit`
 
     def at_least(self, deviation: float) -> Parameter:
         """The parameter, known no better than this."""
@@ -82,12 +81,11 @@ class Term:
         than the prior.
     never_estimated : bool
         Whether no record can tell them: their priors pass into the covariance, whatever the equations seem to say.
-    tested : bool
-        Whether its priors are what the manifest states, or usual of sound instruments: records may contradict them.
-    harmless : float
-        Deviation in their unit below which none is worth contradicting.
+    contradiction, gross : str, float
+        Condition of a parameter whose prior the records contradict, as stated or usual of sound instruments: they are
+        held against it. How far off it is, in its unit, that no calibration has.
     stated : tuple of Parameter
-        The parameters that are contradicted: as stated, or what is harmless.
+        What may be contradicted: the parameters as stated, or what is harmless.
     sentence, scale : str, float
         Said of every parameter `p` that the records tell, with its `value` and its `error` times the scale.
 
@@ -101,8 +99,8 @@ class Term:
     name = ""
     always_estimated = False
     never_estimated = False
-    tested = False
-    harmless = 0.0
+    contradiction = ""
+    gross = np.inf
     sentence = ""
     scale = 1.0
 
@@ -111,7 +109,7 @@ class Term:
         self.parameters: tuple[Parameter, ...] = ()
         self.points: tuple[int, ...] = ()
         self.prepare(rig, blocks)
-        self.stated = tuple(p.at_least(self.harmless) for p in self.parameters)
+        self.stated = tuple(p.at_least(p.harmless) for p in self.parameters)
         wide = [rig.widened.get((self.name, p.name), 0.0) for p in self.parameters]
         self.parameters = tuple(p.at_least(size) for p, size in zip(self.parameters, wide))
 
@@ -146,31 +144,9 @@ class Term:
         """What is left of the priors by what other terms have `fitted`, (q,): of parameters that no record tells."""
         return np.ones(len(self.parameters))
 
-    def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
-        """The rig, its sensors as uncertain as the records show them; None where they are as stated."""
-        return None
-
     def learnt(self, rig: Rig, solution: Solution) -> Rig:
-        """The rig as uncertain as a solve shows it where that contradicts what is stated; itself where not.
-
-        What the term's test says of it stays said.
-        """
-        fitted = solution.fitted.get(self.name)
-        widened = None if fitted is None else self.widened(rig, fitted)
-        if fitted is None or widened is None:
-            return rig
-        return replace(widened, contradicted={**rig.contradicted, self.name: self.conditions(fitted)})
-
-    def contradicted(self, fitted: Fitted) -> list[int]:
-        """Places of parameters that the records contradict, as they are where taken as uncertain as that."""
-        wide = [k for k, p in enumerate(self.stated) if (self.name, p.name) in self.rig.widened]
-        distance = [abs(fitted.value[k] - p.mean) / p.deviation for k, p in enumerate(self.stated)]
-        return [k for k in wide if distance[k] > _LIMIT] or wide
-
-    def farthest(self, fitted: Fitted, places: Sequence[int]) -> float:
-        """How far off the parameters at these places may be, in their unit."""
-        sizes = [self.rig.widened.get((self.name, self.stated[k].name), 0.0) for k in places]
-        return float(np.max([*sizes, *np.abs(fitted.value[list(places)])], initial=0.0))
+        """The rig as uncertain as a solve shows it, by a test of the term's own; itself where that says nothing."""
+        return rig
 
     def standing_on(self, fitted: Fitted) -> ComplexArray | None:
         """Compliance of the springs under the housing (2, 2) [m/N], of the term that knows it."""
@@ -178,7 +154,13 @@ class Term:
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """What to say where the records contradict what was stated."""
-        return ()
+        off = {p: self.rig.widened.get((self.name, p.name), 0.0) for p in self.stated}
+        times = [f"{p.name} ({size / p.deviation:.0f} times)" for p, size in off.items() if size]
+        if not times:
+            return ()
+        text = f"{'; '.join(self.words(fitted))}: beyond the uncertainty stated of {', '.join(times)}"
+        name = "records-contradicted" if max(off.values()) > self.gross else self.contradiction
+        return (Condition(name, text.lstrip(": ")),)
 
     def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> Conditions:
         """What to say of one point (its number), `h` (2, 2) [N/m]."""
@@ -266,11 +248,6 @@ class FilmTerm(Additive):
         changes, group = self.changes(blocks, state), self.group[blocks.point]
         numbers = value.reshape(-1, changes.shape[1])[group] * (group >= 0)[:, None]
         return np.einsum("nk,nkij->nij", numbers, changes)
-
-
-def differing(share: float, text: str) -> Conditions:
-    """Sensors that contradict others of their quantity by a share of what they read."""
-    return (Condition("records-contradicted" if share > NO_GAIN else "probe-gains-differ", text),)
 
 
 def numbered(name: str, unit: str, deviations: Sequence[float]) -> tuple[Parameter, ...]:

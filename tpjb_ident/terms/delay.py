@@ -8,13 +8,13 @@ tell.
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.conditions import Conditions
 from tpjb_ident.estimate.equation import Blocks, Rig
-from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, differing
+from tpjb_ident.estimate.term import NO_GAIN, OUT_OF_STEP, Factor, Fitted, Parameter
 
 _MILLISECOND = 1e-3
-#: Deviation of a delay that nobody doubts, where others tell it [s].
-_SURE = 1e-6
+#: Deviation of a delay that nobody doubts, where others tell it [s], and of one that does no harm [ms].
+_SURE, _HARMLESS = 1e-6, 0.01
 #: Standard errors and phase [rad] from which cells come late, and not the accelerometers early.
 _CLEAR, _NOTABLE = 2.0, 0.02
 
@@ -23,8 +23,7 @@ class Delay(Factor):
     """A sensor that comes later by tau reads exp(-i omega tau) times the truth."""
 
     name = "delay"
-    tested = True
-    harmless = 0.01
+    contradiction = OUT_OF_STEP
     sentence = "{p.name} late by {value:.3g} ms (standard error {error:.2g} ms)"
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
@@ -36,7 +35,12 @@ class Delay(Factor):
         names = list(dict.fromkeys(devices[deviation > 0].tolist()))
         self.sensors = ((devices[:, None] == np.array(names, dtype=str)) & (deviation[:, None] > 0)).astype(float)
         largest = (self.sensors * deviation[:, None]).max(axis=0) / _MILLISECOND
-        self.parameters = tuple(Parameter(name, "ms", float(size)) for name, size in zip(names, largest))
+        sizes = zip(names, largest.tolist())
+        self.parameters = tuple(Parameter(name, "ms", size, harmless=_HARMLESS) for name, size in sizes)
+        among = self.sensors[rig.pick("displacement")].any(axis=0)
+        wide = np.array([(self.name, name) in rig.widened for name in names], dtype=bool)
+        if wide.any() and among[wide].all():  # probes against probes
+            self.contradiction, self.gross = "probe-gains-differ", NO_GAIN / self._omega / _MILLISECOND
 
     def rate(self, blocks: Blocks) -> ComplexArray:
         """-i omega, per ms."""
@@ -49,9 +53,4 @@ class Delay(Factor):
             known = (condition for conditions in self.rig.contradicted.values() for condition in conditions)
             out_of_step = (condition for condition in known if condition == OUT_OF_STEP)
             return tuple(out_of_step) if late.any() else ()
-        places, probes = self.contradicted(fitted), self.rig.pick("displacement")
-        among = self.sensors[probes].any(axis=0)
-        text = "; ".join(self.words(fitted))
-        late = holding((not among[places].all(), OUT_OF_STEP, text))
-        turn = self.farthest(fitted, [k for k in places if among[k]]) * _MILLISECOND * self._omega
-        return (*late, *(differing(turn, text) if turn else ()))
+        return super().conditions(fitted)

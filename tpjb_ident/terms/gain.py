@@ -3,16 +3,16 @@
 import numpy as np
 
 from rigdata.arrays import ComplexArray, IntArray
-from tpjb_ident.conditions import Conditions
 from tpjb_ident.estimate.equation import Blocks, Rig
-from tpjb_ident.estimate.term import Factor, Fitted, Parameter, differing
+from tpjb_ident.estimate.term import NO_GAIN, Factor, Parameter
 
 
 class Gain(Factor):
     """Logarithm of a sensor's gain; two probes and two cells tell nothing of it, a third probe the differences."""
 
     name = "calibration"
-    tested = True
+    contradiction = "probe-gains-differ"
+    gross = NO_GAIN
     sentence = "{p.name} reads {value:+.2f} % (standard error {error:.2f} %)"
     scale = 100.0
 
@@ -47,12 +47,3 @@ class Gain(Factor):
         for q, (j, k, point) in enumerate(self._places):
             exponent[:, j, q] = (blocks.calibration[:, j] == k) & (self._point(blocks, j) == point)
         return exponent
-
-    def conditions(self, fitted: Fitted) -> Conditions:
-        """Sensors that differ from the others beyond what is stated."""
-        places = self.contradicted(fitted)
-        if not places:
-            return ()
-        names = ", ".join(self.parameters[k].name for k in places)
-        text = ": ".join(["; ".join(self.words(fitted)), f"beyond the uncertainty stated of {names}"]).lstrip(": ")
-        return differing(self.farthest(fitted, places), text)

@@ -3,9 +3,8 @@
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.equation import Blocks, Rig
-from tpjb_ident.estimate.term import Factor, Fitted, Parameter
+from tpjb_ident.estimate.term import Factor, Parameter
 
 #: Parts in a thousand per kelvin, the unit of a coefficient in the solve.
 _UNIT = 1e-3
@@ -15,7 +14,7 @@ class Temperature(Factor):
     """A sensor reads more by its coefficient for every kelvin away from its reference, or from the runs' mean."""
 
     name = "temperature"
-    tested = True
+    contradiction = "probes-drift"
     sentence = "{p.name} reads {value:+.3f} % more per K (standard error {error:.3f} %)"
     scale = 0.1
 
@@ -37,7 +36,3 @@ class Temperature(Factor):
         """Thousandths per kelvin away from the reference."""
         away = np.nan_to_num(blocks.temperature[:, None] - self._reference)
         return np.asarray(_UNIT * away[:, None] * self.sensors, complex)
-
-    def conditions(self, fitted: Fitted) -> Conditions:
-        """Drifts beyond what is stated."""
-        return holding((self.contradicted(fitted), "probes-drift", "; ".join(self.words(fitted))))
