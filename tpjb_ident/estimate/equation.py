@@ -111,9 +111,9 @@ class Rig(Directed):
         return np.array([s.plane * (j in probes and len(planes) > 1) for j, s in enumerate(self.channels)])
 
     @property
-    def spare(self) -> list[int]:
-        """Rows of quantities with more than two sensors: they tell what is wrong with one of them."""
-        return [j for rows in map(self.pick, VECTOR_QUANTITIES) if len(rows) > 2 for j in rows]
+    def spare(self) -> BoolArray:
+        """Whether a sensor is one of more than two of its quantity, (m,): they tell what is wrong with one of them."""
+        return np.array([len(self.pick(sensor.quantity)) > 2 for sensor in self.channels])
 
     def doubting(self, doubted: Mapping[str, tuple[float, float]]) -> Rig:
         """The rig, gains and axes [rad] of some sensors, by their names, known no better than this."""

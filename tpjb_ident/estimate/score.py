@@ -48,7 +48,8 @@ def clear_limit(scatter: Scatter, blocks: Blocks, spent: int) -> float:
 class Score(NamedTuple):
     """What records say of a term's k parameters in directions of theirs, in deviations as stated."""
 
-    term: Term
+    names: list[tuple[str, str]]  #: of the term and the parameters
+    stated: FloatArray  #: (k,): their deviations
     directions: FloatArray  #: (k, k), columns
     distance: FloatArray  #: (k,): from the means
     error: FloatArray  #: (k,)
@@ -56,21 +57,23 @@ class Score(NamedTuple):
     @staticmethod
     def of(term: Term, chosen: BoolArray, last: Step) -> Score:
         """By the last step, whose shared parameters `chosen` (q,) are the term's."""
-        stated = np.array([parameter.deviation for parameter in term.stated])
-        precision = np.linalg.inv(last.joint_covariance[np.ix_(chosen, chosen)]) * np.outer(stated, stated)
-        told, directions = np.linalg.eigh(precision - np.diag(last.precision[chosen] * stated**2))
+        deviation = np.array([parameter.deviation for parameter in term.stated])
+        places, stated = np.flatnonzero(chosen)[deviation < np.inf], deviation[deviation < np.inf]
+        precision = np.linalg.inv(last.joint_covariance[np.ix_(places, places)]) * np.outer(stated, stated)
+        told, directions = np.linalg.eigh(precision - np.diag(last.precision[places] * stated**2))
         told = np.maximum(told, _LEAST)
-        distance = directions.T @ precision @ (last.joint[chosen] / stated) / told
-        return Score(term, directions, distance, told**-0.5)
+        distance = directions.T @ precision @ (last.joint[places] / stated) / told
+        names = [(term.name, parameter.name) for parameter in term.stated if parameter.deviation < np.inf]
+        return Score(names, stated, directions, distance, told**-0.5)
 
     def off(self, limit: float) -> Distances:
         """How far off the parameters are that contradict what is stated by so many errors."""
         apart = np.abs(self.distance) > np.hypot(limit * self.error, _BEYOND)
-        sizes = np.linalg.norm(self.directions * (apart * self.distance), axis=1).tolist()
-        named = zip(self.term.stated, sizes)
-        return {(self.term.name, p.name): min(size * p.deviation, _FARTHEST) for p, size in named if size > 1}
+        sizes = np.linalg.norm(self.directions * (apart * self.distance), axis=1)
+        off = np.minimum(sizes * self.stated, _FARTHEST) * (sizes > 1)
+        return {name: size for name, size in zip(self.names, off.tolist()) if size}
 
     @property
     def clearest(self) -> float:
         """Largest distance over its error."""
-        return float(np.abs(self.distance / self.error).max())
+        return float(np.abs(self.distance / self.error).max(initial=0.0))

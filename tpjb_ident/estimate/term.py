@@ -48,7 +48,7 @@ class Parameter:
     unit: str
     deviation: float  #: prior standard deviation, in `unit`
     mean: float = 0.0
-    harmless: float = 0.0  #: deviation below which none is worth contradicting, in `unit`
+    harmless: float = 0.0  #: deviation below which none is worth contradicting, in `unit`; infinite: no record does
 
     def at_least(self, deviation: float) -> Parameter:
         """The parameter, known no better than this."""

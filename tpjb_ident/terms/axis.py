@@ -23,12 +23,12 @@ class Axis(Additive):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        least = np.zeros(len(rig))
-        least[rig.spare] = _SURE
-        deviations = [sensor.axis_uncertainty or size for sensor, size in zip(rig.channels, least.tolist())]
-        self._rows = [j for j, deviation in enumerate(deviations) if deviation]
+        stated = np.array([sensor.axis_uncertainty for sensor in rig.channels])
+        deviations = np.maximum(stated, _SURE * rig.spare)
+        self._rows = np.flatnonzero(deviations)
+        harmless = np.where(rig.spare, _HARMLESS, np.inf).tolist()
         self.parameters = tuple(
-            Parameter(rig.channels[j].name, "rad", deviations[j], harmless=_HARMLESS) for j in self._rows
+            Parameter(rig.channels[j].name, "rad", float(deviations[j]), harmless=harmless[j]) for j in self._rows
         )
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:

@@ -30,8 +30,7 @@ class Delay(Factor):
         """Parameters and what goes with them."""
         self._omega = blocks.usual_omega
         devices = np.array([sensor.clock or sensor.name for sensor in rig.channels])
-        deviation = np.array([sensor.delay_uncertainty for sensor in rig.channels])
-        deviation[rig.spare] = np.maximum(deviation[rig.spare], _SURE)
+        deviation = np.maximum([sensor.delay_uncertainty for sensor in rig.channels], _SURE * rig.spare)
         names = list(dict.fromkeys(devices[deviation > 0].tolist()))
         self.sensors = ((devices[:, None] == np.array(names, dtype=str)) & (deviation[:, None] > 0)).astype(float)
         largest = (self.sensors * deviation[:, None]).max(axis=0) / _MILLISECOND

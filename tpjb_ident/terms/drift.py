@@ -28,22 +28,20 @@ class Drift(Factor):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        places = {run: k for k, run in enumerate(rig.runs)}
-        order = np.array([places.get(run, np.nan) for run in blocks.runs])
-        probes = rig.pick("displacement")
         self.sensors = np.zeros((len(rig), 0))
-        if len(np.unique(order)) < _LEAST or not np.isfinite(order).all() or not probes:
+        if len(set(blocks.runs)) < _LEAST or not set(blocks.runs) <= set(rig.runs):
             return
-        self._order = (order - np.ptp(order) / 2 - order.min()) / (np.ptp(order) / 2)
-        alone = np.eye(len(rig))[:, probes]
+        order = np.array([rig.runs.index(run) for run in blocks.runs])
+        self._order = np.interp(order, [order.min(), order.max()], [-1.0, 1.0])
+        alone = np.eye(len(rig))[:, rig.pick("displacement")]
         self.sensors = np.column_stack([alone.sum(axis=1), alone])
-        names = ["all probes", *(rig.channels[j].name for j in probes)]
-        drifts = [rig.widened.get((self.name, name), 0.0) for name in names]
+        harmless = {"all probes": _TOGETHER} | {rig.channels[j].name: _ALONE for j in rig.pick("displacement")}
+        self.parameters = tuple(Parameter(name, "1", _SURE, harmless=size) for name, size in harmless.items())
+        drifts = [rig.widened.get((self.name, name), 0.0) for name in harmless]
         self._drifted = np.flatnonzero(drifts)
-        harmless = [_TOGETHER] + [_ALONE] * len(probes)
-        self.parameters = tuple(Parameter(name, "1", _SURE, harmless=size) for name, size in zip(names, harmless))
         for k in self._drifted:
-            self.parameters += (Parameter(f"{names[k]} throughout", "1", _EITHER_END * drifts[k]),)
+            name = f"{self.parameters[k].name} throughout"
+            self.parameters += (Parameter(name, "1", _EITHER_END * drifts[k]),)
 
     def exponent(self, blocks: Blocks) -> ComplexArray:
         """From minus one at the first run to one at the last; one of what is uncertain throughout."""

@@ -34,7 +34,8 @@ class Gain(Factor):
                         self._places.append((j, k, point))
                         words = name if point < 0 else f"{name}, at {blocks.points[point]}"
                         size = float(np.hypot(sensor.uncertainty or 0.0, deviation))
-                        parameters.append(Parameter(words, "1", size))
+                        # what the housing's equations leave out is no evidence: gains are held against gains
+                        parameters.append(Parameter(words, "1", size, harmless=0.0 if rig.spare[j] else np.inf))
         self.parameters = tuple(parameters)
 
     def _point(self, blocks: Blocks, j: int) -> IntArray:
