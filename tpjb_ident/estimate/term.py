@@ -99,6 +99,8 @@ class Term:
     name = ""
     always_estimated = False
     never_estimated = False
+    parameters: tuple[Parameter, ...] = ()
+    points: tuple[int, ...] = ()
     contradiction = ""
     gross = np.inf
     sentence = ""
@@ -106,8 +108,6 @@ class Term:
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         self.rig = rig
-        self.parameters: tuple[Parameter, ...] = ()
-        self.points: tuple[int, ...] = ()
         self.prepare(rig, blocks)
         self.stated = tuple(p.at_least(p.harmless) for p in self.parameters)
         wide = [rig.widened.get((self.name, p.name), 0.0) for p in self.parameters]

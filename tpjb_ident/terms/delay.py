@@ -36,7 +36,7 @@ class Delay(Factor):
         largest = (self.sensors * deviation[:, None]).max(axis=0) / _MILLISECOND
         sizes = zip(names, largest.tolist())
         self.parameters = tuple(Parameter(name, "ms", size, harmless=_HARMLESS) for name, size in sizes)
-        among = self.sensors[rig.pick("displacement")].any(axis=0)
+        among = np.asarray(self.sensors[rig.pick("displacement")].any(axis=0))
         wide = np.array([(self.name, name) in rig.widened for name in names], dtype=bool)
         if wide.any() and among[wide].all():  # probes against probes
             self.contradiction, self.gross = "probe-gains-differ", NO_GAIN / self._omega / _MILLISECOND
