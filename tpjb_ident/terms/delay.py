@@ -14,7 +14,7 @@ from tpjb_ident.estimate.term import NO_GAIN, OUT_OF_STEP, Factor, Fitted, Param
 
 _MILLISECOND = 1e-3
 #: Deviation of a delay that nobody doubts, where others tell it [s], and of one that does no harm [ms].
-_SURE, _HARMLESS = 1e-6, 0.01
+_SURE, _HARMLESS = 1e-7, 0.01
 #: Standard errors and phase [rad] from which cells come late, and not the accelerometers early.
 _CLEAR, _NOTABLE = 2.0, 0.02
 

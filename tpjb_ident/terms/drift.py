@@ -11,9 +11,9 @@ from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Parameter
 
 #: Drift over half the runs that nobody doubts; that does no harm, of all probes, as by a film that warms, and of one.
-_SURE, _TOGETHER, _ALONE = 2e-4, 0.01, 2e-3
+_SURE, _TOGETHER, _ALONE = 1e-5, 0.02, 2e-3
 #: Deviation of a gain that was right at the first or at the last run, over its drift from the middle to there.
-_EITHER_END = 0.75
+_EITHER_END = 0.9
 #: Runs that tell a drift from their scatter, at least.
 _LEAST = 6
 
