@@ -6,7 +6,7 @@ import pytest
 from tests.estimate import block_cases
 from tests.estimate.block_cases import MASS, Case, away, film, made, solved
 from tests.seeds import seeds
-from tpjb_ident.terms.registry import learnt_rig
+from tpjb_ident.terms.registry import learnt_rig, solved_as_learnt
 from tpjb_ident.terms.shaft import not_told
 
 
@@ -15,16 +15,22 @@ def term_of(solution, name):
     return term, solution.fitted[name]
 
 
+def learnt(case):
+    """The solve with the rig as its records show it."""
+    rig, blocks, truth = made(case)
+    return solved_as_learnt(rig, lambda rig: solved(rig, blocks, truth))
+
+
 def test_a_drift_and_a_delay_are_said_with_their_figures_and_named_beyond_what_was_stated():
     warm = Case(
         noise=1e-4, drift={"D1": 5e-4}, kelvins=15.0, stated={"D1": {"temperature_coefficient_uncertainty": 1e-4}}
     )
-    term, fitted = term_of(solved(*made(warm)), "temperature")
+    term, fitted = term_of(learnt(warm), "temperature")
     (sentence,) = term.words(fitted)
     assert sentence.startswith("D1 reads +0.0")
     assert term.conditions(fitted) == ("probes-drift",)
     late = Case(late={"force": 6e-4}, hertz=(30.0, 90.0), stated={"force": {"delay_uncertainty": 1e-4}})
-    term, fitted = term_of(solved(*made(late)), "delay")
+    term, fitted = term_of(learnt(late), "delay")
     first, second = term.words(fitted)
     assert first.startswith("F1 late by 0.")
     assert second.startswith("F2 late by 0.")

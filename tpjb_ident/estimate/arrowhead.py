@@ -126,6 +126,8 @@ class Step:
     S_inverse: FloatArray  #: (q, q): zero in rows and columns of considered parameters
     estimated: BoolArray  #: (q,)
     precision: FloatArray  #: (q,): Lambda
+    joint: FloatArray  #: (q,): distance of the shared parameters from their means, were all estimated
+    joint_covariance: FloatArray  #: (q, q)
 
     def factors(self) -> FloatArray:
         """One standard deviation of every shared parameter's prior, as it moves all points together, (q, P, k)."""
@@ -163,6 +165,9 @@ def step(sums: Sums, shared: Prior, by_point: Prior) -> Step:
     A_inverse, K, S = _eliminated(A, sums.E, G)
     inverse = np.asarray(np.linalg.inv(S), dtype=float)
     estimated = shared.estimated(np.diag(inverse))
+    # from the means: what is considered stands there
+    score = sums.g_t + shared.precision * shared.distance + np.einsum("pak,pa->k", K, g) - S @ shared.distance
+    joint = inverse @ score, inverse
     is_learnt = by_point.estimated(_variances(A_inverse, K, inverse)[:, k:])
     # what is considered is held at its mean; what it would move is kept apart
     moves, moves_shared = (
@@ -192,7 +197,7 @@ def step(sums: Sums, shared: Prior, by_point: Prior) -> Step:
     )
     weight = np.concatenate([np.zeros((len(A), k)), by_point.precision * is_learnt], axis=1)
     records = _records(A_inverse, K, S, S_inverse, weight, shared.precision)[:, :k, :k]
-    return Step(x[:, :k], theta, points, records, K[:, :k], S, S_inverse, estimated, shared.precision)
+    return Step(x[:, :k], theta, points, records, K[:, :k], S, S_inverse, estimated, shared.precision, *joint)
 
 
 def _by_prior(is_learnt: BoolArray, learnt: FloatArray, passed: FloatArray, root: FloatArray) -> FloatArray:

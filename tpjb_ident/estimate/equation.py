@@ -80,6 +80,9 @@ class Rig(Directed):
     mount: str = "cells"  #: "cells", "floating", or "unknown": no accelerometer tells
     #: by term: what its test said of sensors that are since taken as uncertain as it showed them
     contradicted: Mapping[str, Conditions] = field(default_factory=dict)
+    #: by term and parameter: deviation of those that the records contradict, as far off as they show them
+    widened: dict[tuple[str, str], float] = field(default_factory=dict)
+    runs: tuple[str, ...] = ()  #: names of the dynamic runs, in the order of the campaign
     #: by run and sensor: deviation of a gain that is another one there
     off: Mapping[tuple[str, str], float] = field(default_factory=dict)
     bare: RigStiffness = field(default_factory=RigStiffness)
@@ -106,6 +109,11 @@ class Rig(Directed):
         probes = self.pick("displacement")
         planes = {self.channels[j].plane for j in probes}
         return np.array([s.plane * (j in probes and len(planes) > 1) for j, s in enumerate(self.channels)])
+
+    @property
+    def spare(self) -> BoolArray:
+        """Whether a sensor is one of more than two of its quantity, (m,): they tell what is wrong with one of them."""
+        return np.array([len(self.pick(sensor.quantity)) > 2 for sensor in self.channels])
 
     def doubting(self, doubted: Mapping[str, tuple[float, float]]) -> Rig:
         """The rig, gains and axes [rad] of some sensors, by their names, known no better than this."""
@@ -383,7 +391,8 @@ def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
 
 def campaign_rig(campaign: Campaign, **known: Any) -> Rig:
     """The rig of a campaign's dynamic runs as stated; `known`: what else is of it, by name."""
-    return Rig(sensors_of(campaign), campaign.housing_mass, campaign.mass_uncertainty, **known)
+    runs = tuple(run.id for run in campaign.of_kind("dynamic"))
+    return Rig(sensors_of(campaign), campaign.housing_mass, campaign.mass_uncertainty, runs=runs, **known)
 
 
 def mounted(rig: Rig, blocks: Blocks, stated: str | None, ratio: complex) -> Rig:

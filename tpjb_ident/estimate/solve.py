@@ -30,6 +30,7 @@ from tpjb_ident.estimate.equation import (
 )
 from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns, slopes_over_load
 from tpjb_ident.estimate.scatter import PHASES, AlongForce, ForceScatter, Residuals, Scatter, mixed_dof
+from tpjb_ident.estimate.score import LIKELY, Distances, Score, clear_limit
 from tpjb_ident.estimate.term import Additive, FilmTerm, Fitted, Term
 
 #: Standard deviation that a parameter has at least, in its unit.
@@ -116,6 +117,8 @@ class Solution:
     factor: ComplexArray  #: (n, m): what multiplies the readings of every block
     shift: ComplexArray  #: (n, m), SI: what is in the readings beside the motion's part
     run_change: ComplexArray  #: (n, 2, 2), N/m: H of a run beside that of its point
+    contradicted: Distances  #: parameters that contradict what is stated of them
+    supposed: Distances  #: those of one term that may
     ran_away: bool = False  #: no point has an answer
 
     def blocks_of(self, group: int) -> BoolArray:
@@ -145,7 +148,8 @@ class Solution:
         """What the terms' tests say of the rig: it touches every point."""
         conditions = [condition for term in self.terms for condition in term.conditions(self.fitted[term.name])]
         text = "the runs together give no H, as where they are driven below their noise: it is the windows' alone"
-        return (*conditions, *holding((self.ran_away, "iteration-limit", text)))
+        # where a gain explains what an axis does as well, the gain is told
+        return tuple(dict.fromkeys((*conditions, *holding((self.ran_away, "iteration-limit", text)))))
 
 
 class Solver:
@@ -372,7 +376,20 @@ class Solver:
             spare,
             np.clip(self.scatter.variance[self.group] * fit.information, 0.0, 1.0),
             *self._apart(),
+            *self._contradictions(last),
         )
+
+    def _contradictions(self, last: Step) -> tuple[Distances, Distances]:
+        """How far off parameters are that contradict what is stated; and those of the likeliest term, if any may."""
+        tested = [term for term in self.shared.terms if term.contradiction and self.answered.any()]
+        scores = [Score.of(term, self.shared.chosen(term)[0], last) for term in tested]
+        if not scores:
+            return {}, {}
+        clear: Distances = {}
+        limit = clear_limit(self.scatter, self.blocks, len(self.rig.widened))
+        for score in scores:
+            clear |= score.off(limit)
+        return clear, max(scores, key=lambda score: score.clearest).off(LIKELY)
 
     def _apart(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Factor and shift of the blocks' readings (n, m), and how their H differs from their point's (n, 2, 2)."""

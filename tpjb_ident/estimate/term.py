@@ -13,14 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.conditions import Conditions
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, State, film_change_rows
 
 if TYPE_CHECKING:
     from tpjb_ident.estimate.solve import Solution
 
-#: Standard deviations beyond which a parameter contradicts what is stated.
-_LIMIT = 3.0
 #: Largest logarithm of a factor.
 _LARGEST = 5.0
 #: Of a change of H that a film's lines show so much is allowed for: they are right within a fifth.
@@ -31,6 +29,8 @@ CHANGE_BY_ORBIT = 2.0
 CHANGE_AS_DEVIATION = 1 / 1.6
 #: Changes below this share are not worth telling [share of H].
 _LEAST_CHANGE = 2e-4
+#: Difference of sensors beyond any calibration: an axis, a sign or a cable is wrong.
+NO_GAIN = 0.2
 #: Condition of accelerometers that lead the cells: the housing's test finds it, the delay tells whether it stays.
 OUT_OF_STEP = "cells-and-accelerometers-out-of-phase"
 
@@ -48,6 +48,11 @@ class Parameter:
     unit: str
     deviation: float  #: prior standard deviation, in `unit`
     mean: float = 0.0
+    harmless: float = 0.0  #: deviation below which none is worth contradicting, in `unit`; infinite: no record does
+
+    def at_least(self, deviation: float) -> Parameter:
+        """The parameter, known no better than this."""
+        return replace(self, deviation=max(self.deviation, deviation))
 
 
 @dataclass(frozen=True)
@@ -76,6 +81,11 @@ class Term:
         than the prior.
     never_estimated : bool
         Whether no record can tell them: their priors pass into the covariance, whatever the equations seem to say.
+    contradiction, gross : str, float
+        Condition of a parameter whose prior the records contradict, as stated or usual of sound instruments: they are
+        held against it. How far off it is, in its unit, that no calibration has.
+    stated : tuple of Parameter
+        What may be contradicted: the parameters as stated, or what is harmless.
     sentence, scale : str, float
         Said of every parameter `p` that the records tell, with its `value` and its `error` times the scale.
 
@@ -89,14 +99,19 @@ class Term:
     name = ""
     always_estimated = False
     never_estimated = False
+    parameters: tuple[Parameter, ...] = ()
+    points: tuple[int, ...] = ()
+    contradiction = ""
+    gross = np.inf
     sentence = ""
     scale = 1.0
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         self.rig = rig
-        self.parameters: tuple[Parameter, ...] = ()
-        self.points: tuple[int, ...] = ()
         self.prepare(rig, blocks)
+        self.stated = tuple(p.at_least(p.harmless) for p in self.parameters)
+        wide = [rig.widened.get((self.name, p.name), 0.0) for p in self.parameters]
+        self.parameters = tuple(p.at_least(size) for p, size in zip(self.parameters, wide))
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Take from rig and blocks what the term needs: its parameters, where it applies."""
@@ -129,20 +144,9 @@ class Term:
         """What is left of the priors by what other terms have `fitted`, (q,): of parameters that no record tells."""
         return np.ones(len(self.parameters))
 
-    def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
-        """The rig, its sensors as uncertain as the records show them; None where they are as stated."""
-        return None
-
     def learnt(self, rig: Rig, solution: Solution) -> Rig:
-        """The rig as uncertain as a solve shows it where that contradicts what is stated; itself where not.
-
-        What the term's test says of it stays said.
-        """
-        fitted = solution.fitted.get(self.name)
-        widened = None if fitted is None else self.widened(rig, fitted)
-        if fitted is None or widened is None:
-            return rig
-        return replace(widened, contradicted={**rig.contradicted, self.name: self.conditions(fitted)})
+        """The rig as uncertain as a solve shows it, by a test of the term's own; itself where that says nothing."""
+        return rig
 
     def standing_on(self, fitted: Fitted) -> ComplexArray | None:
         """Compliance of the springs under the housing (2, 2) [m/N], of the term that knows it."""
@@ -150,7 +154,13 @@ class Term:
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """What to say where the records contradict what was stated."""
-        return ()
+        off = {p: self.rig.widened.get((self.name, p.name), 0.0) for p in self.stated}
+        times = [f"{p.name} ({size / p.deviation:.0f} times)" for p, size in off.items() if size]
+        if not times:
+            return ()
+        text = f"{'; '.join(self.words(fitted))}: beyond the uncertainty stated of {', '.join(times)}"
+        name = "records-contradicted" if max(off.values()) > self.gross else self.contradiction
+        return (Condition(name, text.lstrip(": ")),)
 
     def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> Conditions:
         """What to say of one point (its number), `h` (2, 2) [N/m]."""
@@ -238,20 +248,6 @@ class FilmTerm(Additive):
         changes, group = self.changes(blocks, state), self.group[blocks.point]
         numbers = value.reshape(-1, changes.shape[1])[group] * (group >= 0)[:, None]
         return np.einsum("nk,nkij->nij", numbers, changes)
-
-
-def exceeding(fitted: Fitted, parameters: tuple[Parameter, ...]) -> list[int]:
-    """Places of estimated parameters further from the mean than they scatter if the prior holds.
-
-    The value's variance is then the prior's less what the records leave; and it must stand above its own error.
-    """
-    places = []
-    for k, parameter in enumerate(parameters):
-        distance, error = abs(float(fitted.value[k]) - parameter.mean), float(fitted.deviation[k])
-        scatter = np.sqrt(max(parameter.deviation**2 - error**2, error**2))
-        if fitted.estimated[k] and distance > _LIMIT * scatter:
-            places.append(k)
-    return places
 
 
 def numbered(name: str, unit: str, deviations: Sequence[float]) -> tuple[Parameter, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import Blocks, Rig, State
+from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter
 
 #: Standard errors from which a corner is negative.
@@ -43,11 +44,12 @@ class Corner(Factor):
         """The high pass itself: its gain falls by half the square of the lead."""
         state.factor /= 1 - self.exponent(blocks) @ value
 
-    def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
+    def learnt(self, rig: Rig, solution: Solution) -> Rig:
         """Accelerometers asked for theirs where the cells' is negative."""
-        if rig.out_of_step or not len(rig.pick("acceleration")) or not fitted.value[0] < -fitted.deviation[0]:
-            return None
-        return replace(rig, out_of_step=True)
+        if rig.out_of_step or not self.parameters or not rig.pick("acceleration"):
+            return rig
+        fitted = solution.fitted[self.name]
+        return replace(rig, out_of_step=True) if fitted.value[0] < -fitted.deviation[0] else rig
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Accelerometers whose corner would have to be negative: something else turns them, no filter does."""

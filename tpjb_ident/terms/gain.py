@@ -1,22 +1,18 @@
 """Gains of single sensors, as far as the manifest states their uncertainty: one number a sensor for the campaign."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from rigdata.arrays import ComplexArray, IntArray
-from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import Blocks, Rig
-from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
-
-#: Difference of gains beyond any calibration: an axis, a sign or a cable is wrong.
-NO_GAIN = 0.2
+from tpjb_ident.estimate.term import NO_GAIN, Factor, Parameter
 
 
 class Gain(Factor):
     """Logarithm of a sensor's gain; two probes and two cells tell nothing of it, a third probe the differences."""
 
     name = "calibration"
+    contradiction = "probe-gains-differ"
+    gross = NO_GAIN
     sentence = "{p.name} reads {value:+.2f} % (standard error {error:.2f} %)"
     scale = 100.0
 
@@ -38,7 +34,8 @@ class Gain(Factor):
                         self._places.append((j, k, point))
                         words = name if point < 0 else f"{name}, at {blocks.points[point]}"
                         size = float(np.hypot(sensor.uncertainty or 0.0, deviation))
-                        parameters.append(Parameter(words, "1", size))
+                        # what the housing's equations leave out is no evidence: gains are held against gains
+                        parameters.append(Parameter(words, "1", size, harmless=0.0 if rig.spare[j] else np.inf))
         self.parameters = tuple(parameters)
 
     def _point(self, blocks: Blocks, j: int) -> IntArray:
@@ -51,29 +48,3 @@ class Gain(Factor):
         for q, (j, k, point) in enumerate(self._places):
             exponent[:, j, q] = (blocks.calibration[:, j] == k) & (self._point(blocks, j) == point)
         return exponent
-
-    def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
-        """Gains of a quantity whose channels differ beyond what is stated, as uncertain as they differ."""
-        spread = {}
-        for quantity, values in self._differing(fitted).items():
-            spread[quantity] = float(np.sqrt(np.sum(np.square(values)) / max(len(values) - 1, 1)))
-        sensors = []
-        for sensor in rig.channels:
-            size = spread.get(sensor.quantity, 0.0)
-            sensors.append(sensor.doubted(size, size))  # what contradicts so may as well be an axis or crosstalk
-        return replace(rig, channels=tuple(sensors)) if spread else None
-
-    def _differing(self, fitted: Fitted) -> dict[str, list[float]]:
-        """Gains by quantity, of those whose channels differ beyond what is stated."""
-        quantities = [self.rig.channels[j].quantity for j, *_ in self._places]
-        differing = {quantities[k] for k in exceeding(fitted, self.parameters)}
-        return {name: [float(v) for v, q in zip(fitted.value, quantities) if q == name] for name in differing}
-
-    def conditions(self, fitted: Fitted) -> Conditions:
-        """Sensors that differ from the others beyond what is stated."""
-        outliers = [self.parameters[k].name for k in exceeding(fitted, self.parameters)]
-        if not outliers:
-            return self.rig.contradicted.get(self.name, ())
-        text = f"{'; '.join(self.words(fitted))}: beyond the uncertainty stated of {', '.join(outliers)}"
-        difference = max(np.ptp(values) for values in self._differing(fitted).values())
-        return (Condition("records-contradicted" if difference > NO_GAIN else "probe-gains-differ", text),)

@@ -13,6 +13,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import Blocks, Rig, State, film_force, housing_rows, vector
+from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.term import OUT_OF_STEP, Fitted, Parameter, Term
 
 _NANOMETRE = 1e-9
@@ -181,7 +182,7 @@ class Housing(Term):
             return None
         return _compliance(fitted.value)
 
-    def widened(self, rig: Rig, fitted: Fitted) -> Rig | None:
+    def learnt(self, rig: Rig, solution: Solution) -> Rig:
         """Cells, or probes of a floating stator, as uncertain in time as accelerometers lead them.
 
         A spring's loss is positive, late cells lower it. Accelerometers with which nothing else is wrong may have led
@@ -189,11 +190,12 @@ class Housing(Term):
         """
         is_stated = any(sensor.delay_uncertainty for sensor in rig.channels)
         if is_stated or rig.mount == "unknown" or not rig.has_acceleration:
-            return None
+            return rig
+        fitted = solution.fitted[self.name]
         first = 3 if rig.mount == "cells" else len(fitted.value) - 1
         late = fitted.value[first:] < -2 * fitted.deviation[first:]
         if not late.any() or self.is_on_foundation(fitted):
-            return None
+            return rig
         lag = float(fitted.value[first:][late].min())
         if rig.mount == "cells":
             compared, sound = "force", all(condition == OUT_OF_STEP for condition in self.conditions(fitted))
@@ -201,7 +203,8 @@ class Housing(Term):
             compared, sound = "displacement", not (self._is_unexplained(fitted) or _otherwise(fitted, _GROSS))
         uncertain = {compared: -lag / self._omega}
         sensors = tuple(replace(s, delay_uncertainty=uncertain.get(s.quantity, 0.0)) for s in rig.channels)
-        return replace(rig, channels=sensors, out_of_step=sound)
+        said = {**rig.contradicted, self.name: self.conditions(fitted)}
+        return replace(rig, channels=sensors, out_of_step=sound, contradicted=said)
 
 
 def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:

@@ -1,6 +1,7 @@
 """All terms of the measurement equation, in the order of the budget: a new term is one file and its name here."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.corner import Corner
 from tpjb_ident.terms.delay import Delay
 from tpjb_ident.terms.distortion import Distortion
+from tpjb_ident.terms.drift import Drift
 from tpjb_ident.terms.gain import Gain
 from tpjb_ident.terms.housing import STIFFEST, Housing
 from tpjb_ident.terms.load import Load
@@ -30,6 +32,7 @@ TERMS: tuple[type[Term], ...] = (
     Gain,
     RunGain,
     Temperature,
+    Drift,
     Axis,
     Delay,
     Corner,
@@ -55,13 +58,19 @@ def learnt_rig(rig: Rig, solution: Solution) -> Rig:
     """The rig as uncertain as a solve shows it where that contradicts what is stated; itself where it does not."""
     for term in solution.all_terms:
         rig = term.learnt(rig, solution)
-    return rig
+    return replace(rig, widened=rig.widened | solution.contradicted) if solution.contradicted else rig
 
 
 def solved_as_learnt(rig: Rig, solve: Callable[[Rig], Solution]) -> Solution:
-    """Solve, and once more with the rig as the records show it, where they contradict what is stated of it."""
+    """Solve, and once more with the rig as the records show it, where they contradict what is stated of it.
+
+    Where they only may, that is supposed, and the solve with it tells.
+    """
     solution = solve(rig)
     learnt = learnt_rig(rig, solution)
+    if learnt is rig and solution.supposed:
+        supposed = solve(replace(rig, widened=solution.supposed))
+        learnt = learnt_rig(rig, supposed) if supposed.contradicted else rig
     return solution if learnt is rig else solve(learnt)
 
 
