@@ -70,6 +70,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: (not item.nodeid.startswith(TOGETHER), -slow[item.path]))
 
 
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """What asks the sample campaigns is left out where they do not lie beside the checkout."""
+    if item.get_closest_marker("samples") and not (ROOT.parent / "shared").is_dir():
+        pytest.skip("no ../shared beside this checkout")
+
+
 @pytest.fixture(scope="session")
 def checkout() -> Path:
     """Folder of the checkout."""

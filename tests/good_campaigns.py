@@ -44,6 +44,9 @@ from rigdata.virtual_rig import (
 from rigdata.virtual_rig.campaign import CsvLayout, csv_layout
 
 BEARINGS = Path(__file__).resolve().parents[1] / "model" / "bearings"
+#: The sample campaigns of an independent program, for tests marked `samples`.
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+SAMPLES = SHARED / "samples"
 STIFFNESS = np.array([[3.0e8, 0.2e8], [-0.3e8, 4.5e8]])
 DAMPING = np.array([[5e5, 2e4], [1e4, 7e5]])
 #: Of a bearing with strong cross coupling, for the tests of the virtual rig itself.
@@ -93,6 +96,11 @@ def rocker_rig(seed: int, *faults: Fault, plan: RigPlan = SMALL_PLAN, **names: s
     truth = RigTruth.constant(ROCKER_STIFFNESS, ROCKER_DAMPING, bearing_name="rocker.toml", bearing_text=text)
     instruments = Instruments.like_paper(5, 3)
     return VirtualRig(truth, plan, instruments, Noise.like_samples(), faults=faults, seed=seed, **names)
+
+
+def sample(name: str) -> Path:
+    """A sample campaign: its folder, or its file."""
+    return SAMPLES / name if (SAMPLES / name).is_dir() else SAMPLES / f"{name}.h5"
 
 
 def written(path: Path, rig: VirtualRig, layout: str | CsvLayout = "hdf5") -> Path:

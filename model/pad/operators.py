@@ -17,7 +17,7 @@ from model.pad.mesh import COARSE, FINE, MeshDensity, PadGeometry, SectorMesh, s
 from model.pad.store import load_arrays, save_arrays, storage_key
 from rigdata.arrays import BoolArray, FloatArray
 
-#: Eight nodes: expansion to 2e-6, heat into the pad to 3e-4 (`tests/model/test_convection.py`).
+#: Eight nodes: expansion to 2e-6, heat into the pad to 3e-4 (`tests/model/test_pad_solid.py`).
 _NODES = 8
 #: Largest convection between the nodes [W/m^2/K]; above it a pad is solved for its own.
 LARGEST = 1e4

@@ -17,7 +17,7 @@ from rigdata.calibration import Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem
 from rigdata.virtual_rig import Fault, Noise, Sensor
-from tests.good_campaigns import PLAN, directions, stiff_rig
+from tests.good_campaigns import PLAN, directions, sample, stiff_rig
 from tests.rigs import held_run
 from tests.rigs.held_run import HeldReader, channels
 from tests.seeds import first_quick
@@ -30,7 +30,6 @@ from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.run_phasors import run_phasors
 
-SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
 #: Probes of the virtual rig.
 PAIR = ("X1A", "X1B")
 PROBES = (
@@ -226,11 +225,9 @@ def test_a_problem_prints_itself_with_place_and_cure():
 
 @pytest.mark.slow
 @pytest.mark.samples
-@pytest.mark.parametrize("name", ["rocker-baseline", "effect-b.h5"])
+@pytest.mark.parametrize("name", ["rocker-baseline", "effect-b"])
 def test_sample_campaigns_raise_no_alarm(name):
-    if not (SAMPLES / name).exists():
-        pytest.skip("no ../shared/samples beside this checkout")
-    assert [p for p in check_campaign(SAMPLES / name) if p.severity != "note"] == []
+    assert [p for p in check_campaign(sample(name)) if p.severity != "note"] == []
 
 
 def test_a_channel_is_spare_where_the_others_tell_the_plane():

@@ -1,4 +1,6 @@
-"""`tpjb rerun`: the same computed again with the options and inputs of run.json; what differs is named by its place."""
+"""`tpjb verify` and `tpjb rerun`: what run.json says of results. Unchanged, changed, missing, moved: each has its words
+and its exit code; the same is computed again with the recorded options and inputs, what differs is named by its place.
+"""
 
 import json
 import shutil
@@ -6,26 +8,35 @@ import shutil
 import pytest
 
 from tests.command_line import ended, tpjb
+from tpjb_ident.cli.command import Command
+from tpjb_ident.cli.commands.verify import files_of
 from tpjb_ident.runtime.differences import compared
+from tpjb_ident.runtime.output_folder import READY
 
 HEAD = "static_load_N,kxx_N_per_m,kxx_N_per_m_lo,kxx_N_per_m_hi,quality"
 
 
 @pytest.fixture(scope="module")
 def original(small_campaign, tmp_path_factory):
-    """Results of two commands in one folder beside their campaign."""
-    folder = tmp_path_factory.mktemp("rerun")
-    campaign = shutil.copy(small_campaign, folder / "campaign.h5")
+    """Results of two commands in one folder, their campaign beside it."""
+    folder = tmp_path_factory.mktemp("original")
+    (folder / "data").mkdir()
+    campaign = shutil.copy(small_campaign, folder / "data" / "campaign.h5")
     campaign.chmod(0o644)
     for command in ("locus", "check"):
-        assert tpjb(command, campaign, "--out", folder / "out", "-q").exit_code == 0
+        ended(0, command, campaign, "--out", folder / "out", "-q")
     return folder
 
 
 @pytest.fixture
-def results(original, tmp_path):
-    shutil.copytree(original, tmp_path / "copy")
-    return tmp_path / "copy" / "out"
+def place(original, tmp_path):
+    """A copy to spoil."""
+    return shutil.copytree(original, tmp_path / "here")
+
+
+@pytest.fixture
+def results(place):
+    return place / "out"
 
 
 def edited(results, change):
@@ -36,6 +47,109 @@ def edited(results, change):
 
 def plain(result) -> str:
     return " ".join(result.output.split())
+
+
+def changed_table(place):
+    table = place / "out" / "locus.csv"
+    table.write_text(table.read_text().replace("0.", "1.", 1))
+
+
+def missing_table(place):
+    (place / "out" / "clearance.parquet").unlink()
+
+
+def changed_records(place):
+    with (place / "data" / "campaign.h5").open("ab") as file:
+        file.write(b"x")
+
+
+def half_moved(place):
+    (place / "out" / READY).mkdir()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "code", "says"),
+    [
+        (lambda place: None, 0, "all results and inputs are the same bytes"),
+        (changed_table, 3, "locus.csv is not what it was"),
+        (missing_table, 3, "clearance.parquet is missing"),
+        (changed_records, 3, "input campaign.h5 is not what it was"),
+        (half_moved, 3, "a command was killed"),
+    ],
+)
+def test_each_state_has_its_words_and_its_exit_code(place, spoil, code, says):
+    spoil(place)
+    result = ended(code, "verify", place / "out")
+    assert says in result.output
+    if spoil is changed_table:
+        assert "locus.csv" in result.stderr
+
+
+def test_moved_inputs_are_found_where_they_are_said_to_be(place):
+    (place / "data").rename(place / "elsewhere")
+    result = ended(2, "verify", place / "out")
+    assert "--input" in result.stderr
+    for given in (place / "elsewhere", place / "elsewhere" / "campaign.h5"):
+        assert tpjb("verify", place / "out", "--input", given).exit_code == 0
+
+
+def test_results_and_inputs_moved_together_are_found(place, tmp_path):
+    place.rename(tmp_path / "there")
+    assert tpjb("verify", tmp_path / "there" / "out").exit_code == 0
+
+
+NOTHING = '{"schema": "tpjb-run/2", "commands": {"locus": {"outputs": []}}}'
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[" * 5000, '{"schema": "tpjb-run/1", "commands": []}', NOTHING])
+def test_without_a_record_nothing_can_be_said(place, text):
+    (place / "out" / "run.json").write_text(text)
+    result = ended(2, "verify", place / "out")
+    assert "run.json" in result.stderr
+
+
+def test_a_record_of_a_stranger_cannot_send_us_out_of_the_folder(place):
+    strange = {"inputs_sha256": {"../../../../../../etc/passwd": "0" * 64}, "outputs": ["/etc/passwd"]}
+    strange["outputs_sha256"] = {"/etc/passwd": "0" * 64}
+
+    def change(record):
+        record["commands"]["locus"] |= strange
+        record["commands"]["x"] = {"outputs": 5, "inputs_sha256": [1], "inputs_at": {"a": 7}, "versions": "no"}
+
+    edited(place / "out", change)
+    result = ended(3, "verify", place / "out")
+    assert "/etc/passwd is missing" in result.stdout
+    assert "input ../../../../../../etc/passwd is missing" in result.stdout
+
+
+def test_another_version_is_a_note_and_the_answer_can_be_written(place, tmp_path):
+    edited(place / "out", lambda record: record["commands"]["locus"]["versions"].update(numpy="1.0"))
+    result = ended(0, "verify", place / "out", "--out", tmp_path / "answer")
+    assert "computed with numpy 1.0" in result.stderr
+    answer = json.loads((tmp_path / "answer" / "verify.json").read_text())
+    assert {f["state"] for f in answer["files"]} == {"same"}
+    assert {f["role"] for f in answer["files"]} == {"result", "input"}
+
+
+def test_inputs_of_one_name_are_told_apart_by_their_folders(tmp_path):
+    command = Command("compare", {}, tmp_path / "out")
+    for folder in ("before", "after", "after/again"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "rig.toml").write_text(folder, encoding="utf-8")
+        command.file(tmp_path / folder / "rig.toml")
+    assert list(command.inputs) == ["rig.toml", "after/rig.toml", "again/rig.toml"]
+    paths = {name: f"../{folder}/rig.toml" for name, folder in (("a", "before"), ("b", "after"), ("c", "after/again"))}
+    entry = {"inputs_at": paths, "inputs_sha256": command.inputs}
+    (tmp_path / "out").mkdir()
+
+    def states():
+        return [file["state"] for file in files_of(tmp_path / "out", "compare", entry, ())]
+
+    assert states() == ["same", "same", "same"]
+    (tmp_path / "after" / "rig.toml").write_text("changed", encoding="utf-8")
+    assert states() == ["same", "differs", "same"]
+    (tmp_path / "before" / "rig.toml").write_text("changed", encoding="utf-8")
+    assert states() == ["differs", "differs", "same"]
 
 
 @pytest.mark.slow
@@ -65,7 +179,7 @@ def test_a_number_that_does_not_come_out_again_is_named_with_its_place(results):
 
 @pytest.mark.slow
 def test_an_input_that_is_gone_or_changed_is_named(results):
-    campaign = results.parent / "campaign.h5"
+    campaign = results.parent / "data" / "campaign.h5"
     with campaign.open("ab") as file:
         file.write(b"x")
     result = tpjb("rerun", results)

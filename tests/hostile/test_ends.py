@@ -51,7 +51,7 @@ def test_warnings_of_arithmetic_go_to_the_record_and_others_to_people(tmp_path, 
         warnings.simplefilter("always")
         assert command.run(work, {}) == 0
     printed = " ".join(capsys.readouterr().err.split())
-    assert "the cache cannot be written" in printed
+    assert "RuntimeWarning: the cache cannot be written" in printed
     assert "encountered" not in printed
     (entry,) = json.loads((tmp_path / "o" / "run.json").read_text(encoding="utf-8"))["commands"].values()
     assert len(entry["arithmetic"]) == 2

@@ -14,7 +14,6 @@ import functools
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,17 +23,11 @@ from model.bearing_file import load_bearing
 from model.pivots import ScaledPivot, pivot_laws
 from model.predict import Mesh, predict
 from model.prediction import Prediction
+from tests.good_campaigns import BEARINGS, SAMPLES, SHARED
 
-SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 REFERENCE = SHARED / "references" / "peer_predictions.csv"
-BEARINGS = Path(__file__).resolve().parents[2] / "model" / "bearings"
 SPEED = 2 * math.pi * 22.0
 LIMIT = 0.03
-
-
-def shared(test):
-    """A test that needs what other programs gave."""
-    return pytest.mark.samples(pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared")(test))
 
 
 def bearing(name: str) -> Bearing:
@@ -67,7 +60,7 @@ def test_what_frequency_does(pivots, kyy):
     np.testing.assert_allclose(p.kyy, kyy, rtol=LIMIT)
 
 
-@shared
+@pytest.mark.samples
 def test_every_row_with_rigid_pads():
     with REFERENCE.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["pad_elastic"] == "rigid"]
@@ -85,7 +78,7 @@ def test_every_row_with_rigid_pads():
         assert p.min_film == pytest.approx(1e-6 * float(row["hmin_um"]), rel=0.015)
 
 
-TRUTH = SHARED / "samples" / "truth"
+TRUTH = SAMPLES / "truth"
 #: Deflections of the measured-pivot campaign: Kirk-Reedy delta(W) over these (README of the samples).
 SOFTER = (0.38, 0.45, 0.35, 0.40, 0.30)
 
@@ -113,7 +106,7 @@ def solve(name: str, key: str, point: dict, mesh: Mesh | None = None) -> Predict
     return predict(bearing, point["static_load_N"], -math.pi / 2, speed, excitation, pivots=laws, mesh=mesh)
 
 
-@shared
+@pytest.mark.samples
 @pytest.mark.parametrize(("name", "key"), CASES)
 def test_coefficients_positions_loads_and_temperatures(name, key):
     for point in truth(name)[key]:
@@ -133,7 +126,7 @@ def test_coefficients_positions_loads_and_temperatures(name, key):
         assert p.min_film == pytest.approx(point["h_min_m"], rel=0.003)
 
 
-@shared
+@pytest.mark.samples
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "key"), CASES)
 def test_refined_mesh_stays(name, key):
@@ -143,7 +136,7 @@ def test_refined_mesh_stays(name, key):
     np.testing.assert_allclose(np.diag(p.c), np.diag(np.array(point["C"])), rtol=0.003)
 
 
-@shared
+@pytest.mark.samples
 def test_locus():
     data = truth("rocker-measured-pivots")
     bearing = load_bearing(BEARINGS / data["bearing"])

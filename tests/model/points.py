@@ -23,6 +23,11 @@ def run(bearing: Bearing, *effects: Effect, load: float = LOAD, direction: float
     return p
 
 
+def excited(bearing: Bearing, *effects: Effect, **more: Any) -> Prediction:
+    """A prediction that converges, at the excitation of 25 Hz."""
+    return run(bearing, *effects, excitation=OMEGA, **more)
+
+
 def close(found: np.ndarray, expected: np.ndarray, share: float) -> None:
     """Every entry is off by a share of the largest at most."""
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=share * np.abs(expected).max())

@@ -53,15 +53,6 @@ def test_every_pad_has_its_own_sizes(different, rocker):
     assert all(pad.pivot is None for pad in rocker.pads)
 
 
-@pytest.mark.parametrize("entry", ["thickness", "mass", "pivot_diameter"])
-def test_a_list_of_another_length_is_refused(text, entry):
-    (line,) = [line for line in text.splitlines() if line.startswith(f"{entry} = [")]
-    inside = line.partition("[")[2].partition("]")[0]
-    short = line.replace(inside, inside.rpartition(", ")[0])
-    with pytest.raises(BearingError, match=rf"different.toml, \[\w+\] {entry}: 4 values for 5 pads. Give one each"):
-        parse_bearing(text.replace(line, short), "different.toml")
-
-
 def test_a_lining_thicker_than_its_pad_is_refused(text):
     with pytest.raises(BearingError, match="babbitt_thickness < elastic_thickness <= thickness"):
         parse_bearing(text.replace('"14 mm", "16 mm"]', '"2 mm", "16 mm"]'), "different.toml")

@@ -4,7 +4,6 @@ import math
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,8 +25,8 @@ from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
 from model.static_tests import dry_curve
-from tests.model import points
 from tests.model.points import DOWN, LOAD, OMEGA, SPEED, close
+from tests.model.points import excited as run
 from tests.rigs.bearings import changed_pads
 
 NAMES = {
@@ -45,10 +44,6 @@ HOUSING_MASS, CELLS = 30.0, np.array([4.0e8, 6.0e8])
 @pytest.fixture(scope="module")
 def base(rocker) -> Prediction:
     return run(rocker)
-
-
-def run(bearing: Bearing, *effects: Effect, **more: Any) -> Prediction:
-    return points.run(bearing, *effects, excitation=OMEGA, **more)
 
 
 def same(p: Prediction, q: Prediction, tolerance: float = 1e-10) -> None:

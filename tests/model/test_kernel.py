@@ -61,15 +61,6 @@ def test_a_compiled_loop_is_pickled_by_its_name():
 
 
 @pytest.mark.slow
-def test_nothing_is_compiled_or_loaded_until_a_loop_is_called():
-    asked = (
-        "import sys, model.predict, model.film.models; print(sorted({'numba', 'scipy', 'pandas'} & set(sys.modules)))"
-    )
-    told = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
-    assert told.stdout.strip() == "[]"
-
-
-@pytest.mark.slow
 def test_code_on_the_disk_allocates_without_a_compiler():
     asked = (
         "import numpy as np; from numba.core.runtime import rtsys\n"

@@ -2,12 +2,10 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from model.bearing import Bearing
 from model.dynamics import bearing_impedance, describing, friction_impedance
 from model.effects import Effect, EffectError, apply_effects, known_effects
 from model.film.oil_state import set_viscosity
@@ -16,20 +14,15 @@ from model.measured_pivot import MeasuredPivot
 from model.options import Options
 from model.pivots import pivot_laws
 from model.predict import predict_setup
-from model.prediction import Prediction
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
 from model.statics.pad_film import oil_constants
 from model.tilt_hold import TiltHold, friction_limits, held_moment, hold_numbers, rolling_radius
-from tests.model import points
 from tests.model.points import DOWN, LOAD, OMEGA, SPEED, slopes
+from tests.model.points import excited as run
 from tests.rigs.bearings import changed_pads
 from tests.rigs.random_bearings import draw
 from tests.studies.random_bearings import fault, rolling
-
-
-def run(bearing: Bearing, *effects: Effect, **more: Any) -> Prediction:
-    return points.run(bearing, *effects, excitation=OMEGA, **more)
 
 
 def offsets(*values: float) -> Effect:

@@ -1,4 +1,4 @@
-"""The pad as a solid: algebra, symmetry, heat balance, grids, cache."""
+"""The pad as a solid: algebra, symmetry, heat balance, grids, cache, operators over what its free faces convect."""
 
 import dataclasses
 import math
@@ -10,10 +10,11 @@ from model.bearing import STEEL, Bearing, Material, Oil, Pad, Pivot
 from model.pad import operators as operators_module
 from model.pad import store as pad_store
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, pivot_face, sector_mesh
-from model.pad.operators import conduct, pad_operators
+from model.pad.operators import LARGEST, conduct, pad_operators
 from tests.pad_responses import PadResponse, pad_solid
 
 COARSE = MeshDensity(arc=6, face=1, half_length=3, backing=2)
+COARSEST = MeshDensity(2, 1, 3, 1)
 OIL = Oil(0.0396, 0.034, 860.0, 7e-4, 2000.0, 0.13, 40.0)
 PAD = Pad(-math.pi / 2, math.radians(63.5), 0.5, 0.13e-3, 0.08e-3, 16e-3, 3e-3, 16e-3, 0.54, 0.256e-3)
 ROCKER = Pivot("rocker", contact_length=39.6e-3, housing_diameter=0.132, pivot_diameter=0.1196)
@@ -183,7 +184,7 @@ class TestStore:
     @staticmethod
     def fresh() -> np.ndarray:
         operators_module.operators_at.cache_clear()
-        return pad_operators(PadGeometry.of(PAD, bearing()), MeshDensity(2, 1, 3, 1), True).compliance
+        return pad_operators(PadGeometry.of(PAD, bearing()), COARSEST, True).compliance
 
     def test_second_process_reads_the_file(self, tmp_path, monkeypatch, counted) -> None:
         monkeypatch.setenv("TPJB_CACHE", str(tmp_path / "deep" / "folder"))
@@ -254,3 +255,24 @@ def test_materials_reach_the_solution() -> None:
     odd = dataclasses.replace(PAD, backing=Material(206e9, 0.3, 12e-6, 5.4))
     rise = np.ones((25, 7))
     assert solid(odd).back_temperature(rise)[12, 0] < solid().back_temperature(rise)[12, 0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("even", [True, False])
+def test_operators_between_the_nodes_of_convection_are_those_of_a_solution(rocker, even):
+    geometry = PadGeometry.of(rocker.pads[0], rocker)
+    for convection in (0.0, 20.0, 50.0, 137.0, 500.0, 1500.0, 8000.0):
+        own = dataclasses.replace(geometry, back_convection=convection)
+        exact, near = pad_operators(own, COARSEST, even), pad_operators(own, COARSEST, even, cooled=True)
+        np.testing.assert_allclose(near.compliance, exact.compliance, rtol=1e-9, atol=1e-20)
+        np.testing.assert_allclose(near.expansion, exact.expansion, atol=5e-6 * np.abs(exact.expansion).max())
+        np.testing.assert_allclose(near.flux, exact.flux, atol=5e-5 * np.abs(exact.flux).max())
+        if even:  # a film that is warmer all over: what it loses, small beside what goes from node to node
+            lost, right = near.flux.sum(axis=1).mean(), exact.flux.sum(axis=1).mean()
+            assert lost == pytest.approx(right, rel=5e-4, abs=1e-3)
+
+
+def test_beyond_the_nodes_of_convection_a_pad_is_solved_for_its_own(rocker):
+    geometry = dataclasses.replace(PadGeometry.of(rocker.pads[0], rocker), back_convection=3.0 * LARGEST)
+    exact = pad_operators(geometry, COARSEST, True)
+    np.testing.assert_array_equal(pad_operators(geometry, COARSEST, cooled=True).flux, exact.flux)

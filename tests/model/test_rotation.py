@@ -113,8 +113,7 @@ def test_mirrored_load_mirrors_the_bearing(rocker, thermal, aside):
     left, right = (run(light, direction=DOWN + side * aside, thermal=thermal, **LINES) for side in (-1, 1))
     np.testing.assert_allclose(left.pad_load, right.pad_load[MIRRORED_PADS], rtol=1e-5, atol=0.1)
     np.testing.assert_allclose(left.position, right.position * [-1.0, 1.0], atol=1e-10)
-    mirror = np.diag([-1.0, 1.0])
-    close(mirror @ right.h @ mirror, left.h, 1e-4)
+    close(MIRROR @ right.h @ MIRROR, left.h, 1e-4)
     assert left.min_film == pytest.approx(right.min_film, rel=1e-5)
     assert left.power_loss == pytest.approx(right.power_loss, rel=1e-5)
 

@@ -1,4 +1,5 @@
-"""What `tpjb identify` says of nine sample campaigns: of three against their truth, of all against a known commit.
+"""Sample campaigns, which an independent program made, by the commands. What `tpjb identify` says of nine of them: of
+three against their truth, of all against a known commit; what `tpjb diagnose` says of one, to its page.
 
 The golden values pin the code against itself, in units of its standard deviations: a change of layout must not move a
 coefficient, its interval or a flag. A change of method may: `python -m tests.recovery.test_golden` writes the values
@@ -15,21 +16,18 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from tests.command_line import tpjb
+from tests.command_line import ended, tpjb
+from tests.good_campaigns import SAMPLES, SHARED, sample
 
-SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
 GOLDEN = Path(__file__).parent / "data" / "golden.json"
 POINT = ("static_load_N", "static_load_direction_deg", "excitation_Hz")
 #: Largest shift of a coefficient over its standard error, and of an interval's half width over itself.
 SHIFT, WIDTH = 1e-3, 1e-3
 
-pytestmark = [pytest.mark.slow, pytest.mark.samples, pytest.mark.skipif(not SAMPLES.is_dir(), reason="no ../shared")]
-
-
-def campaign_path(name: str) -> Path:
-    return SAMPLES / name if (SAMPLES / name).is_dir() else SAMPLES / f"{name}.h5"
+pytestmark = [pytest.mark.slow, pytest.mark.samples]
 
 
 @functools.cache
@@ -37,7 +35,7 @@ def identified(name: str) -> tuple[list[dict[str, str]], float]:
     """Rows of a sample campaign's table of coefficients, and the processor time that they took [s]."""
     with tempfile.TemporaryDirectory() as folder:
         out, began = Path(folder) / "out", time.process_time()
-        result = tpjb("identify", campaign_path(name), "--workers", 1, "--out", out)
+        result = tpjb("identify", sample(name), "--workers", 1, "--out", out)
         assert result.exit_code in (0, 3), result.output
         rows = list(csv.DictReader((out / "coefficients.csv").read_text(encoding="utf-8").splitlines()))
     return rows, time.process_time() - began
@@ -106,6 +104,49 @@ def test_coefficients_intervals_and_flags_stay(name):
         assert np.abs(shift).max() < SHIFT
         for part in ("se", "half_width"):
             np.testing.assert_allclose(now[part], then[part], rtol=WIDTH)
+
+
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("diagnosed") / "out"
+    ended(0, "diagnose", sample("effect-b"), "--workers", 1, "--out", out)
+    return out
+
+
+def test_the_hidden_effect_is_named_with_an_interval_that_holds_it(diagnosed):
+    verdict = json.loads((diagnosed / "diagnosis.json").read_text())
+    truth = json.loads((SAMPLES / "truth" / "effect-b.json").read_text())["effects"]
+    assert verdict["verdict"] == "named"
+    assert [effect["name"] for effect in verdict["effects"]] == [effect["name"] for effect in truth]
+    (found,) = verdict["effects"]
+    true = truth[0]["parameters"]["fraction"]
+    given = found["parameters"]["fraction"]
+    assert given["lo"] < true < given["hi"]
+    assert given["hi"] - given["lo"] < 0.1 * true
+
+
+def test_the_gap_shrinks_on_points_that_no_fit_has_seen(diagnosed):
+    gap = json.loads((diagnosed / "diagnosis.json").read_text())["gap"]
+    assert gap["heldout_after"] < 0.5 * gap["heldout_before"]
+
+
+def test_the_effects_file_is_read_by_predict_and_changes_what_the_cells_show(diagnosed, tmp_path):
+    bearing = SHARED / "bearings" / "spherical.toml"
+    for name, more in (("plain", ()), ("updated", ("--effects", diagnosed / "updated.effects.toml"))):
+        ended(0, "predict", bearing, "--thermal", "isothermal", *more, "--out", tmp_path / name)
+    plain, updated = (pd.read_csv(tmp_path / name / "prediction.csv").iloc[0] for name in ("plain", "updated"))
+    # a share of one cell's force in the other one: kyx shows that share of kxx, or kxy of kyy
+    change = abs(updated["kxy_N_per_m"] - plain["kxy_N_per_m"]) / plain["kyy_N_per_m"]
+    assert change == pytest.approx(0.035, rel=0.5)
+
+
+def test_the_page_stands_alone_and_the_record_vouches_for_it(diagnosed):
+    page = (diagnosed / "report.html").read_text(encoding="utf-8")
+    assert "The load cells hand" in page  # the finding in words, not the effect's name in code
+    assert "of each force to the other axis" in page
+    assert 'src="http' not in page
+    assert list((diagnosed / "figures").glob("*.svg"))
+    assert tpjb("verify", diagnosed).exit_code == 0
 
 
 def rewrite() -> None:

@@ -27,6 +27,7 @@ from rigdata.virtual_rig import (
     VirtualRig,
     write_campaign,
 )
+from tests.good_campaigns import SAMPLES, sample
 from tpjb_ident.clearance.locus import measure_locus
 from tpjb_ident.clearance.measure import measure_clearance
 from tpjb_ident.pivot.curve import PivotCurve
@@ -36,7 +37,6 @@ ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 LOADS = np.array([1000.0, 2000.0, 4000.0])
 CONTACT_LOAD = 500.0
 CONTACT_TOLERANCE = 0.05
-SAMPLES = Path(__file__).resolve().parents[2].parent / "shared" / "samples"
 #: Load programmes, one test each; `dataclasses.replace` gives them another pad.
 PROGRAMMES = {
     "down": DryTest(1, branch="down"),
@@ -308,12 +308,10 @@ def test_clearance_over_seeds(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.samples
-@pytest.mark.skipif(not SAMPLES.is_dir(), reason="the sample campaigns are not beside this checkout")
 @pytest.mark.parametrize("name", ["rocker-baseline", "rocker-measured-pivots", "spherical-baseline"])
 def test_samples(name):
     truth = json.loads((SAMPLES / "truth" / f"{name}.json").read_text(encoding="utf-8"))
-    folder = SAMPLES / name
-    source = load_campaign(folder if folder.is_dir() else SAMPLES / f"{name}.h5")
+    source = load_campaign(sample(name))
     curves = fit_pivots(source, ANGLES)
     errors = []
     for curve, true in zip(curves, truth["pivot_curves"], strict=True):

@@ -3,8 +3,6 @@
 import hashlib
 import os
 import pickle
-import subprocess
-import sys
 import threading
 from dataclasses import FrozenInstanceError
 from pathlib import Path
@@ -247,12 +245,3 @@ def test_raw_data_is_not_touched(folder):
     rigdata.load_campaign(folder).run("l-1").vector("displacement")
     assert {p: (p.read_bytes(), p.stat().st_mtime_ns) for p in paths} == before
     assert sorted(p for p in folder.rglob("*") if p.is_file()) == paths
-
-
-def test_importing_rigdata_alone_is_light():
-    code = (
-        "import sys, rigdata; heavy = {'pandas', 'pyarrow', 'h5py', 'pint', 'scipy', 'numpy'} & set(sys.modules); "
-        "print(sorted(heavy)); assert 'load_campaign' in dir(rigdata)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"

@@ -14,68 +14,24 @@ from rigdata.units import SI_UNITS, parse_quantity
 from tests.manifests import PROBES, SWEEP, manifest
 from tests.rigdata.manifest_tables import markdown
 
-GOOD = """\
-schema = "tpjb-rig/1"
-id = "rocker-A"
-bearing = "rocker.toml"
-description = "free text"
-
-[housing]
-mass = "30 kg"
-
-[acquisition]
-sample_rate = "2 kHz"
-
-[csv]
-delimiter = ";"
-decimal = ","
-encoding = "cp1252"
-header_line = 7
-units_line = 8
-
-[channels.X1A]
-quantity = "displacement"
-axis = "45 deg"
-unit = "V"
-sensitivity = "7.78 mV/um"
-polarity = -1
-uncertainty = "1 %"
-
-[channels.L1H]
-quantity = "force"
-axis = "0 deg"
-unit = "mV"
-sensitivity = "2.0 mV/V"
-full_scale = "20 kN"
-excitation = "5 V"
-
-[channels.T1]
-quantity = "temperature"
-pad = 1
-position = 0.75
-unit = "V"
-sensitivity = "15 K/V"
-zero = "0 degC"
-
-[[runs]]
-id = "d-05000-25-03"
-file = "runs/d-05000-25-03.csv"
-kind = "dynamic"
-shaft_speed = "22 Hz"
-static_load = "5 kN"
-static_load_direction = "-90 deg"
-excitation_frequency = "25 Hz"
-excitation_direction = "54 deg"
-
-[[runs]]
-id = "p-1-up"
-file = "runs/p-1-up.csv"
-kind = "dry_pivot"
-pad = 1
-static_load_direction = "-90 deg"
-branch = "up"
-sample_rate = "500 Hz"
-"""
+PROBE = {"quantity": "displacement", "axis": "45 deg", "unit": "V", "sensitivity": "7.78 mV/um", "polarity": -1}
+BRIDGE = {"sensitivity": "2.0 mV/V", "full_scale": "20 kN", "excitation": "5 V"}
+POINT = {"shaft_speed": "22 Hz", "static_load": "5 kN", "static_load_direction": "-90 deg"}
+THERMOMETER = {"quantity": "temperature", "unit": "V", "sensitivity": "15 K/V", "zero": "0 degC"}
+GOOD = manifest(
+    {
+        "X1A": PROBE | {"uncertainty": "1 %"},
+        "L1H": {"quantity": "force", "axis": "0 deg", "unit": "mV", **BRIDGE},
+        "T1": THERMOMETER | {"pad": 1, "position": 0.75},
+    },
+    {"id": "d-05000-25-03", "file": "runs/d-05000-25-03.csv", "kind": "dynamic", **POINT}
+    | {"excitation_frequency": "25 Hz", "excitation_direction": "54 deg"},
+    {"id": "p-1-up", "file": "runs/p-1-up.csv", "kind": "dry_pivot", "pad": 1, "static_load_direction": "-90 deg"}
+    | {"branch": "up", "sample_rate": "500 Hz"},
+    head={"id": "rocker-A", "bearing": "rocker.toml", "description": "free text"},
+    acquisition={"sample_rate": "2 kHz"},
+    csv={"delimiter": ";", "decimal": ",", "encoding": "cp1252", "header_line": 7, "units_line": 8},
+)
 
 
 #: Stands for the line on which the replacement was made.
@@ -216,10 +172,6 @@ def test_broken_toml_is_a_problem_not_a_traceback(text):
 def test_huge_manifests_are_refused_unparsed_and_thousands_of_faults_stay_bounded():
     assert "larger than" in problems_of("#" * (MAX_MANIFEST + 1))[0]
     assert 900 < len(problems_of(GOOD + "".join(f"[channels.C{i}]\n" for i in range(1200)))) <= 1000
-
-
-def test_control_and_right_to_left_characters_do_not_reach_the_message():
-    assert not set("\u202e\u0007") & set("".join(problems_of(GOOD.replace("dynamic", "dyn\\u202eamic\\u0007"))))
 
 
 def test_every_key_is_in_the_docs(checkout):

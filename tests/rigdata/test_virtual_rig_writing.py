@@ -12,8 +12,8 @@ import pytest
 
 import rigdata
 from rigdata import virtual_rig as vr
+from tests.good_campaigns import sample
 
-SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
 TRUTH = vr.RigTruth.constant(np.diag([2e8, 4e8]), np.diag([4e5, 6e5]))
 
 
@@ -157,37 +157,33 @@ def test_ids_tell_speeds_and_load_directions_apart():
 
 @pytest.mark.samples
 def test_manifest_has_the_shape_of_the_samples(tmp_path):
-    if not SAMPLES.is_dir():
-        pytest.skip("no samples beside the checkout")
-    sample = tomllib.loads((SAMPLES / "rocker-baseline" / "campaign.toml").read_text())
+    theirs = tomllib.loads((sample("rocker-baseline") / "campaign.toml").read_text())
     ours = vr.VirtualRig(TRUTH, vr.RigPlan.short(), vr.Instruments.like_paper(), seed=1)
     brief = {"dynamic_seconds": 0.01, "locus_seconds": 0.01}
     dry = tuple(vr.DryTest(pad, levels=(500.0,), hold=0.01) for pad in range(1, 6))
     short = replace(ours, plan=replace(ours.plan, **brief, dry=dry, clearance=(vr.ClearanceSweep(seconds=0.1),)))
     vr.write_campaign(tmp_path / "c", short, "csv-german")
     made = tomllib.loads((tmp_path / "c" / "campaign.toml").read_text())
-    for manifest in (sample, made):
+    for manifest in (theirs, made):
         for key in ("id", "bearing", "description"):
             del manifest[key]
     for run in made["runs"]:
         assert run.pop("sample_rate", "500 Hz") == "500 Hz"
-    assert made == sample
+    assert made == theirs
 
 
 @pytest.mark.samples
 def test_csv_has_the_shape_of_the_samples(tmp_path):
-    if not SAMPLES.is_dir():
-        pytest.skip("no samples beside the checkout")
     plan = vr.RigPlan(dynamic=vr.operating_points([(2500.0, 25.0)]), directions=(0.0,))
     vr.write_campaign(tmp_path / "c", rig(plan=plan), "csv-german")
-    sample = (SAMPLES / "rocker-baseline" / "runs" / "d-02500-25-01.csv").read_bytes()
+    theirs = (sample("rocker-baseline") / "runs" / "d-02500-25-01.csv").read_bytes()
     made = (tmp_path / "c" / "runs" / "d-02500-25-01.csv").read_bytes()
-    assert sample.splitlines()[:7] == made.splitlines()[:7]
+    assert theirs.splitlines()[:7] == made.splitlines()[:7]
     for line in (8, 1000, 2006):
-        first, second = (text.splitlines()[line].split(b";") for text in (sample, made))
+        first, second = (text.splitlines()[line].split(b";") for text in (theirs, made))
         # as many decimals in the columns that count: time, probes, cells, accelerometers
         assert [len(f.split(b",")[1]) for f in first[:7]] == [len(f.split(b",")[1]) for f in second[:7]]
-    assert sample.count(b"\r\n") == made.count(b"\r\n")
+    assert theirs.count(b"\r\n") == made.count(b"\r\n")
 
 
 @pytest.mark.slow
@@ -196,14 +192,11 @@ def test_noise_is_of_the_samples_kind_and_size(tmp_path):
     """White floor, 1/f, runout and unbalance of `Noise.like_samples` against a sample campaign's locus runs."""
     import h5py
 
-    path = SAMPLES / "spherical-baseline.h5"
-    if not path.is_file():
-        pytest.skip("no samples beside the checkout")
     noise = replace(vr.Noise.like_samples(), bits=16)
     ours = vr.VirtualRig(TRUTH, vr.RigPlan(locus=vr.locus_points(20)), vr.Instruments.like_paper(), noise, seed=3)
     vr.write_campaign(tmp_path / "c.h5", ours)
     found = []
-    for file in (path, tmp_path / "c.h5"):
+    for file in (sample("spherical-baseline"), tmp_path / "c.h5"):
         with h5py.File(file) as handle:
             runs = [handle[f"runs/l-05000-{i:02d}"] for i in range(1, 21)]
             found.append({n: np.median([residual(run[n][:], run["K1"][:]) for run in runs], axis=0) for n in CHANNELS})

@@ -40,9 +40,21 @@ def test_an_unknown_name_gets_the_nearest():
         _ = ti.load_campain
 
 
-def test_import_is_light():
-    heavy = ("numpy", "pandas", "matplotlib", "numba", "model", "rigdata")
-    assert said_by(f"import sys, tpjb_ident; print([m for m in {heavy} if m in sys.modules])").stdout.strip() == "[]"
+HELP = "from tpjb_ident.cli import main; sys.argv = ['tpjb', '--help']\ntry: main()\nexcept SystemExit: pass"
+
+
+@pytest.mark.parametrize(
+    ("code", "heavy"),
+    [
+        ("import tpjb_ident", "numpy pandas matplotlib numba model rigdata"),
+        ("import rigdata; assert 'load_campaign' in dir(rigdata)", "numpy pandas pyarrow h5py pint scipy"),
+        pytest.param("import model.predict, model.film.models", "numba scipy pandas", marks=pytest.mark.slow),
+        (HELP, "numpy pandas matplotlib pint numba h5py"),
+    ],
+)
+def test_imports_and_help_load_nothing_heavy(code, heavy):
+    done = said_by(f"import sys\n{code}\nprint([m for m in {heavy.split()} if m in sys.modules])")
+    assert done.stdout.splitlines()[-1:] == ["[]"], done.stderr
 
 
 @pytest.mark.parametrize("form", ["package", "module", "namespace"])

@@ -131,55 +131,43 @@ def test_no_source_breaks_a_rule(rule: Callable[[str, str], list[str]]):
     assert {path: found for path, text in texts().items() if (found := rule(path, text))} == {}
 
 
-@pytest.mark.parametrize(
-    ("path", "source"),
-    [
-        ("rigdata/x.py", "import model.units"),
-        ("rigdata/readers/x.py", "def f():\n    from tpjb_ident import locus"),
-        ("model/x.py", "from rigdata import load_campaign"),
-        ("model/x.py", "from rigdata.calibration import Channel"),
-        ("model/effects/x.py", "import importlib\nimportlib.import_module('rigdata')"),
-        ("model/effects/x.py", "from importlib import import_module\nimport_module('rigdata')"),
-        ("tpjb_ident/results/x.py", "from model.bearing import Bearing"),
-        ("tpjb_ident/compare/x.py", "import matplotlib.pyplot as plt"),
-        ("tpjb_ident/report/x.py", "from tpjb_ident.cli import app"),
-        ("tpjb_ident/report/x.py", "from matplotlib import pyplot"),
-        ("model/x.py", "from tests.manifests import PROBE"),
-    ],
+THROUGH_WALLS = (
+    ("rigdata/x.py", "import model.units"),
+    ("rigdata/readers/x.py", "def f():\n    from tpjb_ident import locus"),
+    ("model/x.py", "from rigdata import load_campaign"),
+    ("model/x.py", "from rigdata.calibration import Channel"),
+    ("model/effects/x.py", "import importlib\nimportlib.import_module('rigdata')"),
+    ("model/effects/x.py", "from importlib import import_module\nimport_module('rigdata')"),
+    ("tpjb_ident/results/x.py", "from model.bearing import Bearing"),
+    ("tpjb_ident/compare/x.py", "import matplotlib.pyplot as plt"),
+    ("tpjb_ident/report/x.py", "from tpjb_ident.cli import app"),
+    ("tpjb_ident/report/x.py", "from matplotlib import pyplot"),
+    ("model/x.py", "from tests.manifests import PROBE"),
 )
-def test_a_breach_is_seen(path, source):
-    assert through_walls(path, source)
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        "import pickle", "from urllib.request import urlopen", "eval(x)", "exec(x)", "import os\nos.system(x)",
-        "import numpy as np\nnp.load(x)", "np.load(x, allow_pickle=True)", "pd.read_pickle(x)", "frame.query(x)",
-        "f(shell=True)", "import subprocess", "import http.server", "__import__(x)", "frame.iloc[0].query(x)",
-    ],
+DANGERS = (
+    "import pickle", "from urllib.request import urlopen", "eval(x)", "exec(x)", "import os\nos.system(x)",
+    "import numpy as np\nnp.load(x)", "np.load(x, allow_pickle=True)", "pd.read_pickle(x)", "frame.query(x)",
+    "f(shell=True)", "import subprocess", "import http.server", "__import__(x)", "frame.iloc[0].query(x)",
 )  # fmt: skip
-def test_a_danger_is_seen(source):
-    assert dangers("x.py", source)
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        "import warnings\nwarnings.simplefilter('ignore')",
-        "warnings.filterwarnings('ignore', category=RuntimeWarning)",
-        "warnings.filterwarnings(action='ignore')",
-        "np.seterr(all='ignore')",
-        "with np.errstate(divide='ignore'):\n    pass",
-    ],
+SWALLOWED = (
+    "import warnings\nwarnings.simplefilter('ignore')",
+    "warnings.filterwarnings('ignore', category=RuntimeWarning)",
+    "warnings.filterwarnings(action='ignore')",
+    "np.seterr(all='ignore')",
+    "with np.errstate(divide='ignore'):\n    pass",
 )
-def test_a_swallowed_warning_is_seen(source):
-    assert swallowed("x.py", source)
+WRITES = ("path.write_text(x)", "open(x, 'w')", "h5py.File(x, 'r+')")
+BREACHES = [
+    *((through_walls, *breach) for breach in THROUGH_WALLS),
+    *((dangers, "x.py", source) for source in DANGERS),
+    *((swallowed, "x.py", source) for source in SWALLOWED),
+    *((writes, "rigdata/x.py", source) for source in WRITES),
+]
 
 
-@pytest.mark.parametrize("source", ["path.write_text(x)", "open(x, 'w')", "h5py.File(x, 'r+')"])
-def test_writing_is_seen(source):
-    assert writes("rigdata/x.py", source)
+@pytest.mark.parametrize(("rule", "path", "source"), BREACHES)
+def test_a_breach_is_seen(rule, path, source):
+    assert rule(path, source)
 
 
 @pytest.mark.parametrize(
