@@ -63,6 +63,8 @@ class Case:
     rates: Mapping[str, float] = field(default_factory=dict)  #: relative, by quantity
     drift: Mapping[str, float] = field(default_factory=dict)  #: 1/K
     kelvins: float = 0.0  #: standard deviation of the runs' temperatures
+    warmer: tuple[float, ...] = (0.0,)  #: K: of the film in the runs of a point, over and over
+    thinner: float = 0.0  #: change of H, 1/K
     mass_error: float = 0.0  #: relative
     common_miss: complex = 0j  #: of all loads alike: relative size + i turn
     turning: np.ndarray = field(default_factory=lambda: np.zeros(16))  #: the numbers of `LoadTurn`
@@ -139,6 +141,7 @@ def made(case: Case, seed: int = 0) -> tuple[Rig, Blocks, np.ndarray]:
             windows=np.full(n, float(WINDOWS)),
             time=np.full(n, MIDDLE),
             temperature=temperature,
+            film_temperature=320.0 + _warmer(case, n),
             miss=miss[:, 0] + 1j * miss[:, 1],
             miss_error=np.zeros(n),
             shaft=shaft,
@@ -153,6 +156,11 @@ def made(case: Case, seed: int = 0) -> tuple[Rig, Blocks, np.ndarray]:
 
 def _unit(angles: np.ndarray) -> np.ndarray:
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def _warmer(case, n) -> np.ndarray:
+    """Film temperatures of the runs above the usual one, (n,) [K]."""
+    return np.resize(case.warmer, n)
 
 
 def _motion(case, points, point, miss, rng) -> tuple[np.ndarray, np.ndarray]:
@@ -175,7 +183,7 @@ def _motion(case, points, point, miss, rng) -> tuple[np.ndarray, np.ndarray]:
     d = np.linalg.solve(h[point], drive[:, :, None])[:, :, 0]
     square = np.sum(np.abs(d) ** 2, axis=1)
     usual = np.array([square[point == p].mean() for p in range(len(points))])
-    at_run = at_run * (1 + case.bent * square / usual[point])[:, None, None]
+    at_run = at_run * (1 + case.bent * square / usual[point] + case.thinner * _warmer(case, n))[:, None, None]
     force = np.einsum("nij,nj->ni", at_run, d)
     force = force + case.scatter * np.linalg.norm(force, axis=1)[:, None] * complex_normal(rng, n, 2)
     omega = np.array([points[p].excitation for p in point])

@@ -439,3 +439,35 @@ def test_one_plane_of_probes_is_information_only():
     near, far = (solved(described, blocks, truth) for described in (rig, beside))
     np.testing.assert_array_equal(near.h, far.h)
     np.testing.assert_array_equal(deviations(near), deviations(far))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_directions_on_oil_of_two_temperatures_stand_in_the_interval_and_are_told(seed):
+    case = Case(directions=2, warmer=(-5.5, 5.5), thinner=-0.018)
+    solution, truth = answered(case, seed)
+    assert held(solution, truth, 2.5)
+    assert np.abs(away(answered(replace(case, warmer=(0.0,)), seed)[0], truth)).max() < 4.0
+    assert "film-not-equally-warm" in solution.conditions()
+    far = np.abs(solution.h / truth - 1)[:, [0, 1], [0, 1]].max()
+    assert far > 0.08  # without the term silently: noise is a thousandth
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_runs_of_one_direction_that_differ_in_temperature_tell_what_it_does(seed):
+    case = Case(directions=4, sizes=(1.0, 1.0), warmer=(-2.0, 2.0, -2.0, 2.0, 2.0, -2.0, 2.0, -2.0), thinner=-0.018)
+    solution, truth = answered(case, seed)
+    fitted = of(solution, "film temperature")
+    told_here = fitted.estimated[:8]
+    assert told_here[[0, 3, 4, 7]].all()
+    assert fitted.value[[0, 3]] == pytest.approx(-0.018, abs=0.003)
+    assert held(solution, truth)
+
+
+def test_films_as_warm_as_a_supply_holds_them_widen_nothing():
+    case = Case(directions=4, warmer=(-0.2, 0.2, 0.2, -0.2), thinner=-0.018)
+    solution, truth = answered(case)
+    alone, _ = answered(replace(case, warmer=(0.0,)))
+    assert held(solution, truth)
+    ratio = deviations(solution) / deviations(alone)
+    assert np.median(ratio) < 1.3
+    assert "film-not-equally-warm" not in solution.conditions()

@@ -143,6 +143,7 @@ class Blocks:
     windows: FloatArray  #: (n,): effective number of windows
     time: FloatArray  #: (n,), s: middle of the windows
     temperature: FloatArray  #: (n,), K: of the run; NaN where not known
+    film_temperature: FloatArray  #: (n,), K: likewise
     miss: ComplexArray  #: (n,): static load against its set point, relative size + i turn [rad]
     miss_error: FloatArray  #: (n,): standard error of the run's own mean load, relative
     shaft: ComplexArray  #: (n,): unit phasor of what turns with the shaft; NaN where the line is not the shaft's
@@ -194,6 +195,7 @@ def stacked(
         "windows": 1.0,
         "time": 0.0,
         "temperature": np.nan,
+        "film_temperature": np.nan,
         "shaft": np.nan + 0j,
         "uneven": np.zeros(2),
         "gain_scatter": 0.0,

@@ -86,7 +86,8 @@ def band_blocks(
             places = _places(spectra[0], rig.channels)
             channels = [None if k < 0 else spectra[0].channels[k] for k in places]
             row = channel_columns(channels, calibrations)
-            row |= {"run": len(runs), "temperature": spectra[0].temperature, "miss": missed_load(miss, members)}
+            row |= {"run": len(runs), "miss": missed_load(miss, members), "temperature": spectra[0].temperature}
+            row["film_temperature"] = np.mean([s.film_temperature for s in spectra])
             for place, response in enumerate(_run_rows(point, spectra, places)):
                 bins = point.bins[place]
                 at = {"point": first + place, "omega": 2 * np.pi * frequencies[place]}

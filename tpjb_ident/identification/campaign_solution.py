@@ -195,6 +195,7 @@ def campaign_blocks(
                 "windows": w.count[g],
                 "time": w.time[g],
                 "temperature": run.temperature,
+                "film_temperature": run.film_temperature,
                 "miss": missed_load(miss, [g]),
                 "miss_error": error / load if load > 0 else _LOAD_ERROR,
                 "shaft": point.shaft[g],

@@ -115,6 +115,11 @@ class RunPhasors(Directed):
         samples = self.length * self.sample_rate
         return np.maximum(2 * usual_scale(self.scale) / np.sqrt(samples), np.finfo(float).tiny)
 
+    @property
+    def film_temperature(self) -> float:
+        """Mean over the pads, without their thermometers as `temperature` [K]."""
+        return float(np.mean([*self.temperatures.values()])) if self.temperatures else self.temperature
+
     @cached_property
     def displacement(self) -> ComplexArray:
         """X and Y of the probes, (n_windows, n_lines, 2) [m]; NaN where a window gave none."""

@@ -18,6 +18,7 @@ from tpjb_ident.terms.corner import Corner
 from tpjb_ident.terms.delay import Delay
 from tpjb_ident.terms.distortion import Distortion
 from tpjb_ident.terms.drift import Drift
+from tpjb_ident.terms.film_temperature import FilmTemperature
 from tpjb_ident.terms.gain import Gain
 from tpjb_ident.terms.housing import STIFFEST, Housing
 from tpjb_ident.terms.load import Load
@@ -44,6 +45,7 @@ TERMS: tuple[type[Term], ...] = (
     Tilt,
     LoadTurn,
     Load,
+    FilmTemperature,
     Amplitude,
     Distortion,
 )
