@@ -9,7 +9,7 @@ from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.term import NO_GAIN, Additive, Parameter
 
 #: Deviation of an axis that nobody doubts, where others tell it, and of one that does no harm [rad].
-_SURE, _HARMLESS = 2e-5, 2e-3
+_SURE, _HARMLESS = 2e-4, 2e-3
 
 
 class Axis(Additive):

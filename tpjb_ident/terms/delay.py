@@ -14,7 +14,7 @@ from tpjb_ident.estimate.term import NO_GAIN, OUT_OF_STEP, Factor, Fitted, Param
 
 _MILLISECOND = 1e-3
 #: Deviation of a delay that nobody doubts, where others tell it [s], and of one that does no harm [ms].
-_SURE, _HARMLESS = 1e-7, 0.01
+_SURE, _HARMLESS = 1e-6, 0.01
 #: Standard errors and phase [rad] from which cells come late, and not the accelerometers early.
 _CLEAR, _NOTABLE = 2.0, 0.02
 
@@ -37,7 +37,7 @@ class Delay(Factor):
         sizes = zip(names, largest.tolist())
         self.parameters = tuple(Parameter(name, "ms", size, harmless=_HARMLESS) for name, size in sizes)
         among = np.asarray(self.sensors[rig.pick("displacement")].any(axis=0))
-        wide = np.array([(self.name, name) in rig.widened for name in names], dtype=bool)
+        self._wide = wide = np.array([(self.name, name) in rig.widened for name in names], dtype=bool)
         if wide.any() and among[wide].all():  # probes against probes
             self.contradiction, self.gross = "probe-gains-differ", NO_GAIN / self._omega / _MILLISECOND
 
@@ -47,9 +47,10 @@ class Delay(Factor):
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""
+        said = super().conditions(fitted)
         if self.rig.out_of_step:
             late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)
             known = (condition for conditions in self.rig.contradicted.values() for condition in conditions)
             out_of_step = (condition for condition in known if condition == OUT_OF_STEP)
-            return tuple(out_of_step) if late.any() else ()
-        return super().conditions(fitted)
+            return (*(out_of_step if np.any(late & ~self._wide) else ()), *said)
+        return said
