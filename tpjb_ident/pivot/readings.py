@@ -17,6 +17,7 @@ from tpjb_ident.pivot.laws import LAWS
 
 REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest load
 MODEL_ERROR = 3e-4  # of the deflection: what averaging over a curved law leaves; matters in computed records only
+_CREPT = 0.9  # of the creep that was taken off, one standard deviation: that it goes on is likelier than that it ends
 UNKNOWN_ZERO = 2.0e-5  # [m], spread of the reading at zero load from run to run of one pad
 LAG = 0.002  # [s], by which displacement may lag behind load
 _TIMES = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # the usual share of friction, where the load comes back
@@ -40,15 +41,14 @@ def fit_data(records: Sequence[DryRecord], noise: NoiseModel) -> FitData:
         one_level = (part.hold[:, None] == part.hold) & (part.hold >= 0) | np.eye(len(part), dtype=bool)
         zero = UNKNOWN_ZERO**2 if len(records) > 1 else 0.0
         covariances.append(part.covariance(noise) + record.quantisation**2 * one_level + own + zero)
-    friction, spread = max((record.friction for record in records), key=operator.itemgetter(1))
+    deflection = deflection - deflection[np.argmin(load)]
     return FitData(
         load=load,
-        deflection=deflection - deflection[np.argmin(load)],
+        deflection=deflection,
         branch=branch,
         whitener=np.linalg.inv(np.linalg.cholesky(linalg.block_diag(*covariances))),
         reference_load=REFERENCE_SHARE * np.max(load),
-        # on one branch a share of the load and a share of the deflection that creeps are one error
-        friction=(friction, max(spread, *(record.creep for record in records))),
+        friction=max((record.friction for record in records), key=operator.itemgetter(1)),
     )
 
 
@@ -86,11 +86,14 @@ def score_of(fit: LawFit, data: FitData, columns: FloatArray | BoolArray) -> tup
 def with_shared_errors(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitData]) -> tuple[list[FitData], float]:
     """Data of pads with what is off alike in all readings of a test or of a pad.
 
-    Compliance is another one in every test of a pad, by a scatter that all pads' tests tell together; and the load has
-    a zero that is known so well.
+    Compliance is another one in every test of a pad, by a scatter that all pads' tests tell together; creep that was
+    taken off may end with the next step; and the load has a zero that is known so well.
     """
     tests = [[record.run.id for record in records] for records in pads]  # a slip makes two parts of one
-    if all(len(set(names)) < 2 and not records[0].load_error for names, records in zip(tests, pads, strict=True)):
+    if all(
+        len(set(names)) < 2 and not (records[0].load_error or records[0].creep)
+        for names, records in zip(tests, pads, strict=True)
+    ):
         return list(data), 0.0
     fits = [fit_law(LAWS["spline"], True, pad) for pad in data]
     runs = []
@@ -103,10 +106,11 @@ def with_shared_errors(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitDa
     for records, pad, fit, run, change in zip(pads, data, fits, runs, changes, strict=True):
         root, error = np.linalg.inv(pad.whitener), max(record.load_error for record in records)
         more, less = (fit.reading_gradient(pad.load + shift, pad.branch)[0] for shift in (error, -error))
-        zero = 0.5 * (more - less)
-        covariance = root @ root.T + scatter**2 * np.outer(change, change) * (run[:, None] == run)
-        whitener = np.linalg.inv(np.linalg.cholesky(covariance + np.outer(zero, zero)))
-        wider.append(replace(pad, whitener=whitener) if scatter or error else pad)
+        zero, creep = 0.5 * (more - less), _CREPT * max(record.creep for record in records)
+        stiffness = scatter**2 * (run[:, None] == run) + creep**2
+        covariance = root @ root.T + stiffness * np.outer(change, change) + np.outer(zero, zero)
+        whitener = np.linalg.inv(np.linalg.cholesky(covariance))
+        wider.append(replace(pad, whitener=whitener) if scatter or error or creep else pad)
     return wider, scatter
 
 
