@@ -45,6 +45,7 @@ from tpjb_ident.pivot.refusals import (
     structure_behind,
     usable_runs,
 )
+from tpjb_ident.pivot.sweep_witness import SweepWitness, sweep_witness, told
 
 CONTACT_TOLERANCE = 0.05  # of the compliance: what incomplete contact may add where contact counts as complete
 _ANGLE_WARNING = math.radians(4.0)
@@ -90,7 +91,8 @@ def fit_pivots(
     [1, 2, 3, 4, 5]
     """
     angles = np.asarray(pivot_angles, dtype=float)
-    records, problems = _read(campaign, angles)
+    witness = sweep_witness(campaign, angles)
+    records, problems = _read(campaign, angles, witness)
     records, contradicted, noise = refused_records(records, angles)
     problems += contradicted
     refused = {problem.run for problem in problems}
@@ -98,18 +100,20 @@ def fit_pivots(
     many = 2 * len(refused) >= len(campaign.of_kind("dry_pivot"))
     if problems and (on_refusal == "raise" or not used or (on_refusal == "few" and many)):
         raise RigDataError(problems)
+    used = witness.held_against(used) if witness else used
     used, noise, creeps = without_creep(used, noise)
     used = [with_friction(record, noise) for record in used]
-    pads = defaultdict(list)
+    pads = defaultdict[int, list[DryRecord]](list)
     for record in sorted(used, key=lambda record: record.pad):
         pads[record.pad] += sound_parts(record, noise)
     curves = _fit_pads(list(pads.values()), structure_behind(records))
-    return tuple(
-        replace(curve, status=(*curve.status, *creeps[curve.pad], *refused_runs(problems))) for curve in curves
-    )
+    common = (*(witness.conditions if witness else ()), *refused_runs(problems))
+    return tuple(replace(curve, status=(*curve.status, *creeps[curve.pad], *common)) for curve in curves)
 
 
-def _read(campaign: Campaign, angles: FloatArray) -> tuple[list[DryRecord], list[Problem]]:
+def _read(
+    campaign: Campaign, angles: FloatArray, witness: SweepWitness | None
+) -> tuple[list[DryRecord], list[Problem]]:
     """Every dry run that can be read, and why the others cannot."""
     runs = campaign.of_kind("dry_pivot")
     if not runs:
@@ -120,7 +124,7 @@ def _read(campaign: Campaign, angles: FloatArray) -> tuple[list[DryRecord], list
         if run.pad is None or not 1 <= run.pad <= len(angles):
             what = f"names pad {run.pad}, the bearing has pads 1 to {len(angles)}"
             raise refusal(run, "pad", what, "Correct the manifest")
-        return read_dry_run(run, float(angles[run.pad - 1]))
+        return read_dry_run(told(run, witness.channels) if witness else run, float(angles[run.pad - 1]))
 
     return usable_runs(runs, read)
 
@@ -165,7 +169,10 @@ def assemble_curve(
         load_direction=first.load_direction,
         displacement_direction=first.displacement_direction,
         hysteresis=_loop(steps, law),
-        relative_calibration=relative_calibration(axial_channels(first.run).values(), first.angle),
+        relative_calibration=math.hypot(
+            relative_calibration(axial_channels(first.run).values(), first.angle),
+            max(abs(record.elsewhere) for record in records),
+        ),
         runs=tuple(dict.fromkeys(record.run.id for record in records)),
     )
     return replace(curve, status=_status(curve, records, structure))
@@ -235,9 +242,12 @@ def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> 
         shares[fit.name] += weight
     listed = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
     slipped = _slips(records, law)
+    moved = {record.run.id: 100.0 * record.elsewhere for record in records if record.elsewhere}
+    elsewhere = ", ".join(f"{run} by {share:+.1f} % of the clearance" for run, share in moved.items())
     return holding(
         (bad > 0, "bad-steps", f"{bad} left out"),
         (slipped, "shaft-slipped", slipped),
+        (elsewhere, "starts-elsewhere", elsewhere),
         (abs(curve.load_direction.angle) > _ANGLE_WARNING, "load-off-pad", str(curve.load_direction)),
         (structure, "structure-gives", structure),
         (aside and not structure, "moves-aside", f"the shaft goes {curve.displacement_direction}"),
