@@ -186,10 +186,10 @@ def _check_pads(bearing: Bearing, name: str) -> None:
             raise BearingError(f"{name}, [pads] pivot_offset: must lie between 0 and 1 (0.5 is the middle).")
         if not pad.babbitt_thickness < pad.elastic_thickness <= pad.thickness:
             raise BearingError(f"{name}, [pads]: need babbitt_thickness < elastic_thickness <= thickness.")
-    for number, other, room in pad_rooms(bearing):
+    for number, neighbour, room in pad_rooms(bearing):
         arc = bearing.pads[number - 1].arc
         if arc > room + 1e-9:
             raise BearingError(
-                f"{name}, [pads]: pad #{number} overlaps pad #{other} "
+                f"{name}, [pads]: pad #{number} overlaps pad #{neighbour} "
                 f"({math.degrees(arc):.1f} deg of arc, {math.degrees(room):.1f} deg of room). Check arc, pivot_angles."
             )

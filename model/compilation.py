@@ -166,8 +166,8 @@ def _store_type() -> Any:
 
         def load(self, key: Any) -> Any:
             with contextlib.suppress(Exception):  # what a damaged file raises is any error at all
-                kept = Path(self._data_path(self._load_index()[key])).read_bytes()
-                if kept[-_DIGEST:] == _digest(key, kept[:-_DIGEST]):
+                content = Path(self._data_path(self._load_index()[key])).read_bytes()
+                if content[-_DIGEST:] == _digest(key, content[:-_DIGEST]):
                     return super().load(key)
             return None
 

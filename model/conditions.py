@@ -20,7 +20,7 @@ def named(kind: str, pads: Sequence[int] = (), number: float | str = 0.0) -> Con
     return Condition(kind.format(**places), severity, detail.format(**places), tuple(pads))
 
 
-def said(table: Iterable[tuple[Any, ...]]) -> tuple[Condition, ...]:
+def conditions_of(table: Iterable[tuple[Any, ...]]) -> tuple[Condition, ...]:
     """Name what holds of a table: of every line whether it does, and what `named` takes."""
     return tuple(named(*words) for holds, *words in table if holds)
 

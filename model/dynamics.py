@@ -69,8 +69,8 @@ def flexing_impedance(film: PadFilm, omega: FloatArray, factor: float, axial: Ax
     still, moving = film.work.slopes[:, :2], film.work.slopes[:, 2:4]
     if axial is not None:
         shape, levers, stiffness, inertia = axial
-        more = slopes(shape[:, :, None])
-        still, moving = np.hstack([still, more[0]]), np.hstack([moving, more[1]])
+        columns = slopes(shape[:, :, None])
+        still, moving = np.hstack([still, columns[0]]), np.hstack([moving, columns[1]])
     softest = slopes(film.deformation.shapes) if factor and film.deformation is not None else None
     out = np.empty((len(omega), 2, 2), dtype=np.complex128)
     for k, w in enumerate(omega.tolist()):
@@ -96,12 +96,12 @@ def _bent_pressure(
     bent = np.zeros((*film.work.pressure.shape, rigid.shape[1]), dtype=np.complex128)
     for _ in range(_MOST_TURNS):
         field = np.pad(pressure.reshape(len(bent) - 2, -1, rigid.shape[1]), ((1, 1), (grid.first, 1), (0, 0)))
-        wanted = factor * (body.compliance @ field.reshape(-1, rigid.shape[1]))
-        missing = wanted - bent.reshape(wanted.shape)
-        if not np.abs(missing).max() > _SETTLED * np.abs(wanted).max():
+        target = factor * (body.compliance @ field.reshape(-1, rigid.shape[1]))
+        missing = target - bent.reshape(target.shape)
+        if not np.abs(missing).max() > _SETTLED * np.abs(target).max():
             return pressure
-        asked = body.amplitudes @ missing
-        bent += missing.reshape(bent.shape) + body.shapes @ (np.linalg.solve(closed, asked) - asked)
+        amplitudes = body.amplitudes @ missing
+        bent += missing.reshape(bent.shape) + body.shapes @ (np.linalg.solve(closed, amplitudes) - amplitudes)
         still, moving = slopes(bent)
         pressure = rigid + still + 1j * omega * moving
     return np.full_like(rigid, np.nan)
@@ -244,12 +244,12 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
             film = equilibrium.films[number - 1]
             if heat:
                 held = film.grid, film.work, film.wedge, equilibrium.running
-                more = np.array([heat_impedance(*held, w, _SETTLED) for w in omega.tolist()])
+                correction = np.array([heat_impedance(*held, w, _SETTLED) for w in omega.tolist()])
             else:
                 factor = setup.bending_factor if setup.options.perturbed_bending else 0.0
                 axial = _axial_tilt(setup, film) if setup.pads_follow else None
-                more = flexing_impedance(film, omega, factor, axial)
-            added[k] = pads.moments[k].T @ more @ pads.frame[k]
+                correction = flexing_impedance(film, omega, factor, axial)
+            added[k] = pads.moments[k].T @ correction @ pads.frame[k]
     h = with_structure(setup, reduce_pads(pads, omega, setup.vibration, added), omega)
     return np.asarray(MIRROR @ h @ MIRROR) if setup.mirrored else h
 

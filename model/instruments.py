@@ -42,7 +42,7 @@ class Instruments:
         if not (self.force or self.displacement):
             return np.asarray(h)
         at = zip(lines, h, strict=True)
-        return np.array([self.force_map(w) @ one @ np.linalg.inv(self.displacement_map(w)) for w, one in at])
+        return np.array([self.force_map(w) @ matrix @ np.linalg.inv(self.displacement_map(w)) for w, matrix in at])
 
     def shown_position(self, position: FloatArray) -> FloatArray:
         """S(0) position (2,) [m]: where static readings place a shaft that the housing's probes see at `position`."""
@@ -59,9 +59,9 @@ class Instruments:
             shown[pad - 1] += offset
         return shown
 
-    def read_displacement(self, one: SensorMap) -> Instruments:
+    def read_displacement(self, sensor_map: SensorMap) -> Instruments:
         """Return a copy whose displacement readings pass through one more map."""
-        return replace(self, displacement=(*self.displacement, one))
+        return replace(self, displacement=(*self.displacement, sensor_map))
 
     def read_cells(self, gain: FloatArray) -> Instruments:
         """Return a copy whose load cells read `gain` (2, 2) times the truth.
@@ -70,11 +70,11 @@ class Instruments:
         F_cell = F_oil / (1 - m omega^2 / K).
         """
 
-        def one(omega: float) -> FloatArray:
+        def cell_map(omega: float) -> FloatArray:
             share = 1.0 / (1.0 - self.housing_mass * omega**2 / np.array(self.cell_stiffness))
             return np.eye(2) + (gain - np.eye(2)) * share
 
-        return replace(self, force=(*self.force, one))
+        return replace(self, force=(*self.force, cell_map))
 
     def weigh_housing(self, mass_error: float) -> Instruments:
         """Return a copy whose housing weighs `mass_error` [kg] more than stated.
@@ -83,11 +83,11 @@ class Instruments:
         a = -omega^2 F_cell / K.
         """
 
-        def one(omega: float) -> FloatArray:
+        def mass_map(omega: float) -> FloatArray:
             share = 1.0 / (np.array(self.cell_stiffness) - (self.housing_mass + mass_error) * omega**2)
             return np.diag(1.0 + mass_error * omega**2 * share)
 
-        return replace(self, force=(*self.force, one))
+        return replace(self, force=(*self.force, mass_map))
 
 
 def _product(maps: tuple[SensorMap, ...], omega: float) -> ComplexArray:

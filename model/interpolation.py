@@ -27,11 +27,11 @@ def row_below(x: FloatArray, count: int, at: float) -> int:
 @inner
 def largest(values: Any) -> float:
     """Largest size of some values, (n,), real or complex; NaN if one is."""
-    found = 0.0
+    size = 0.0
     for value in values:
-        if not abs(value) <= found and found == found:
-            found = abs(value)
-    return found
+        if not abs(value) <= size and size == size:
+            size = abs(value)
+    return size
 
 
 @inner

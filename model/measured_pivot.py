@@ -36,8 +36,8 @@ class _Law:
 
     def stiffness(self, load: float) -> float:
         """Tangent dW/ddelta [N/m]; infinite for a rigid pivot."""
-        give = float(compliance(self.numbers, self.curve, load))
-        return 1.0 / give if give else math.inf
+        flexibility = float(compliance(self.numbers, self.curve, load))
+        return 1.0 / flexibility if flexibility else math.inf
 
     def secant(self, load: float) -> float:
         """K as printed [N/m]."""

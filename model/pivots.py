@@ -153,8 +153,8 @@ def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray]:
 def pressed_beyond(laws: Sequence[PivotLaw], loads: FloatArray) -> tuple[Condition, ...]:
     """Name the pads that press measured pivots harder than the dry tests did: `loads` (n,) [N]."""
     tested = np.array([getattr(law, "valid_to", math.inf) for law in laws])
-    beyond = (np.flatnonzero(loads > tested) + 1).tolist()
-    return (named(BEYOND_TEST, beyond),) if beyond else ()
+    numbers = (np.flatnonzero(loads > tested) + 1).tolist()
+    return (named(BEYOND_TEST, numbers),) if numbers else ()
 
 
 def ask_laws(laws: Sequence[PivotLaw], rows: FloatArray, loads: FloatArray) -> None:
@@ -183,8 +183,8 @@ def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> FormulaPivot
         load_scale = 0.25 * line * (pivot.housing_diameter - pivot.pivot_diameter)
         return FormulaPivot((ROCKER, 0.5 * line, load_scale, 1.0), name, secant_vibrations)
     if pivot.kind == "spherical":
-        give = (9.0 / (2.0 * modulus**2 * pivot.sphere_diameter)) ** (1.0 / 3.0)
-        return FormulaPivot((SPHERICAL, give, 0.0, 1.0), name, secant_vibrations)
+        coefficient = (9.0 / (2.0 * modulus**2 * pivot.sphere_diameter)) ** (1.0 / 3.0)
+        return FormulaPivot((SPHERICAL, coefficient, 0.0, 1.0), name, secant_vibrations)
     return RIGID_PIVOT
 
 
@@ -267,13 +267,13 @@ def measured_pivots(
         if number in laws:
             raise BearingError(f"{source}, pad {number}: has two [[pads]] tables. Keep one of them.")
         laws[number] = law
-    wanted = pads or max(laws)
-    missing = sorted(set(range(1, wanted + 1)) - set(laws))
-    if missing or max(laws) > wanted:
+    count = pads or max(laws)
+    missing = sorted(set(range(1, count + 1)) - set(laws))
+    if missing or max(laws) > count:
         raise BearingError(
-            f"{source}: has pads {sorted(laws)}, needs 1 to {wanted}. Measure pad #{(missing or [wanted])[0]} too."
+            f"{source}: has pads {sorted(laws)}, needs 1 to {count}. Measure pad #{(missing or [count])[0]} too."
         )
-    return tuple(laws[k] for k in range(1, wanted + 1))
+    return tuple(laws[k] for k in range(1, count + 1))
 
 
 #: Keys of a pivots.toml, of all and of a pad.

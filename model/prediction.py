@@ -104,9 +104,9 @@ class Prediction:
         lines = self._frequencies
         kxx, kyy = np.diagonal(self.k.reshape(-1, 2, 2)[0]) / 1e6
         cxx, cyy = np.diagonal(self.c.reshape(-1, 2, 2)[0]) / 1e3
-        more = f" and at {len(lines) - 1} more" if len(lines) > 1 else ""
+        addition = f" and at {len(lines) - 1} more" if len(lines) > 1 else ""
         return (
-            f"{self}; at {lines[0]:.4g} Hz{more}: kxx {kxx:.4g}, kyy {kyy:.4g} MN/m, "
+            f"{self}; at {lines[0]:.4g} Hz{addition}: kxx {kxx:.4g}, kyy {kyy:.4g} MN/m, "
             f"cxx {cxx:.4g}, cyy {cyy:.4g} kN s/m"
         )
 
@@ -299,7 +299,7 @@ class Prediction:
     @property
     def pad_matrices(self) -> tuple[PadMatrices, ...]:
         """Full matrices of the pads that carry, Eq. (11) and (12), in the frame of `equilibrium`."""
-        return tuple(PadMatrices(*one) for one in zip(*pad_matrices(self.setup, self._films), strict=True))
+        return tuple(PadMatrices(*parts) for parts in zip(*pad_matrices(self.setup, self._films), strict=True))
 
     @functools.cached_property
     def mesh_error(self) -> float:

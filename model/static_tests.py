@@ -14,10 +14,10 @@ def dry_curve(setup: Setup, pad: int, load: FloatArray) -> tuple[FloatArray, Flo
     """Force [N] and displacement [m] along a pad's direction as cells and probes read a dry test: `load` (n,) [N]."""
     law = setup.pivots[pad - 1]
     normal = np.array(setup.bearing.pads[pad - 1].normal)
-    give = np.array([law.deflection(w) for w in load.tolist()]) + (normal @ setup.structure @ normal) * load
+    deflection = np.array([law.deflection(w) for w in load.tolist()]) + (normal @ setup.structure @ normal) * load
     displacement = normal @ setup.instruments.displacement_map(0.0).real @ normal
     force = normal @ setup.instruments.force_map(0.0).real @ normal
-    return load * force, give * displacement
+    return load * force, deflection * displacement
 
 
 def polygon_sides(setup: Setup, push_load: float) -> tuple[FloatArray, FloatArray]:

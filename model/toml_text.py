@@ -25,7 +25,7 @@ def read_table(text: str, place: str, schema: str, refuse: type[ModelError]) -> 
         data = parse_toml(text)
     except ValueError as error:
         raise refuse(f"{place}: cannot be read, not valid TOML: {error}. Mend that line.") from error
-    found = data.get("schema", schema)
-    if found != schema:
-        raise refuse(f"{place}, schema: {found!r} is not known. This version reads {schema!r}.")
+    version = data.get("schema", schema)
+    if version != schema:
+        raise refuse(f"{place}, schema: {version!r} is not known. This version reads {schema!r}.")
     return data

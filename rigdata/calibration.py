@@ -72,9 +72,9 @@ class ResponseTable:
 
     def at(self, frequency: FloatArray) -> ComplexArray:
         """Complex gain at `frequency` (n,) [Hz], linear between the lines of the table, NaN outside it."""
-        known, gains, phases = np.transpose(self.lines)
-        gain = np.interp(frequency, known, gains, left=np.nan, right=np.nan)
-        return gain * np.exp(1j * np.interp(frequency, known, phases))
+        frequencies, gains, phases = np.transpose(self.lines)
+        gain = np.interp(frequency, frequencies, gains, left=np.nan, right=np.nan)
+        return gain * np.exp(1j * np.interp(frequency, frequencies, phases))
 
 
 def parse_response_table(text: str) -> ResponseTable:
@@ -105,8 +105,8 @@ class ChannelResponse:
         """What a phasor at `frequency` (n,) [Hz] was multiplied by."""
         f = np.asarray(frequency, dtype=float)
         total = np.exp(-2j * math.pi * f * self.delay)
-        for each in self.filters:
-            total = total * each.at(f)
+        for stage in self.filters:
+            total = total * stage.at(f)
         return total
 
 

@@ -329,15 +329,15 @@ def _assembled(
     channels = _used(manifest.channels)
     runs = []
     for entry in manifest.runs:
-        own = manifest.described.get(entry.id)
+        run_channels = manifest.described.get(entry.id)
         try:
-            reader = reader_of(entry, entry.sample_rate or manifest.sample_rate, own or manifest.channels)
+            reader = reader_of(entry, entry.sample_rate or manifest.sample_rate, run_channels or manifest.channels)
         except RigDataError as error:
             problems.extend(error.problems)
             continue
-        stated = {name: getattr(entry, name) for name in RunDescription.__dataclass_fields__}
-        used = channels if own is None else _used(own)
-        runs.append(Run(**stated, channels=used, reader=reader, housing_mass=manifest.housing_mass))
+        description = {name: getattr(entry, name) for name in RunDescription.__dataclass_fields__}
+        used = channels if run_channels is None else _used(run_channels)
+        runs.append(Run(**description, channels=used, reader=reader, housing_mass=manifest.housing_mass))
     if any(p.severity == "error" for p in problems):
         raise RigDataError([*manifest.notes, *problems])
     described = {name: getattr(manifest, name) for name in Description.__dataclass_fields__}

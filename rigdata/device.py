@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import FloatArray, IntArray
 from rigdata.calibration import UNDESCRIBED, Channels
 
 #: Share by which a stated rate may miss that of the samples.
@@ -54,11 +54,14 @@ class Grid:
     label: str = ""
     begin: float = 0.0  #: first time [s]; NaN where it is missing
     times: int | None = None  #: of a time column that should serve it but has not its length
+    places: IntArray | None = None  #: of its rows, where a logger left rows out
     channels: list[str] = field(default_factory=list)
 
 
 #: Steps this many times longer than nearly all are gaps.
 _GAP = 3.0
+#: Steps of an even grid are whole within this.
+_EVEN = 0.2
 
 
 def rate_of_time(time: FloatArray) -> float:
@@ -87,10 +90,25 @@ def _without_gaps(time: FloatArray) -> FloatArray:
     return np.append(0.0, np.cumsum(np.where(gaps, steps[~gaps].mean(), steps)))
 
 
-def timed_grid(length: int, clock: str, time: FloatArray, label: str, stated: float | None) -> Grid:
-    """The grid of a time column, by its first times (n,) [s]; of a stated rate where these tell none."""
-    rate = rate_of_time(time)
-    return Grid(length, clock, rate if rate > 0 else stated or rate, label, float(time[0]) if len(time) else 0.0)
+def timed_grid(length: int, clock: str, time: FloatArray, label: str, nominal_rate: float | None) -> Grid:
+    """The grid of a time column, by its first times (n,) [s] or all; of a stated rate where these tell none."""
+    rate, begin = rate_of_time(time), float(time[0]) if len(time) else 0.0
+    places = _places(time) if len(time) == length else None
+    length = length if places is None else int(places[-1]) + 1
+    return Grid(length, clock, rate if rate > 0 else nominal_rate or rate, label, begin, places=places)
+
+
+def _places(time: FloatArray) -> IntArray | None:
+    """Places (n,) of rows on an even grid of times (n,) that a logger left rows out of; None where it left out none.
+
+    A row that is left out is a reading without a value: what is known of gaps is known of either.
+    """
+    steps = np.diff(time) * rate_of_time(time)
+    counts = np.rint(steps)
+    is_even = np.all((counts >= 1) & (np.abs(steps - counts) < _EVEN))
+    if not is_even or not len(steps) < counts.sum() < 2 * len(time):
+        return None
+    return np.append(0, np.cumsum(counts)).astype(np.intp)
 
 
 def planned(
@@ -119,14 +137,14 @@ def planned(
     counts = Counter(timing.length for timing in untimed.values())
     usual = max(counts, key=lambda length: (counts[length], length), default=0)
     for name, timing in untimed.items():
-        same = [grid for grid in shared if grid.length == timing.length]
+        matches = [grid for grid in shared if grid.length == timing.length]
         if timing.times is not None:
             faults[name] = f"has {timing.length} samples, its time column {timing.times}"
-        elif same:
-            max(same, key=lambda grid: grid.rate).channels.append(name)
+        elif matches:
+            max(matches, key=lambda grid: grid.rate).channels.append(name)
         elif shared or timing.length != usual:
-            others = max((grid.length for grid in shared), default=usual)
-            faults[name] = f"has {timing.length} samples and no times, the others have {others}"
+            samples = max((grid.length for grid in shared), default=usual)
+            faults[name] = f"has {timing.length} samples and no times, the others have {samples}"
         else:
             grids.setdefault((usual, ""), Grid(usual, "", run_rate or np.nan)).channels.append(name)
     for name, rate in rates.items():

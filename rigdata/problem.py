@@ -66,8 +66,8 @@ class Problem:
                 object.__setattr__(self, name, "".join(letters))
 
     def __str__(self) -> str:
-        where = f"{self.file}, {self.place}" if self.place else self.file
-        return f"{where}: {self.what}. {self.cure}"
+        location = f"{self.file}, {self.place}" if self.place else self.file
+        return f"{location}: {self.what}. {self.cure}"
 
 
 class Condition(str):
@@ -118,18 +118,18 @@ def gathered(problems: Iterable[Problem]) -> Iterator[Problem]:
     for p in problems:
         words = re.sub(r"[-+]?\d[\d.e+-]*", "#", p.what)
         groups[p.severity, words, p.file if p.severity == "error" else ""].append(p)
-    for first, *others in groups.values():
-        if len(others) + 1 < ALIKE:
-            yield from (first, *others)
+    for first, *repeats in groups.values():
+        if len(repeats) + 1 < ALIKE:
+            yield from (first, *repeats)
             continue
-        places = dict.fromkeys(p.place.split(",")[0] if p.severity == "error" else p.run or p.file for p in others)
-        times = f"{len(others)} more times, such as {', '.join([*places][:3])}"
+        places = dict.fromkeys(p.place.split(",")[0] if p.severity == "error" else p.run or p.file for p in repeats)
+        times = f"{len(repeats)} more times, such as {', '.join([*places][:3])}"
         yield replace(first, what=f"{first.what} (the like {times})")
 
 
-def refuse(file: str, place: str, what: str, cure: str, run: str | None = None) -> RigDataError:
+def refuse(file: str, place: str, fault: str, cure: str, run: str | None = None) -> RigDataError:
     """The error to raise for one thing that stops the reading: file, place, what is wrong, what to do."""
-    return RigDataError(Problem("error", file, place, what, cure, run))
+    return RigDataError(Problem("error", file, place, fault, cure, run))
 
 
 def shown(value: object) -> str:

@@ -80,14 +80,14 @@ class Run(RunDescription):
         """Channels that are sampled together; the run's own device, that of the first displacement channel, first."""
         return self.reader.devices()
 
-    def _apart(self, names: Sequence[str]) -> bool:
+    def _are_separate(self, names: Sequence[str]) -> bool:
         """Whether channels are sampled apart from the run's own device; refused where only some of them are."""
-        apart = self.reader.apart()
-        if not apart.intersection(names):
+        separate_names = self.reader.apart()
+        if not separate_names.intersection(names):
             return False
         devices = {name: device for device in self.devices for name in device.channels}
         rates = {(devices[name].rate, devices[name].length) for name in names if name in devices}
-        if not apart.issuperset(names) or len(rates) > 1:
+        if not separate_names.issuperset(names) or len(rates) > 1:
             listed = ", ".join(f"{name} ({devices[name].rate:.6g} Hz)" for name in names if name in devices)
             fault = f"are not sampled at the same times: {listed}"
             raise self._refuse("channels", fault, "Read them device by device, see Run.devices")
@@ -126,7 +126,7 @@ class Run(RunDescription):
                 listed = f"It has {', '.join(device.channels)}"[:200]
                 raise self._refuse(f"channel {name}", f"is none of device {device.name!r}", listed)
         first, last = _limits(start, stop, device.length)
-        is_apart = self._apart(names)
+        is_apart = self._are_separate(names)
         reader = self.reader
         readings = (reader.read_device if is_apart else reader.read)(names, first, last) if names else []
         values = np.empty((len(names), last - first))
@@ -202,7 +202,7 @@ class Run(RunDescription):
         self, names: Sequence[str], start: int | None, stop: int | None
     ) -> tuple[list[FloatArray], FloatArray, float]:
         """Readings (n,) of channels that are sampled together, their times (n,) and their rate."""
-        if not self._apart(names):
+        if not self._are_separate(names):
             first, last = _limits(start, stop, self.length)
             return self.reader.read(names, first, last), self.reader.time(first, last), self.sample_rate
         reader = self.reader

@@ -58,9 +58,9 @@ def plane_vector(along: FloatArray, values: ComplexArray) -> ComplexArray:
     NaN where they span no plane.
     """
     present = np.isfinite(values)
-    seen = np.where(present[..., None], along, 0.0)
-    gram = np.swapaxes(seen, -1, -2) @ seen
-    moment = np.swapaxes(seen, -1, -2) @ np.where(present, values, 0.0)[..., None]
+    axes = np.where(present[..., None], along, 0.0)
+    gram = np.swapaxes(axes, -1, -2) @ axes
+    moment = np.swapaxes(axes, -1, -2) @ np.where(present, values, 0.0)[..., None]
     spanned = np.linalg.det(gram) > _COLLINEAR_SINE**2
     vectors = np.full((*values.shape[:-1], 2), np.nan + 0j)
     vectors[spanned] = np.linalg.solve(gram[spanned], moment[spanned])[..., 0]

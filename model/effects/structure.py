@@ -27,9 +27,9 @@ def _add_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
     return _added(setup.change(pivots=tuple(pivots)), "series_compliance", xx, xy, yy)
 
 
-def _added(setup: Setup, name: str, *more: float) -> Setup:
+def _added(setup: Setup, name: str, *amounts: float) -> Setup:
     """Add to the entries of a matrix."""
-    return setup.change(**{name: tuple(np.add(getattr(setup, name), more).tolist())})
+    return setup.change(**{name: tuple(np.add(getattr(setup, name), amounts).tolist())})
 
 
 def _alone(law: PivotLaw, compliance: float) -> PivotLaw:

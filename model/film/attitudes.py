@@ -158,8 +158,8 @@ def walk(
                 _open(grid, work, running, out, (low, high))
             break
         rises[low - 1] = rises[low]  # the parallel film, where rows are few
-        known = low if high - low > 3 else low - 1
-        curvature = _ahead(work, out, wedge, (known, min(low + 3, high), low))
+        first_row = low if high - low > 3 else low - 1
+        curvature = _ahead(work, out, wedge, (first_row, min(low + 3, high), low))
         work.ruptured[:] = False
         if _fill(grid, work, running, out, low - 1, (curvature, wedge)):
             low -= 1
@@ -216,8 +216,8 @@ def _fill(
 ) -> bool:
     """Fill a row from a start (A, B); False where nothing balances at that wedge, or carries nothing."""
     (numbers, rises), (curvature, wedge) = out, start
-    found, curvature, load = _balance(grid, work, running, curvature, wedge)
-    if not found or not load > 0.0:
+    is_balanced, curvature, load = _balance(grid, work, running, curvature, wedge)
+    if not is_balanced or not load > 0.0:
         return False
     numbers[row, 0], numbers[row, 1], numbers[row, 2] = curvature, wedge, load
     rises[row] = work.temperature.reshape(-1) - 40.0

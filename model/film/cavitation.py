@@ -130,7 +130,7 @@ def _pivot(film: FedFilm, band: FloatArray, x: FloatArray) -> int:
 @inner
 def _assemble_columns(film: FedFilm, band: FloatArray) -> None:
     """Fill the band (n, 2 width + 1): entry (row, column) stands at ``band[row, width + column - row]``."""
-    grid, (along, beside), couette = film.grid, film.faces.conductance, film.faces.couette[0]
+    grid, (along, across), couette = film.grid, film.faces.conductance, film.faces.couette[0]
     ruptured, width, line = film.work.ruptured.reshape(-1), band.shape[1] // 2, film.grid.steps[0]
     band[:] = 0.0
     for k in range(len(band)):
@@ -140,7 +140,7 @@ def _assemble_columns(film: FedFilm, band: FloatArray) -> None:
             if k + width < len(band):
                 band[k + width, 0] = -couette[n]
             continue
-        band[k, width] = along[n] + beside[n] + beside[n - 1]
+        band[k, width] = along[n] + across[n] + across[n - 1]
         if k >= width or not ruptured[n - line]:  # what is supplied to a gap that opens does not ask for the pressure
             band[k, width] += along[n - line]
         if k >= width:
@@ -148,9 +148,9 @@ def _assemble_columns(film: FedFilm, band: FloatArray) -> None:
         if k + width < len(band):
             band[k + width, 0] = -along[n]
         if (k + 1) % width != 0:
-            band[k + 1, width - 1] -= beside[n]
+            band[k + 1, width - 1] -= across[n]
         if k % width != 0:
-            band[k - 1, width + 1] -= beside[n - 1]
+            band[k - 1, width + 1] -= across[n - 1]
 
 
 @inner
@@ -161,8 +161,8 @@ def _starved(film: FedFilm) -> int:
     """
     changed, p, faces = 0, film.work.pressure, film.faces
     for j in range(len(film.supply)):
-        asked = faces.couette[0, j] - faces.conductance[0, j] * (p[1, j] - p[0, j])
-        lacking = asked > film.supply[j]
+        demand = faces.couette[0, j] - faces.conductance[0, j] * (p[1, j] - p[0, j])
+        lacking = demand > film.supply[j]
         if lacking != film.work.ruptured[0, j]:
             film.work.ruptured[0, j] = lacking
             changed += 1

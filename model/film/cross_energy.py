@@ -51,13 +51,13 @@ def cross_operator(
     for i in range(nt):
         for j in range(lines):
             _shared_flow(film, speed, i, j, flows[i, j])
-    shape, made = (lines, cells), np.zeros((nt + 1, n))
+    shape, heating = (lines, cells), np.zeros((nt + 1, n))
     over = np.zeros((lines, cells + 1)), np.zeros((lines + 1, cells))
     space = _Space(*over, np.zeros((4, *shape)), np.zeros(shape), np.zeros(shape))
     for i in range(nt + 1):
-        _dissipation(film, speed, i, made[i])
+        _dissipation(film, speed, i, heating[i])
     # a hotter film shears with less heat: taken as it will be, or the two would swing
-    dissipation[:] = 0.5 * heat[2] * (made[:-1] + made[1:])
+    dissipation[:] = 0.5 * heat[2] * (heating[:-1] + heating[1:])
     less = heat[4] * dissipation
     dissipation += less * cross.temperature[1:].reshape((nt, n))
     for i in range(nt):

@@ -30,10 +30,10 @@ def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray
         band, before, journal = operator.factor[i], operator.before[i], operator.journal[i]
         old, new = fields[i], fields[i + 1]
         for k in range(n):
-            beside = 0.0  # a journal that is a kelvin warm for the third field
+            coupling = 0.0  # a journal that is a kelvin warm for the third field
             if (k + 1) % cells == 0:
-                beside = journal[k // cells, 0] + journal[k // cells, 1]
-            values = _plus((sources[i, k], 0.0, beside), before[k, 0], old, k)
+                coupling = journal[k // cells, 0] + journal[k // cells, 1]
+            values = _plus((sources[i, k], 0.0, coupling), before[k, 0], old, k)
             for side in range(4):
                 step = (1 if side < 2 else cells) * (2 * (side % 2) - 1)
                 values = _plus(values, before[k, 1 + side], old, min(max(k + step, 0), n - 1))
@@ -104,22 +104,22 @@ def conduct(
     fields, face = np.zeros((*answer[0].shape, 3)), np.empty(missing.shape)
     held = (film, operator, pad, fields, face)
     change = gmres(_warmed, held, times(pad[1], missing.reshape(-1)), tolerance)
-    more = _conducted(film, operator, times(pad[0], change), fields, face)
-    if not math.isfinite(more):
+    heat = _conducted(film, operator, times(pad[0], change), fields, face)
+    if not math.isfinite(heat):
         return 0.0
     answer[0][:] += fields[:, :, 0]
     answer[1][:] += face
-    return more
+    return heat
 
 
 @inner
 def _warmed(
     held: tuple[_Solved, CrossOperator, tuple[FloatArray, FloatArray, FloatArray], FloatArray, FloatArray],
-    asked: FloatArray,
+    rise: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """A change of the pad's coarser nodes, about the one that is asked for, and what the film leaves of it."""
     film, operator, (flux, to_coarse, guess), fields, face = held
-    change = times(guess, asked)
+    change = times(guess, rise)
     _conducted(film, operator, times(flux, change), fields, face)
     return change, change - times(to_coarse, face.reshape(-1))
 

@@ -15,11 +15,11 @@ BOUNDLESS = 1e30
 
 
 @inner
-def solve(matrix: FloatArray, right: FloatArray) -> None:
+def solve(matrix: FloatArray, constants: FloatArray) -> None:
     """Gauss' elimination with the largest pivot of each column; the solutions replace the right-hand sides (.., q)."""
-    n, count = len(matrix), right.shape[1]
+    n, count = len(matrix), constants.shape[1]
     system = np.empty((n, n + count))
-    system[:, :n], system[:, n:] = matrix, right[:n]
+    system[:, :n], system[:, n:] = matrix, constants[:n]
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -35,22 +35,22 @@ def solve(matrix: FloatArray, right: FloatArray) -> None:
         for j in range(count):
             total = system[k, n + j]
             for i in range(k + 1, n):
-                total -= system[k, i] * right[i, j]
-            right[k, j] = total / system[k, k]
+                total -= system[k, i] * constants[i, j]
+            constants[k, j] = total / system[k, k]
 
 
 @inner
-def nearest(images: FloatArray, count: int, right: FloatArray, apart: float, weights: FloatArray) -> bool:
+def nearest(images: FloatArray, count: int, target: FloatArray, damping: float, weights: FloatArray) -> bool:
     """Weights (.., 1) of the first images (.., n) whose sum is nearest to a vector (n,); False if all are zero.
 
-    Images that hardly differ are of no use to each other: `apart` is the share by which they are taken to.
+    Images that hardly differ are of no use to each other: `damping` is the share by which they are taken to.
     """
     gram, trace = np.empty((count, count)), 0.0
     for i in range(count):
-        weights[i, 0] = product(images[i], right)
+        weights[i, 0] = product(images[i], target)
         for j in range(count):
             gram[i, j] = product(images[i], images[j])
-        gram[i, i] *= 1.0 + apart
+        gram[i, i] *= 1.0 + damping
         trace += gram[i, i]
     if not trace > 0.0:
         return False
@@ -59,37 +59,37 @@ def nearest(images: FloatArray, count: int, right: FloatArray, apart: float, wei
 
 
 @inner
-def gmres(step_of: Any, held: Any, right: FloatArray, tolerance: float) -> FloatArray:
+def gmres(step_of: Any, held: Any, target: FloatArray, tolerance: float) -> FloatArray:
     """Steps (n,) whose images add up to a vector, to a share of it; NaN where an image is `BOUNDLESS`.
 
-    ``step_of(held, left)`` gives a step towards what is left, and its image; linear. What the last step leaves
+    ``step_of(held, residual)`` gives a step towards what is left, and its image; linear. What the last step leaves
     contracts with the rest. Y. Saad, SIAM J. Sci. Comput. 14 (1993) 461.
     """
-    answer, left, count = np.zeros(len(right)), right.copy(), 0
-    steps, images, weights = np.empty((_STEPS, len(right))), np.empty((_STEPS, len(right))), np.zeros((_STEPS, 1))
-    size = math.sqrt(product(right, right))
+    answer, residual, count = np.zeros(len(target)), target.copy(), 0
+    steps, images, weights = np.empty((_STEPS, len(target))), np.empty((_STEPS, len(target))), np.zeros((_STEPS, 1))
+    size = math.sqrt(product(target, target))
     length = size
     while count < _STEPS and length > tolerance * size:
-        steps[count], images[count] = step_of(held, left / length)
+        steps[count], images[count] = step_of(held, residual / length)
         if not product(images[count], images[count]) < BOUNDLESS:
-            return np.full(len(right), math.nan)
+            return np.full(len(target), math.nan)
         count += 1
-        nearest(images, count, right, 1e-13, weights)
-        left[:] = right
+        nearest(images, count, target, 1e-13, weights)
+        residual[:] = target
         for k in range(count):
-            left -= weights[k, 0] * images[k]
-        length = math.sqrt(product(left, left))
+            residual -= weights[k, 0] * images[k]
+        length = math.sqrt(product(residual, residual))
     for k in range(count):
         answer += weights[k, 0] * steps[k]
     return answer
 
 
 @inner
-def product(one: FloatArray, other: FloatArray) -> float:
+def product(first: FloatArray, second: FloatArray) -> float:
     """Sum of products."""
     total = 0.0
-    for q in range(len(one)):
-        total += one[q] * other[q]
+    for q in range(len(first)):
+        total += first[q] * second[q]
     return total
 
 

@@ -28,19 +28,19 @@ _LEAST_FLOW = 0.2
 @compiled
 def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running, temperature: FloatArray) -> float:
     """March the film temperature from the leading edge: `temperature` (nt + 1, nz + 1) [degC]."""
-    made, loss = heat_sources(grid, work, running, 1.0)
+    sources, loss = heat_sources(grid, work, running, 1.0)
     shape = (1, *temperature.shape)
     temperature[0] = inlet
-    return march(grid, work, running, loss, temperature.reshape(shape), between(made.reshape(shape)))
+    return march(grid, work, running, loss, temperature.reshape(shape), between(sources.reshape(shape)))
 
 
 @inner
-def heat_sources(grid: FilmGrid, work: FilmWork, running: Running, kept: float) -> tuple[FloatArray, FloatArray]:
+def heat_sources(grid: FilmGrid, work: FilmWork, running: Running, share: float) -> tuple[FloatArray, FloatArray]:
     """What stations make [W] and lose per kelvin [W/K] if a share is kept: a hotter film makes less heat."""
     heat = dissipated(grid, work, running.speed)
     sheared, pressed = heat[0], heat[1] + heat[2]
-    fewer = kept * running.oil[1] * np.maximum(sheared - pressed, 0.0)
-    return kept * (sheared + pressed + work.gained) + fewer * work.temperature, work.exchange + fewer
+    fewer = share * running.oil[1] * np.maximum(sheared - pressed, 0.0)
+    return share * (sheared + pressed + work.gained) + fewer * work.temperature, work.exchange + fewer
 
 
 @inner
@@ -126,14 +126,14 @@ def heat_step(
 
 @inner
 def warm(
-    grid: FilmGrid, work: FilmWork, running: Running, asked: FloatArray, limits: tuple[float, float], shift: FloatArray
+    grid: FilmGrid, work: FilmWork, running: Running, rise: FloatArray, limits: tuple[float, float], shift: FloatArray
 ) -> tuple[float, float, float]:
-    """Change a film's temperature by a share of what is asked for, no more than a limit.
+    """Change a film's temperature by a share of the rise that is asked for, no more than a limit.
 
     Returns the largest change asked for [K], and the change of the film's force.
     """
-    change = largest(asked.reshape(-1))
-    work.temperature[:] += limited_share(change, limits) * asked
+    change = largest(rise.reshape(-1))
+    work.temperature[:] += limited_share(change, limits) * rise
     radial, tangential = pressure_change(grid, work, running.speed, running.oil, shift)
     return change, radial, tangential
 

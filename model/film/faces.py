@@ -60,6 +60,6 @@ def net_inflow(grid: FilmGrid, flow: Any, inflow: Any) -> None:
 @inner
 def poiseuille_inflow(p: FloatArray, conductance: FloatArray, line: int, n: int) -> float:
     """What the pressure of its neighbours drives into the control volume of a node without pressure."""
-    along, beside = conductance
+    along, across = conductance
     inflow = along[n - line] * p[n - line] + along[n] * p[n + line]
-    return inflow + beside[n] * p[n + 1] + beside[n - 1] * p[n - 1]
+    return inflow + across[n] * p[n + 1] + across[n - 1] * p[n - 1]

@@ -59,10 +59,10 @@ def heat_impedance(
             pressure.reshape(-1)[grid.node] = frozen + answer
             fields = np.zeros((1, *shape), dtype=np.complex128)
             march(grid, work, running, loss, fields, _gain(film, thicker, warmer, pressure))
-            asked, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
+            increment, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
             warmer = fields[0]
             _pressure(film, warmer, omega, answer)
-            if asked < settled * size:
+            if increment < settled * size:
                 out[:, axis] = force_of(grid, grid.area, answer.reshape((-1, 1)))[:, 0]
                 break
     return out
@@ -100,30 +100,30 @@ def _gain(film: _Film, thicker: FloatArray, warmer: ComplexArray, pressure: Comp
     nt, lines = t.shape[0] - 1, t.shape[1]
     gained = np.empty((1, nt, lines), dtype=np.complex128)
     sides = np.zeros((2, lines), dtype=np.complex128)
-    made = _made(film, thicker, pressure)
+    dissipation = _dissipation_change(film, thicker, pressure)
     flows = _flows(film, thicker, warmer, pressure)
     for i in range(nt):
         side_exchange(grid, film.running, i, (flows, thicker), work.flow, sides)
-        both = t[i] + t[i + 1]
+        total = t[i] + t[i + 1]
         for j in range(lines):
-            value = 0.5 * (made[i, j] + made[i + 1, j])
+            value = 0.5 * (dissipation[i, j] + dissipation[i + 1, j])
             value -= heat[0] * flows[0, i * lines + j] * (t[i + 1, j] - t[i, j])
             if j > 0:
-                value -= sides[0, j] * (both[j - 1] - both[j])
+                value -= sides[0, j] * (total[j - 1] - total[j])
             if j < lines - 1:
-                value -= sides[1, j] * (both[j + 1] - both[j])
+                value -= sides[1, j] * (total[j + 1] - total[j])
             gained[0, i, j] = value
     return gained
 
 
 @inner
-def _made(film: _Film, thicker: FloatArray, pressure: ComplexArray) -> ComplexArray:
+def _dissipation_change(film: _Film, thicker: FloatArray, pressure: ComplexArray) -> ComplexArray:
     """Change of the heat made at every station, at the old temperature, (nt + 1, nz + 1) [W/m]."""
     grid, p, h, mu = film.grid, film.work.pressure, film.work.thickness, film.work.viscosity
-    made = np.empty(p.shape, dtype=np.complex128)
+    change = np.empty(p.shape, dtype=np.complex128)
     for i in range(p.shape[0]):
         for j in range(p.shape[1]):
             along, across = slope_products(grid, p, pressure, i, j)
             turned = h[i, j] ** 3 / (6.0 * mu[i, j]) * (along + across) * grid.dx * grid.height[j]
-            made[i, j] = turned + thicker[i, j] * film.closer[i, j]
-    return made
+            change[i, j] = turned + thicker[i, j] * film.closer[i, j]
+    return change

@@ -14,7 +14,7 @@ from rigdata.arrays import FloatArray
 @inner
 def assemble(grid: FilmGrid, work: FilmWork, faces: Faces) -> None:
     """Lower band of the matrix: row k holds its diagonal and the entries below it; ruptured nodes stand alone."""
-    band, ruptured, (along, beside) = work.band, work.ruptured.reshape(-1), faces.conductance
+    band, ruptured, (along, across) = work.band, work.ruptured.reshape(-1), faces.conductance
     width, line = band.shape[1] - 1, grid.steps[0]
     band[:] = 0.0
     for k in range(len(band)):
@@ -22,19 +22,19 @@ def assemble(grid: FilmGrid, work: FilmWork, faces: Faces) -> None:
         if ruptured[n]:
             band[k, 0] = 1.0
             continue
-        band[k, 0] = along[n - line] + along[n] + beside[n] + beside[n - 1]
+        band[k, 0] = along[n - line] + along[n] + across[n] + across[n - 1]
         if (k + 1) % width != 0 and not ruptured[n + 1]:
-            band[k, 1] -= beside[n]
+            band[k, 1] -= across[n]
         if k + width < len(band) and not ruptured[n + line]:
             band[k, width] -= along[n]
 
 
-def _factoriser(known: int | None) -> Any:
+def _factoriser(bandwidth: int | None) -> Any:
     """`factorise` for one width: what the compiler knows, it keeps in registers."""
 
     @inner
     def factorise_band(band: FloatArray) -> None:
-        n, width = band.shape[0], band.shape[1] - 1 if known is None else known
+        n, width = band.shape[0], band.shape[1] - 1 if bandwidth is None else bandwidth
         for k in range(n):
             inverse = 1.0 / band[k, 0]
             for r in range(1, width + 1):
@@ -48,12 +48,12 @@ def _factoriser(known: int | None) -> Any:
     return factorise_band
 
 
-def _substitution(known: int | None) -> Any:
+def _substitution(bandwidth: int | None) -> Any:
     """`substitute` for one width: an unknown's nearest neighbour comes last, so that nothing waits for memory."""
 
     @inner
     def substitute_band(band: FloatArray, x: FloatArray) -> None:
-        n, width = band.shape[0], band.shape[1] - 1 if known is None else known
+        n, width = band.shape[0], band.shape[1] - 1 if bandwidth is None else bandwidth
         for k in range(1, n):
             total = x[k]
             for r in range(width, 0, -1):
@@ -70,12 +70,12 @@ def _substitution(known: int | None) -> Any:
     return substitute_band
 
 
-def _substitution_of_four(known: int | None) -> Any:
+def _substitution_of_four(bandwidth: int | None) -> Any:
     """`substitute_four` for one width, see `_substitution`."""
 
     @inner
     def substitute_four_bands(band: FloatArray, x: Any, first: int) -> None:
-        n, width = band.shape[0], band.shape[1] - 1 if known is None else known
+        n, width = band.shape[0], band.shape[1] - 1 if bandwidth is None else bandwidth
         second, third, fourth = first + 1, first + 2, first + 3
         for k in range(1, n):
             a, b, c, d = x[k, first], x[k, second], x[k, third], x[k, fourth]
@@ -100,16 +100,16 @@ def _substitution_of_four(known: int | None) -> Any:
 
 def _for_any_width(make: Any) -> Any:
     """For the default mesh, half a film of 6 intervals, the coarser one where many models are compared, any other."""
-    six, four, other = make(6), make(4), make(None)
+    six, four, general = make(6), make(4), make(None)
 
     @inner
-    def for_any_width(band: FloatArray, *right: Any) -> None:
+    def for_any_width(band: FloatArray, *vectors: Any) -> None:
         if band.shape[1] == 7:
-            six(band, *right)
+            six(band, *vectors)
         elif band.shape[1] == 5:
-            four(band, *right)
+            four(band, *vectors)
         else:
-            other(band, *right)
+            general(band, *vectors)
 
     return for_any_width
 

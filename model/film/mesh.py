@@ -136,7 +136,7 @@ def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWor
     unknowns = nz - grids[0].first
     count, n = len(grids), (nt - 1) * unknowns
     shape = (count, nt + 1, nz + 1)
-    rest: dict[str, Any] = {
+    arrays: dict[str, Any] = {
         "ruptured": np.zeros(shape, dtype=np.bool_),
         "temperature": np.full(shape, inlet_temperature),
         "drag": np.ones(shape),
@@ -145,8 +145,8 @@ def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWor
         "unknown": np.zeros((count, n)),
         "slopes": np.zeros((count, n, 4)),
     }
-    rest |= {name: np.zeros(shape) for name in FilmWork._fields if name not in rest}
-    stack = FilmWork(**rest)
+    arrays |= {name: np.zeros(shape) for name in FilmWork._fields if name not in arrays}
+    stack = FilmWork(**arrays)
     return stack, [FilmWork(*parts) for parts in zip(*stack, strict=True)]
 
 

@@ -35,8 +35,8 @@ def least_share(grid: FilmGrid, work: FilmWork, da: float, db: float, extra: Flo
     for i in range(work.thickness.shape[0]):
         change = -(da * grid.cos[i] + db * grid.sin[i])
         for j in range(work.thickness.shape[1]):
-            more = extra[i, j] if extra.size > 0 else 0.0
-            worst = min(worst, (change + more) / work.thickness[i, j])
+            addition = extra[i, j] if extra.size > 0 else 0.0
+            worst = min(worst, (change + addition) / work.thickness[i, j])
     return worst
 
 
@@ -47,7 +47,7 @@ def edge_flows(grid: FilmGrid, work: FilmWork, supplied: float) -> tuple[float, 
     The difference leaves at the trailing edge, in streaks where the film is ruptured: by balance, because the rupture
     line of a mesh moves by whole nodes and what is found behind it jumps.
     """
-    along, beside, lines, nodes = work.flow[0], work.flow[1], grid.steps[0], work.pressure.size
+    along, across, lines, nodes = work.flow[0], work.flow[1], grid.steps[0], work.pressure.size
     entering, corners, leaving_corners, inside, leaving = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(lines):
         flow, out = min(along[j], supplied * grid.height[j]), along[nodes - 2 * lines + j]
@@ -60,11 +60,11 @@ def edge_flows(grid: FilmGrid, work: FilmWork, supplied: float) -> tuple[float, 
             leaving += out
     over = 0.0
     for n in range(0, nodes, lines):
-        over += beside[n + lines - 2]
+        over += across[n + lines - 2]
         if grid.first == 1:
-            over -= beside[n]
+            over -= across[n]
     # the half cells at the edges have no pressure: they run as full at the trailing edge as the lines beside them
     filled = min(1.0, max(0.0, (inside - over) / leaving)) if leaving > 0.0 else 1.0
     # the mesh holds one half of a symmetric film
-    both = 2.0 if grid.first == 0 else 1.0
-    return both * entering, both * (over + corners - filled * leaving_corners)
+    halves = 2.0 if grid.first == 0 else 1.0
+    return halves * entering, halves * (over + corners - filled * leaving_corners)

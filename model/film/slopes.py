@@ -101,14 +101,14 @@ def shape_slopes(grid: FilmGrid, work: FilmWork, conductance: FloatArray, shapes
         for n in range(len(p) - step):
             driven = conductance[side, n] * (p[n + step] - p[n])
             thicker[side, n] = (work.flow[side, n] - 2.0 * driven) / (h[n] + h[n + step])
-    along, beside = thicker
+    along, across = thicker
     for k in range(len(slopes)):
         n = grid.node[k]
         for m in range(count):  # side by side in memory
             inflow = along[n - line] * (shape[n - line, m] + shape[n, m])
             inflow -= along[n] * (shape[n, m] + shape[n + line, m])
-            inflow += beside[n - 1] * (shape[n - 1, m] + shape[n, m])
-            slopes[k, m] = inflow - beside[n] * (shape[n, m] + shape[n + 1, m])
+            inflow += across[n - 1] * (shape[n - 1, m] + shape[n, m])
+            slopes[k, m] = inflow - across[n] * (shape[n, m] + shape[n + 1, m])
     keep_ruptured(grid, work, slopes)
     substitute_many(work.band, slopes)
     return slopes

@@ -76,9 +76,9 @@ def resist(grid: FilmGrid, work: FilmWork, speed: float, faces: Faces) -> None:
         step = grid.steps[side]
         for n in range(len(light) - step):
             reynolds = 0.5 * (light[n] + light[n + step]) * speed * faces.height[side, n]
-            more, rate = excess(reynolds, ALONG if side == 0 else ACROSS)
-            faces.conductance[side, n] *= 12.0 / (12.0 + more)
-            faces.power[side, n] -= rate / (12.0 + more)
+            resistance, rate = excess(reynolds, ALONG if side == 0 else ACROSS)
+            faces.conductance[side, n] *= 12.0 / (12.0 + resistance)
+            faces.power[side, n] -= rate / (12.0 + resistance)
 
 
 @inner

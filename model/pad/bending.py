@@ -105,10 +105,10 @@ def _pad_deformation(
     )
 
 
-def _between_lines(out: FloatArray, matrix: FloatArray, given: FloatArray) -> FloatArray:
+def _between_lines(out: FloatArray, matrix: FloatArray, gather: FloatArray) -> FloatArray:
     """A matrix on the solid's face as one between its lines along the arc, of the film's columns, column by column."""
-    face = matrix.reshape(-1, out.shape[1], matrix.shape[1] // len(given), len(given))
-    lines = np.einsum("xs,asbt,ty->xayb", out, face, given, optimize=True)
+    face = matrix.reshape(-1, out.shape[1], matrix.shape[1] // len(gather), len(gather))
+    lines = np.einsum("xs,asbt,ty->xayb", out, face, gather, optimize=True)
     return lines.reshape(len(out) * len(face), -1)
 
 

@@ -178,8 +178,8 @@ def sector_mesh(geometry: PadGeometry, density: MeshDensity) -> SectorMesh:
     if end - under < 1e-6 * end:  # the strip is as long as the pad: no rim
         z = graded(0.0, end, density.half_length, end, edge)
     else:
-        inner, beyond = _share(density.half_length - 1, under, end - under)
-        z = _join(graded(0.0, under, inner, end, rim), graded(under, end, beyond + 1, rim, edge))
+        inner, overhang = _share(density.half_length - 1, under, end - under)
+        z = _join(graded(0.0, under, inner, end, rim), graded(under, end, overhang + 1, rim, edge))
     r = graded(geometry.interface_radius, outer, density.backing, edge, rim)
     layers = (geometry.backing,) * density.backing
     if geometry.babbitt_thickness > 0:

@@ -22,18 +22,18 @@ def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
     if not load > 0.0:
         return 0.0
     if law[0] == CONSTANT:
-        give = load / law[1]
+        delta = load / law[1]
     elif law[0] == ROCKER:
-        give = load * (2.0 / 3.0 + _logarithm(law[2], load)) / law[1]
+        delta = load * (2.0 / 3.0 + _logarithm(law[2], load)) / law[1]
     elif law[0] == SPHERICAL:
-        give = law[1] * load ** (2.0 / 3.0)
+        delta = law[1] * load ** (2.0 / 3.0)
     else:
         end = curve[0, int(law[1]) - 1]
         i, s = _piece(law, curve, min(load, end))
-        give = ((curve[1, i] * s + curve[2, i]) * s + curve[3, i]) * s + curve[4, i]
+        delta = ((curve[1, i] * s + curve[2, i]) * s + curve[3, i]) * s + curve[4, i]
         if load > end:
-            give += (load - end) * _measured_compliance(law, curve, end)
-    return give / law[3]
+            delta += (load - end) * _measured_compliance(law, curve, end)
+    return delta / law[3]
 
 
 @inner

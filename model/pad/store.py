@@ -96,10 +96,10 @@ def save_arrays(key: str, arrays: Mapping[str, FloatArray]) -> bool:
 def _prune(folder: Path) -> None:
     """Remove all but the newest files: a sweep over geometries must not fill a disk."""
     latest = time.time() + 60.0  # what is later was stored while the clock was ahead: it must not outlive all others
-    found = [(path.stat(), path) for path in folder.glob("pad-*.npz")]
-    found.sort(key=lambda pair: pair[0].st_mtime if pair[0].st_mtime < latest else 0.0, reverse=True)
+    files = [(path.stat(), path) for path in folder.glob("pad-*.npz")]
+    files.sort(key=lambda pair: pair[0].st_mtime if pair[0].st_mtime < latest else 0.0, reverse=True)
     size = 0
-    for state, path in found:
+    for state, path in files:
         size += state.st_size
         if size > _MOST:
             path.unlink(missing_ok=True)

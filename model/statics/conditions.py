@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from model.bearing import pad_rooms
-from model.conditions import said
+from model.conditions import conditions_of
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
 from model.statics.pad_flow import starved
@@ -70,14 +70,14 @@ def status_of(
     # pads in the journal's way, or in each other's, stand in bearings built in code: a file is refused
     narrow = [k for k, p in enumerate(pads, 1) if not p.assembled_clearance + setup.clearance_change > 0.0]
     meeting = []
-    for number, other, room in pad_rooms(setup.bearing):
+    for number, neighbour, room in pad_rooms(setup.bearing):
         gap = room - pads[number - 1].arc
-        meeting.append((gap < 1e-9, "pads {pads} touch" if gap > -1e-9 else "pads {pads} overlap", (number, other)))
+        meeting.append((gap < 1e-9, "pads {pads} touch" if gap > -1e-9 else "pads {pads} overlap", (number, neighbour)))
     reynolds = largest_reynolds(films, speed)
     swirls = reynolds > _LAMINAR and setup.options.turbulence == "none"
     warmth = np.array([f.work.temperature for f in films if f.forces is not None] or _OIL_DATA)
     coldest, hottest = float(warmth.min()), float(warmth.max())
-    beyond = coldest if coldest < _OIL_DATA[0] else hottest
+    extreme = coldest if coldest < _OIL_DATA[0] else hottest
     normals = [f.normal.tolist() for f in films if f.forces is not None]
     is_free = not failures and setup.rotational_stiffness == 0.0
     on_one_line = all(abs(x * normals[0][1] - y * normals[0][0]) < 1e-6 for x, y in normals)
@@ -90,10 +90,10 @@ def status_of(
         (narrow, "interference: no clearance at pads {pads}", narrow),
         *meeting,
         (swirls, "film not laminar: Re {number:.0f}", (), reynolds),
-        (beyond < _OIL_DATA[0] or beyond > _OIL_DATA[1], "oil beyond its data: {number:.0f} degC", (), beyond),
+        (extreme < _OIL_DATA[0] or extreme > _OIL_DATA[1], "oil beyond its data: {number:.0f} degC", (), extreme),
     )
-    against = said([(failures and unsupported(setup, load), "no pads against the load")])
-    return (*against, *failures, *said(conditions))
+    against = conditions_of([(failures and unsupported(setup, load), "no pads against the load")])
+    return (*against, *failures, *conditions_of(conditions))
 
 
 def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:

@@ -75,9 +75,9 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFil
     spans = tuple((p.leading_edge + setup.starvation * p.arc, p.leading_edge + p.arc) for p in bearing.pads)
     shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))
     grids, stack = _grids(spans, bearing.journal_radius, bearing.length, shape, symmetric)
-    works, each = film_works(grids, setup.inlet_temperature)
+    works, parts = film_works(grids, setup.inlet_temperature)
     crosses = cross_film(works, setup.inlet_temperature) if across else None
-    for k, (pad, grid, work) in enumerate(zip(bearing.pads, grids, each, strict=True)):
+    for k, (pad, grid, work) in enumerate(zip(bearing.pads, grids, parts, strict=True)):
         work.pressure[0, grid.first : -1], (x, y) = pad.leading_edge_pressure, pad.normal
         if not symmetric:
             # the axis leans by `angle` towards `toward`: at z the journal stands z * angle further that way

@@ -59,11 +59,11 @@ def starved(films: Sequence[PadFilm]) -> list[int]:
         if math.isinf(film.supplied):
             continue
         if film.forces is not None:
-            asked = edge_flows(film.grid, film.work, math.inf)[0]
+            demand = edge_flows(film.grid, film.work, math.inf)[0]
         else:
-            asked = through_flow(film)[0] if film.rupture == "jfo" else 0.0
+            demand = through_flow(film)[0] if film.rupture == "jfo" else 0.0
         length = float(film.grid.z[-1] - film.grid.z[0]) * (2.0 if film.grid.first == 0 else 1.0)
-        if asked > (1.0 + _PLENTY) * film.supplied * length:
+        if demand > (1.0 + _PLENTY) * film.supplied * length:
             short.append(film.number)
     return short
 

@@ -30,15 +30,15 @@ def running_of(setup: Setup, surface_speed: float, heat: float) -> Running:
 
     What a share of the heat does, all of it does to oil that takes up more per kelvin.
     """
-    oil, kept = setup.bearing.oil, (1.0 - setup.heat_loss) * heat
-    specific = math.inf if setup.thermal == "isothermal" else oil.specific_heat / kept
-    return Running(float(surface_speed), oil_constants(oil), (specific, oil.conductivity / kept))
+    oil, heat_share = setup.bearing.oil, (1.0 - setup.heat_loss) * heat
+    specific = math.inf if setup.thermal == "isothermal" else oil.specific_heat / heat_share
+    return Running(float(surface_speed), oil_constants(oil), (specific, oil.conductivity / heat_share))
 
 
 def case_of(setup: Setup, load: FloatArray, running: Running, heat: float) -> Case:
     """The numbers of a search; `running` and `heat` as of `running_of`."""
     oil, growth, length = setup.bearing.oil, setup.growth, setup.bearing.length
-    kept, supply = (1.0 - setup.heat_loss) * heat, float(setup.inlet_temperature)
+    heat_share, supply = (1.0 - setup.heat_loss) * heat, float(setup.inlet_temperature)
     thermal = ISOTHERMAL if setup.thermal == "isothermal" else ALONE
     if couples_heat(setup):
         thermal = ACROSS if setup.thermal == "thd" else COUPLED
@@ -53,7 +53,7 @@ def case_of(setup: Setup, load: FloatArray, running: Running, heat: float) -> Ca
         thermal=thermal,
         rupture=None if plain else model,
         supply=supply,
-        kept=kept,
+        heat_share=heat_share,
         mixing=float(setup.mixing),
         journal=bool(setup.options.isothermal_journal),
         closing=0.0 if growth is None else float(growth.closing(setup.bearing)),

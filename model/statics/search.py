@@ -66,7 +66,7 @@ class Search:
         self.case = case_of(setup, self.load, self.running, heat)
         self.bodies = bodies_of(setup, self.case, self.films)
         self.stack = self._pads()
-        self.pads = self.stack.each
+        self.pads = self.stack.table
         self.across = None
         if self.crosses is not None:
             bodies = [f.deformation for f in self.films if f.deformation is not None]
@@ -75,19 +75,19 @@ class Search:
 
     def _pads(self) -> PadStack:
         films = self.films
-        each = np.zeros(len(films), PAD)
+        table = np.zeros(len(films), PAD)
         laws, curves = encoded(self.setup.pivots)
-        each["frame"] = [(f.normal, f.tangent) for f in films]
-        each["preload"] = [f.preload_distance for f in films]
-        each["pivot_radius"] = [f.pivot_radius for f in films]
-        each["clearance"] = [f.pad.pad_clearance for f in films]
-        each["law"] = laws
-        each["flattest"] = [-math.inf if f.pad.leading_edge_pressure else 0.0 for f in films]
-        each["supplied"] = each["heating"] = math.inf
-        each["inlet"] = self.case.supply
-        each["resting"] = math.nan
+        table["frame"] = [(f.normal, f.tangent) for f in films]
+        table["preload"] = [f.preload_distance for f in films]
+        table["pivot_radius"] = [f.pivot_radius for f in films]
+        table["clearance"] = [f.pad.pad_clearance for f in films]
+        table["law"] = laws
+        table["flattest"] = [-math.inf if f.pad.leading_edge_pressure else 0.0 for f in films]
+        table["supplied"] = table["heating"] = math.inf
+        table["inlet"] = self.case.supply
+        table["resting"] = math.nan
         angles = [f.pad.pivot_angle % math.tau for f in films]
-        return PadStack(each, np.argsort(angles, kind="stable"), curves)
+        return PadStack(table, np.argsort(angles, kind="stable"), curves)
 
     def _state(self) -> SearchState:
         works, crosses = self.works, self.crosses
@@ -126,11 +126,11 @@ class Search:
                 self.rises.append(self.rises[first])
                 continue
             curve = attitudes(film.grid, clearance, self.running, self.case.supply, load)
-            gives = np.empty(0)
+            deflections = np.empty(0)
             if pads["law"][m, 0] == OTHER:
-                gives = np.array([law.deflection(w) for w in curve.load.tolist()])
+                deflections = np.array([law.deflection(w) for w in curve.load.tolist()])
             pivot = pads["law"][m], self.stack.curves[m]
-            pads["rows"][m] = pivot_curve(curve[:3], clearance, pivot, gives, pads["attitudes"][m])
+            pads["rows"][m] = pivot_curve(curve[:3], clearance, pivot, deflections, pads["attitudes"][m])
             self.rises.append((len(curve.load) - int(pads["rows"][m]), curve.rise))
 
     def stand(self) -> Search:
@@ -178,10 +178,10 @@ class Search:
         folds = np.where(self.pads["rows"] >= 2, self.pads["attitudes"][:, 0, 0], math.inf)
         return np.asarray((self.reach - folds) / self.pads["clearance"])
 
-    def let_idle(self, which: Any) -> None:
+    def let_idle(self, places: Any) -> None:
         """Let pads carry nothing: their places (from 0), or (n,) which."""
-        self.pads["idle"][which] = True
-        self.pads["tilt"][which] = self.pads["deflection"][which] = 0.0
+        self.pads["idle"][places] = True
+        self.pads["tilt"][places] = self.pads["deflection"][places] = 0.0
 
     def even_films(self) -> list[int]:
         """Numbers of idle pads that stand at a fold without load, concentric: their films count, as they are there.
@@ -210,32 +210,32 @@ class Search:
             return False
         self.stand()
         # where a pad has no curve, here or there, nothing is moved; pads that friction holds stay where they are held
-        known = not np.isnan(self.begun.position - start.begun.position).any()
-        moved = self.begun if known and not self.setup.friction else start.begun
+        has_curves = not np.isnan(self.begun.position - start.begun.position).any()
+        moved = self.begun if has_curves and not self.setup.friction else start.begun
         shift = Begun(*(np.nan_to_num(new - old) for new, old in zip(moved, start.begun, strict=True)))
-        for m, (film, other) in enumerate(zip(self.films, start.films, strict=True)):
+        for m, (film, neighbour) in enumerate(zip(self.films, start.films, strict=True)):
             if self.case.mixing and math.isfinite(self.case.fresh):
-                pads["passed"][m] = through_flow(other)[1]
-            as_curves_say = other.idle == math.isnan(start.begun.tilt[m])
-            if known and as_curves_say and pads["idle"][m] != other.idle:
+                pads["passed"][m] = through_flow(neighbour)[1]
+            as_curves_say = neighbour.idle == math.isnan(start.begun.tilt[m])
+            if has_curves and as_curves_say and pads["idle"][m] != neighbour.idle:
                 continue  # the neighbour's pad does as its curve says: so does this one
-            pads["idle"][m] = other.idle
-            pads["tilt"][m] = other.tilt + shift.tilt[m]
-            pads["deflection"][m] = other.deflection + shift.deflection[m]
+            pads["idle"][m] = neighbour.idle
+            pads["tilt"][m] = neighbour.tilt + shift.tilt[m]
+            pads["deflection"][m] = neighbour.deflection + shift.deflection[m]
             if coupled:  # elsewhere the inlet is the supply of this set-up, whatever the neighbour drank
-                pads["inlet"][m] = other.inlet
+                pads["inlet"][m] = neighbour.inlet
             if self.case.thermal != ISOTHERMAL:
-                film.work.temperature[:] = other.work.temperature + shift.temperature[m]
-            if film.cross is not None and other.cross is not None:
-                film.cross.temperature[:] = other.cross.temperature + shift.temperature[m, :, :, None]
-                film.cross.face[:] = other.cross.face + shift.temperature[m]
-            film.work.ruptured[:] = other.work.ruptured
-            film.work.pressure[1:] = other.work.pressure[1:]
+                film.work.temperature[:] = neighbour.work.temperature + shift.temperature[m]
+            if film.cross is not None and neighbour.cross is not None:
+                film.cross.temperature[:] = neighbour.cross.temperature + shift.temperature[m, :, :, None]
+                film.cross.face[:] = neighbour.cross.face + shift.temperature[m]
+            film.work.ruptured[:] = neighbour.work.ruptured
+            film.work.pressure[1:] = neighbour.work.pressure[1:]
             if self.setup.flexible_pads:
-                state.bent[m] = other.bent
-                film.work.extra[:] += other.bent
+                state.bent[m] = neighbour.bent
+                film.work.extra[:] += neighbour.bent
             if self.case.axial:
-                self._lean(m, other.axial)
+                self._lean(m, neighbour.axial)
         state.position[:] = start.position + shift.position
         if coupled:
             state.figures[JOURNAL] = start.journal_temperature
@@ -276,8 +276,8 @@ class Search:
                 continue
             stiffness = pad.stiffness
             deep = 0.0 < _BEYOND_FOLD * pad.attitudes[3, 0] < pad.force[0]
-            told = deep and is_stable(self.case, pad, curve, stiffness)
-            if self.case.thermal in (ALONE, COUPLED) and not told:  # the temperature follows, and that is known
+            is_held = deep and is_stable(self.case, pad, curve, stiffness)
+            if self.case.thermal in (ALONE, COUPLED) and not is_held:  # the temperature follows, and that is known
                 wedge = (float(pad.clearance), *pad.wedge.tolist())
                 stiffness = stiffness + heat_impedance(film.grid, film.work, wedge, self.running, 0.0, _TOLD).real
             if not is_stable(self.case, pad, curve, stiffness):
@@ -325,10 +325,10 @@ class Search:
 
 
 @lru_cache(maxsize=16)
-def _spread(coarse: tuple[int, int], fine: tuple[int, int], whole: bool) -> tuple[FloatArray, FloatArray]:
+def _spread(coarse: tuple[int, int], fine: tuple[int, int], full_width: bool) -> tuple[FloatArray, FloatArray]:
     """From a curve's mesh to a film's, along and across, where either is graded alike; a whole film is symmetric."""
     z = np.linspace(0.0, 1.0, fine[1])
-    places = np.linspace(0.0, 1.0, fine[0]), np.abs(2.0 * z - 1.0) if whole else z
+    places = np.linspace(0.0, 1.0, fine[0]), np.abs(2.0 * z - 1.0) if full_width else z
     hats = [
         np.array([np.interp(x, np.linspace(0.0, 1.0, count), hat) for hat in np.eye(count)])
         for x, count in zip(places, coarse, strict=True)

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from model.conditions import named, pads_of, said
+from model.conditions import conditions_of, named, pads_of
 from model.setup import Setup
 from model.statics import conditions
 from model.statics.compiled.start import stand_on_curves
@@ -93,7 +93,7 @@ def _doubt(setup: Setup) -> float:
 
 
 def _most_loaded(
-    setup: Setup, load: FloatArray, speed: float, known: Equilibrium, loaded: BoolArray, doubtful: BoolArray
+    setup: Setup, load: FloatArray, speed: float, fallback: Equilibrium, loaded: BoolArray, doubtful: BoolArray
 ) -> Equilibrium:
     """The equilibrium with most of the doubtful pads loaded, no more than `loaded` has; what is known where none is.
 
@@ -105,20 +105,20 @@ def _most_loaded(
         for chosen in itertools.combinations(pads.tolist(), size):
             carrying = loaded.copy()
             carrying[pads] = np.isin(pads, chosen)
-            same = known.converged and np.all(carrying != known.idle)
-            other = known if same else _with_pads(setup, load, speed, carrying)
-            if other.converged:
-                alike.setdefault(tuple(other.idle.tolist()), other)
-            elif not known.converged and len(other.status) > len(known.status):
-                known = other  # the one with the most to say
+            is_fallback = fallback.converged and np.all(carrying != fallback.idle)
+            trial = fallback if is_fallback else _with_pads(setup, load, speed, carrying)
+            if trial.converged:
+                alike.setdefault(tuple(trial.idle.tolist()), trial)
+            elif not fallback.converged and len(trial.status) > len(fallback.status):
+                fallback = trial  # the one with the most to say
         if alike:
             break
     else:
-        return known
-    first, *others = sorted(alike, key=sum)
-    if not others or sum(others[0]) > sum(first):
+        return fallback
+    first, *rivals = sorted(alike, key=sum)
+    if not rivals or sum(rivals[0]) > sum(first):
         return alike[first]
-    another = named("another equilibrium exists", (np.flatnonzero(others[0]) + 1).tolist())
+    another = named("another equilibrium exists", (np.flatnonzero(rivals[0]) + 1).tolist())
     return replace(alike[first], status=(another, *alike[first].status))
 
 
@@ -130,8 +130,8 @@ def _try_sets(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium)
     found_out = (c.severity == "error" and c != "not converged" and not c.pads for c in failed.status)
     if not _is_of_sets(setup) or any(found_out):
         return failed
-    every = np.ones(len(failed.films), bool)
-    result = _most_loaded(setup, load, speed, failed, every, every)
+    all_pads = np.ones(len(failed.films), bool)
+    result = _most_loaded(setup, load, speed, failed, all_pads, all_pads)
     if result.converged:
         return result
     return replace(result, status=(*result.status, named("no set of pads finds rest")))
@@ -157,10 +157,10 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
         trial = Search(search.setup, search.load, search.speed, search.heat)
         trial.start_from(result)
         trial.load_pads(np.arange(len(idle)) == pad)
-        other = trial.run()
+        outcome = trial.run()
         refused.add(pad)
-        if other.converged and not other.idle[pad] and other.idle.sum() < idle.sum():
-            search, result = trial, other
+        if outcome.converged and not outcome.idle[pad] and outcome.idle.sum() < idle.sum():
+            search, result = trial, outcome
 
 
 def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int]) -> Equilibrium:
@@ -183,7 +183,7 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
         (even and not restless, "pads {pads} stand concentric", even),
         (edge, "pads {pads} on the edge of carrying", edge),
     )
-    return replace(result, status=(*said(names), *result.status), loose=tuple(result.idle & (above > _EDGE)))
+    return replace(result, status=(*conditions_of(names), *result.status), loose=tuple(result.idle & (above > _EDGE)))
 
 
 def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:

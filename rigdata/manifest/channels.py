@@ -117,9 +117,9 @@ def _calibration(table: Table, quantity: str, unit: str) -> dict[str, float]:
     values["zero_uncertainty"] = table.value(field)
     if not unit:
         return values
-    stated = [data.get(key) for key in _SENSITIVITY]
+    sensitivity = [data.get(key) for key in _SENSITIVITY]
     with table.noted("sensitivity" if "sensitivity" in data else "unit", f"See the channel tables of {SCHEMA}"):
-        values["gain"] = reading_gain(quantity, unit, *stated)
+        values["gain"] = reading_gain(quantity, unit, *sensitivity)
         if not 0.0 < values["gain"] < 1e30:
             raise UnitError(f"one {unit} would be {values['gain']:g} SI")
         for key in data if not is_signal(unit) else ():
@@ -142,13 +142,13 @@ def channels_by_run(table: Table, channels: Channels, runs: Sequence[str]) -> di
         for run, entry in _entries(table.subtable(name), runs, budget):
             entries[run].append((name, entry))
     described = {}
-    known = {}
+    variants = {}
     for run, changes in entries.items():
         key = tuple(id(entry) for _, entry in changes)
-        if key not in known:
-            known[key] = _changed(table, channels, changes)
-            _check_together(known[key], findings)
-        described[run] = known[key]
+        if key not in variants:
+            variants[key] = _changed(table, channels, changes)
+            _check_together(variants[key], findings)
+        described[run] = variants[key]
     return described
 
 
@@ -171,9 +171,9 @@ def _matching(entry: Table, runs: Sequence[str], budget: Iterator[int]) -> set[s
     """Runs that the patterns of an entry name; `budget` counts the patterns with a star."""
     patterns = entry.value(RUNS_OF)
     named = set()
-    known = set(runs)
+    run_names = set(runs)
     for pattern in patterns or ():
-        matches = {pattern} & known
+        matches = {pattern} & run_names
         if "*" in pattern:
             if next(budget) > _MOST_PATTERNS:
                 entry.error("runs", f"more than {_MOST_PATTERNS} patterns with a star in all", "Join them")

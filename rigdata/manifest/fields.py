@@ -61,7 +61,7 @@ class Field:
 
     def read(self, value: Any) -> Any:
         """The value in SI; UnitError where it is none."""
-        stated = shown(value)
+        spelling = shown(value)
         if self.kind in _RAW:
             return value
         if self.kind in ("text", "choice"):
@@ -80,9 +80,9 @@ class Field:
                 is_good = is_good and isinstance(value, int)
             fault, value = "cannot be", number
         if not is_good:
-            raise UnitError(f"{stated} {fault}")
+            raise UnitError(f"{spelling} {fault}")
         if self.choices and value not in self.choices:
-            raise UnitError(f"{stated} is unknown")
+            raise UnitError(f"{spelling} is unknown")
         return value
 
     def advice(self, value: object) -> str:
@@ -150,7 +150,7 @@ class Findings:
         self.append(Problem("error", self.file, f"line {first} and on", open_summary(paths), remedy))
         self.open = tuple(paths)
 
-    def error(self, path: Path, what: str, cure: str, run: str | None = None, severity: Severity = "error") -> None:
+    def error(self, path: Path, fault: str, cure: str, run: str | None = None, severity: Severity = "error") -> None:
         """Note an error, or something less severe, of the key at `path`."""
         if any(place[: len(path)] == path for place in self.open):
             self.errors += severity == "error"
@@ -160,7 +160,7 @@ class Findings:
             at = at[:-1]
         if at:
             place = f"line {self.lines[at]}, {place}"
-        self.append(Problem(severity, self.file, place, what, cure, run))
+        self.append(Problem(severity, self.file, place, fault, cure, run))
 
     def append(self, problem: Problem) -> None:
         """Note a problem that was found elsewhere."""
@@ -184,9 +184,9 @@ class Table:
         """The table under `key`, empty where absent."""
         return Table(self.data.get(key, {}), (*self.path, key), self.findings)
 
-    def error(self, key: str, what: str, cure: str) -> None:
+    def error(self, key: str, fault: str, cure: str) -> None:
         """Note an error of `key`."""
-        self.findings.error(self.origins.get(key, (*self.path, key)), what, cure)
+        self.findings.error(self.origins.get(key, (*self.path, key)), fault, cure)
 
     def read(self, fields: tuple[Field, ...], needed: Collection[str] = ()) -> dict[str, Any]:
         """The value of every field, SI; keys that are no field are noted."""

@@ -126,14 +126,24 @@ class RunReader(RecordFile):
         """Seconds (stop - start,) of the times that the file holds under `clock`."""
         raise NotImplementedError
 
-    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of channels of one device, (stop - start,) each."""
+    def _stored(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings of channels of one device as the file holds them, (stop - start,) each."""
         raise NotImplementedError
 
+    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings of channels of one device, (stop - start,) each; NaN in rows that a logger left out."""
+        places = self._grid(names[0]).places if names else None
+        if places is None:
+            return self._stored(names, start, stop)
+        first, last = np.searchsorted(places, (start, stop))
+        rows = np.full((len(names), stop - start), np.nan)
+        rows[:, places[first:last] - start] = self._stored(names, first, last)
+        return list(rows)
+
     def _grid(self, name: str = "") -> Grid:
-        """Channels at the times of `name`; without one those of the run's own device."""
+        """Channels at the times of `name`, which may be their clock; without one those of the run's own device."""
         grids = self._layout().grids
-        return next((grid for grid in grids if name in grid.channels), grids[0])
+        return next((grid for grid in grids if name and name in (grid.clock, *grid.channels)), grids[0])
 
     def devices(self) -> tuple[Device, ...]:
         """Channels that are sampled together."""
@@ -171,13 +181,13 @@ class RunReader(RecordFile):
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         """Raw readings of `names` along the run's own times, (stop - start,) each."""
-        faults, apart = self._layout().faults, self.apart()
+        faults, separate_names = self._layout().faults, self.apart()
         for name in names:
             if name in faults:
                 raise faults[name]
-        own = [name for name in names if name not in apart]
-        readings = dict(zip(own, self.read_device(own, start, stop), strict=True))
-        for name in apart.intersection(names):
+        main_names = [name for name in names if name not in separate_names]
+        readings = dict(zip(main_names, self.read_device(main_names, start, stop), strict=True))
+        for name in separate_names.intersection(names):
             readings[name] = self._along(name, start, stop)
         return [readings[name] for name in names]
 
@@ -189,9 +199,12 @@ class RunReader(RecordFile):
     def device_time(self, name: str, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,) of a channel's samples: the file's, else counted from its device's rate."""
         grid = self._grid(name)
-        if grid.clock:
+        if not grid.clock:
+            return grid.begin + np.arange(start, stop) / grid.rate
+        if grid.places is None:
             return self._clock_times(grid.clock, start, stop)
-        return grid.begin + np.arange(start, stop) / grid.rate
+        times = self._clock_times(grid.clock, 0, len(grid.places))
+        return np.interp(np.arange(start, stop), grid.places, times)
 
     def _along(self, name: str, start: int, stop: int) -> FloatArray:
         """Readings of another device along the run's own times, for those who look at all channels together.
@@ -221,9 +234,9 @@ class RunReader(RecordFile):
         """An error for every channel whose unit in the file is another than its unit in the manifest."""
         problems = []
         for name, unit in units.items():
-            channel, stated = self.channels.get(name), unit.strip()
-            if channel is not None and stated and _differ(stated, channel):
-                fault = f"the file states {stated!r}, the manifest unit = {channel.unit!r}"
+            channel, file_unit = self.channels.get(name), unit.strip()
+            if channel is not None and file_unit and _differ(file_unit, channel):
+                fault = f"the file states {file_unit!r}, the manifest unit = {channel.unit!r}"
                 remedy = "Correct unit in the manifest, or the units of the file if those are wrong"
                 problems.append(self.problem("error", f"channel {name}", fault, remedy))
         return problems
@@ -262,13 +275,13 @@ def _meaning(unit: str, quantity: str) -> tuple[object, float]:
     return reading_zero(quantity, unit, None), reading_gain(quantity, unit, None)
 
 
-def _differ(stated: str, channel: Channel) -> bool:
+def _differ(file_unit: str, channel: Channel) -> bool:
     """Whether the unit that a file states makes another number of a reading than the manifest's."""
     quantity = channel.quantity
     if quantity not in DIMENSIONS:
         return False
     try:
-        (kind, factor), (other_kind, other) = _meaning(stated, quantity), _meaning(channel.unit, quantity)
+        (kind, factor), (other_kind, channel_factor) = _meaning(file_unit, quantity), _meaning(channel.unit, quantity)
     except UnitError:
         return False
-    return kind != other_kind or not math.isclose(factor, other, rel_tol=_SAME)
+    return kind != other_kind or not math.isclose(factor, channel_factor, rel_tol=_SAME)

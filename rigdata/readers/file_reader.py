@@ -98,7 +98,7 @@ class FileReader(RunReader):
                 remedy = "Sort or split the run, or export without times"
                 faults[name] = self.refuse(f"channel {name}", fault, remedy)
                 continue
-            clock = next((key for key, shared in times.items() if _alike(shared, time)), str(len(times) + 1))
+            clock = next((key for key, shared in times.items() if _alike(shared, time)), f"times {len(times) + 1}")
             times.setdefault(clock, time)
             if len(times) > _MOST_TIMES:
                 raise self.refuse("", f"has more than {_MOST_TIMES} different times", "Split the run")
@@ -129,8 +129,7 @@ class FileReader(RunReader):
     def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
         return np.array(self._layout().times[clock][start:stop])
 
-    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of channels of one device, (stop - start,) each."""
+    def _stored(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         layout = self._layout()
         for name in names:
             if name not in layout.values:
@@ -145,9 +144,9 @@ class FileReader(RunReader):
         return (*layout.problems, *self._notes(members, (*layout.values, *layout.unread), layout.units))
 
 
-def _alike(time: FloatArray, other: FloatArray) -> bool:
+def _alike(time: FloatArray, reference: FloatArray) -> bool:
     """Whether two channels are sampled at the same times."""
-    if time is other or len(time) != len(other):
-        return time is other
-    step = (other[-1] - other[0]) / max(len(other) - 1, 1) if len(other) else 0.0
-    return bool(np.all(np.abs(time - other) <= SAME_STEP * step))
+    if time is reference or len(time) != len(reference):
+        return time is reference
+    step = (reference[-1] - reference[0]) / max(len(reference) - 1, 1) if len(reference) else 0.0
+    return bool(np.all(np.abs(time - reference) <= SAME_STEP * step))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import OVERFLOW, UNDESCRIBED, Channels
 from rigdata.device import RATE_MISS, rate_of_time
 from rigdata.problem import Problem
@@ -31,8 +31,6 @@ _TIME = re.compile(rf"(?:(?i:{_WORDS})\b|t\s*[\[(]|(?:(?i:{_WORDS})|t)(?:_(?:{_U
 _TIME_UNIT = re.compile(rf"[\[(/,\s_]({_UNITS})\s*[\])]?$")
 #: Two clocks whose samples differ by this share of a step count as one.
 SAME_STEP = 0.01
-#: Steps of an even grid are whole within this.
-_EVEN = 0.2
 
 
 @dataclass(frozen=True)
@@ -137,9 +135,9 @@ def is_time(name: str) -> bool:
 
 def time_unit(name: str, unit: str) -> str:
     """Unit of a time column: stated, or in its name (``time_ms``, ``Zeit [ms]``); "" where there is none."""
-    stated = unit.strip().strip("[]()")
+    symbol = unit.strip().strip("[]()")
     in_name = _TIME_UNIT.search(name.strip())
-    return stated if stated in TIME_FACTORS else in_name[1] if in_name else ""
+    return symbol if symbol in TIME_FACTORS else in_name[1] if in_name else ""
 
 
 def seconds(column: Series) -> FloatArray:
@@ -184,46 +182,26 @@ def table(contents: Contents, record: RecordFile) -> Contents:
                 groups[i].append(i)
             continue
         if clock is not None and len(series[clock]) != len(series[i]):
-            clock = next((other for other in clocks if len(series[other]) == len(series[i])), None)
+            clock = next((candidate for candidate in clocks if len(series[candidate]) == len(series[i])), None)
         groups[clock if series[i].time is None else None].append(i)
     lengths = {len(series[i]) for i in groups.pop(None) if series[i].time is None}
     is_shared = len(clocks) == 1 and len(series[clocks[0]]) not in lengths
     for clock, members in groups.items():
         column = series[clock or 0]
-        known = channels.get(column.name)
-        time = seconds(column) if known is None else known.to_si(column.values)
+        channel = channels.get(column.name)
+        time = seconds(column) if channel is None else channel.to_si(column.values)
         rows = slice(None) if is_shared else _filled_rows([time, *(series[i].values for i in members)])
         time = time[rows]
         usable = np.flatnonzero(np.abs(time) < OVERFLOW)
         if len(usable) not in (0, len(time)):  # missing times are set between their neighbours
             time = np.interp(np.arange(len(time)), usable, time[usable])
-        places = _places(time)
-        if places is not None:
-            time = np.interp(np.arange(places[-1] + 1), places, time)
         for i in members:
-            values, group = series[i].values[rows], series[i].group
-            if places is not None:
-                values, present = np.full(len(time), np.nan), values
-                values[places] = present
-            values = to_temporary_file(values)
+            values, group = to_temporary_file(series[i].values[rows]), series[i].group
             series[i] = replace(series[i], values=values, time=time, group=group if is_shared else column.name or group)
     ordered = [column for i, column in enumerate(series) if i not in clocks or names[i] in channels]
     if is_shared or not clocks:
         ordered = _slow_columns(ordered, record)
     return replace(contents, series=ordered, clocks={names[i]: series[i].unit for i in clocks})
-
-
-def _places(time: FloatArray) -> IntArray | None:
-    """Places (n,) of rows on an even grid of times (n,) that a logger left rows out of; None where it left out none.
-
-    A row that is left out is a reading without a value: what is known of gaps is known of either.
-    """
-    steps = np.diff(time) * rate_of_time(time)
-    whole = np.rint(steps)
-    is_even = np.all((whole >= 1) & (np.abs(steps - whole) < _EVEN))
-    if not is_even or not len(steps) < whole.sum() < 2 * len(time):
-        return None
-    return np.append(0, np.cumsum(whole)).astype(np.intp)
 
 
 def _slow_columns(series: Sequence[Series], record: RecordFile) -> list[Series]:

@@ -224,14 +224,14 @@ def _update(blocks: list[_Block], old: _Tables | None, new: _Tables) -> list[str
 
 def _merge(block: _Block, new: Sequence[str], old: Sequence[str], changes: list[str]) -> None:
     """Fill in open places, put new guesses in place of old ones, and add what a table lacks; no line goes."""
-    guessed, wanted = _values(old), _values(new)
+    guessed, proposals = _values(old), _values(new)
     lines, present = [], set()
     for line in block.lines:
         key, value = _entry(line)
         present.add(key)
         is_guess = bool(_OWN.search(line)) and key in guessed and value == guessed[key][0]
-        if key in wanted and (MARK in value or is_guess) and MARK not in wanted[key][0]:
-            result, drafted = wanted[key]
+        if key in proposals and (MARK in value or is_guess) and MARK not in proposals[key][0]:
+            result, drafted = proposals[key]
             if result != value:
                 changes.append(f"{block.place}: {key} {value} becomes {result}")
             if result != value or "(records)" in drafted:
@@ -244,9 +244,9 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], changes: list[
         present |= _OF_MODEL - {"polarity"}
     if "unit" in present:
         present.add("like")
-        if "sensitivity" in wanted and "sensitivity" not in guessed:
+        if "sensitivity" in proposals and "sensitivity" not in guessed:
             present.add("sensitivity")
-    for key, (value, line) in wanted.items():
+    for key, (value, line) in proposals.items():
         if key not in present:
             lines.append(line)
             changes.append(f"{block.place}: {key} {value} added")

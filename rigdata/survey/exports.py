@@ -85,7 +85,7 @@ def in_seconds(exports: Sequence[Export], described: Tables) -> tuple[list[Expor
     """
     unstated = [export for export in exports if not export.states_times]
     rate = max((export.rate for export in unstated), default=np.nan)
-    units = {name: Entry(stated, "file") for export in exports for name, stated in export.clocks.items()}
+    units = {name: Entry(clock_unit, "file") for export in exports for name, clock_unit in export.clocks.items()}
     open_ = {name for export in unstated for name in export.clocks}
     typed = {described[name].get("unit") for name in open_ if name in described}
     likely = next((unit for unit in ("s", "ms", "us") if rate / TIME_FACTORS[unit] >= _SLOWEST), "s")

@@ -55,16 +55,16 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
     by_name = named("kinds", stem)
     kind = Entry(by_name, "guess", "the file's name") if by_name else OPEN
     # movement beats a misleading name, but a name tells a constant load from none
-    movement, why = _by_movement(forces, moves, lines)
+    movement, reason = _by_movement(forces, moves, lines)
     if movement and movement == (by_name or movement):
-        kind = Entry(movement, "records", why)
+        kind = Entry(movement, "records", reason)
     elif movement and {movement, by_name} != {"dynamic", "locus"}:
-        kind = Entry(movement, "records", f"{why} (its name says {by_name})")
+        kind = Entry(movement, "records", f"{reason} (its name says {by_name})")
     pad = re.search(rf"(?:^p|{PAD})[-_ #]?(\d{{1,2}})(?!\d)", stem, re.IGNORECASE)
     angles = _numbers_before(stem, r"deg(?:ree)?s?|°|grad")
     # a frequency that the name states counts where one of the record's lines confirms it
-    stated = [abs(f) for f in _numbers_before(stem, "Hz")]
-    confirmed = [f for f in stated if any(abs(line.frequency - f) <= NEAR * f for line in lines)]
+    frequencies = [abs(f) for f in _numbers_before(stem, "Hz")]
+    confirmed = [f for f in frequencies if any(abs(line.frequency - f) <= NEAR * f for line in lines)]
     return RunGuess(
         export=export,
         kind=kind,

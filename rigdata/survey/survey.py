@@ -120,22 +120,22 @@ class _Folder:
         pair = next(iter(pairs(self.channels, "force")), None)
         if pair is None:
             return None
-        stated = stated_frame(pair, self.channels)
-        if stated is not None and stated.source == "file":
-            return stated
+        frame = stated_frame(pair, self.channels)
+        if frame is not None and frame.source == "file":
+            return frame
         toward, (first, last) = self._dry_tests(pair)
         readings = (last - first)[0]
-        known = np.isfinite(toward)
-        if len(set(toward[known])) > 1:
-            reason = f"{known.sum()} dry steps toward their pads"
-            return fitted_frame(pair, readings[known], toward[known], reason) or stated
-        if stated is None or not len(self.pivots) or len(readings) < 2:
-            return stated
-        hinted = stated.direction(readings)
+        has_pad = np.isfinite(toward)
+        if len(set(toward[has_pad])) > 1:
+            reason = f"{has_pad.sum()} dry steps toward their pads"
+            return fitted_frame(pair, readings[has_pad], toward[has_pad], reason) or frame
+        if frame is None or not len(self.pivots) or len(readings) < 2:
+            return frame
+        hinted = frame.direction(readings)
         nearest = self.pivots[self._nearest_pad(hinted)]
         if np.abs(wrapped(hinted - nearest)).max() > math.radians(_ALIKE):
-            return stated  # the names' directions lead to no pads
-        return fitted_frame(pair, readings, nearest, f"its name and {len(readings)} dry steps toward pads") or stated
+            return frame  # the names' directions lead to no pads
+        return fitted_frame(pair, readings, nearest, f"its name and {len(readings)} dry steps toward pads") or frame
 
     def _nearest_pad(self, angles: FloatArray | float) -> Any:
         """Indices of the pads nearest to directions [rad]."""
@@ -158,9 +158,9 @@ class _Folder:
         if is_dry and len(self.pivots):
             nearest = int(self._nearest_pad(angle))
             pivot = math.degrees(self.pivots[nearest])
-            off = abs(folded(pivot - degrees))
-            if off <= _TOWARD and run.pad.value in (None, nearest + 1):
-                pad = replace(concluded, value=nearest + 1, reason=f"{reason}, {off:.1f} deg from it")
+            distance = abs(folded(pivot - degrees))
+            if distance <= _TOWARD and run.pad.value in (None, nearest + 1):
+                pad = replace(concluded, value=nearest + 1, reason=f"{reason}, {distance:.1f} deg from it")
                 direction = replace(run.direction, value=folded(pivot))
                 return replace(run, pad=run.pad if run.pad.value else pad, direction=direction)
             if run.pad.value:
@@ -192,8 +192,8 @@ class _Folder:
         yield steps, directions, f"{len(steps)} dry steps"
         if len(steps) > 2:
             towards = np.exp(1j * directions)
-            apart = np.angle(towards - towards.mean())
-            yield last[0] - last[0].mean(axis=0), apart, f"where {len(steps)} dry steps end"
+            deviations = np.angle(towards - towards.mean())
+            yield last[0] - last[0].mean(axis=0), deviations, f"where {len(steps)} dry steps end"
 
     def _of_excitation(self, pair: Pair, cells: Frame) -> _Evidence:
         """How two accelerometers move: the housing gives way to the force on its cells along the excitation."""
@@ -260,14 +260,14 @@ def _pair(run: RunGuess, names: Pair) -> list[Series]:
 
 def _with_load(run: RunGuess, load: float) -> RunGuess:
     """A run with its load [N] by calibrated cells, in their unit; what a name states stands if they agree."""
-    reason, stated = f"cells {load / 1e3:.3g} kN", run.load
-    off = abs(load - stated.number)
-    agrees = off <= _CONTRADICTS * stated.number
-    if stated.source == "file" and agrees:
+    reason, entry = f"cells {load / 1e3:.3g} kN", run.load
+    deviation = abs(load - entry.number)
+    agrees = deviation <= _CONTRADICTS * entry.number
+    if entry.source == "file" and agrees:
         return run
-    if stated.source == "file" or off <= _SPREADS["load"][1] * stated.number:
+    if entry.source == "file" or deviation <= _SPREADS["load"][1] * entry.number:
         source = "records" if agrees else "guess"
-        return replace(run, load=replace(stated, source=source, reason=f"the file's name; {reason}"))
+        return replace(run, load=replace(entry, source=source, reason=f"the file's name; {reason}"))
     return replace(run, load=Entry(load, "records", reason))
 
 
@@ -281,8 +281,8 @@ def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
     lines = [p for p in run.lines if not any(abs(p.frequency - n * turns) <= NEAR * n * turns for n in (1, 2))]
     if not lines:
         return run
-    beside = " beside the shaft's" if len(lines) < len(run.lines) else ""
-    return replace(run, excitation=Entry(lines[0].frequency, "records", f"strongest line{beside}"))
+    remark = " beside the shaft's" if len(lines) < len(run.lines) else ""
+    return replace(run, excitation=Entry(lines[0].frequency, "records", f"strongest line{remark}"))
 
 
 def _set_points(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:

@@ -188,8 +188,8 @@ def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> st
     head += [layout.delimiter.join(cells) + tail for cells in [names, units][: 1 + layout.units_line]]
     form = "\0".join(forms)  # one format string for a whole row is the fastest way in Python
     text = "\n".join([form % tuple(row) for row in table.tolist()])
-    for written, wanted in (("nan", layout.missing), (".", layout.decimal), ("\0", layout.delimiter)):
-        text = text.replace(written, wanted)
+    for former_text, spelling in (("nan", layout.missing), (".", layout.decimal), ("\0", layout.delimiter)):
+        text = text.replace(former_text, spelling)
     body = [line + tail for line in text.split("\n")] if text else []
     end = [""] * (1 + layout.blank_last_lines)
     if "truncated_line" in rig.fault_kinds(record.run.id) and body:
@@ -254,13 +254,13 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
     response = answer(frequency, np.eye(2, dtype=complex), h, instruments)
     readings = {}
     for quantity in ("displacement", "force", "acceleration"):
-        stated, sensed = [], []
+        nominal, sensed = [], []
         for sensor in instruments.of(quantity)[:2]:
             gain = sensor.error.gain * np.exp(-1j * frequency * sensor.error.delay)
-            stated.append(directions(sensor.axis or 0.0))
+            nominal.append(directions(sensor.axis or 0.0))
             sensed.append(gain * felt_direction(sensor, instruments))
         phasors = getattr(response, quantity).T
-        readings[quantity] = np.linalg.solve(np.array(stated, dtype=complex), np.array(sensed)) @ phasors
+        readings[quantity] = np.linalg.solve(np.array(nominal, dtype=complex), np.array(sensed)) @ phasors
     oil_force = readings["force"] + instruments.housing_mass * readings["acceleration"]
     return oil_force @ np.linalg.inv(readings["displacement"])
 

@@ -90,10 +90,10 @@ class Instruments:
         sensors += [Sensor.of_type("thermometer", f"T{number}", pad=number) for number in range(1, n_pads + 1)]
         rng = np.random.default_rng([seed or 0, 0])
         full_scale = next((size for size in _CELL_SIZES if size >= 1.5 * load), 1.5 * load)
-        stated = {"sensitivity": "2.0 mV/V", "full_scale": f"{full_scale / 1e3:g} kN", "excitation": "5 V"}
+        calibration = {"sensitivity": "2.0 mV/V", "full_scale": f"{full_scale / 1e3:g} kN", "excitation": "5 V"}
         for place, sensor in enumerate(sensors):
             if sensor.quantity == "force":
-                sensors[place] = replace(sensor, scale=10.0 / full_scale, calibration=stated)
+                sensors[place] = replace(sensor, scale=10.0 / full_scale, calibration=calibration)
                 continue
             zero = 0.0 if seed is None else rng.normal(0.0, rig["scatter"][sensor.quantity])
             if sensor.quantity == "displacement":

@@ -159,21 +159,21 @@ def dry_motion(run: PlannedRun, test: DryTest, truth: RigTruth, noise: Noise, se
     sideways = np.array([-toward[1], toward[0]])
     time, load = load_history(test, run.rate)
     flaws = noise.dry
-    off = either_sign(rng, flaws.direction)
+    turn = either_sign(rng, flaws.direction)
     side = either_sign(rng, flaws.side)
     side_start = flaws.side_start * rng.standard_normal()
     gap = rng.uniform(*flaws.contact_gap) if toward[1] > _UPPER else 0.0
-    on_pivot = held_back(load * np.cos(off), flaws.friction)
+    on_pivot = held_back(load * np.cos(turn), flaws.friction)
     deflection = truth.deflection(test.pad, on_pivot)
     missing = gap * np.exp(-load / flaws.contact_load)
     radial = truth.clearance[test.pad - 1] + deflection - missing
     position = np.outer(radial, toward) + np.outer(side_start + side * (deflection - missing), sideways)
     facts = {
-        "load_direction_error_deg": float(np.degrees(off)),
+        "load_direction_error_deg": float(np.degrees(turn)),
         "side_share": side,
         "contact_gap_m": gap,
     }
-    return Motion(time, position, np.outer(load, directions(run.direction + off)), truth.cold_temperatures, facts)
+    return Motion(time, position, np.outer(load, directions(run.direction + turn)), truth.cold_temperatures, facts)
 
 
 def load_history(test: DryTest, rate: float) -> tuple[FloatArray, FloatArray]:

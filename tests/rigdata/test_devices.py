@@ -114,12 +114,11 @@ def test_slow_columns_begin_when_the_record_does(tmp_path, file):
 def test_one_missing_reading_is_missing_and_moves_no_other(tmp_path):
     lost = F.copy()
     lost[7] = np.nan
-    one, both = ({"L1H": spread(lost), "L1V": spread(-other)} for other in (F, lost))
-    force = recorded(tmp_path / "r.csv", FAST | one, slow_cells(), RATE).vector("force")
-    assert np.flatnonzero(np.isnan(force.values[:, 0])).tolist() == [7]
-    force = recorded(tmp_path / "r.csv", FAST | both, slow_cells(), RATE).vector("force")
-    assert len(force) == 499
-    np.testing.assert_allclose(force.time, np.delete(COUNTED, 7))
+    for other in (F, lost):
+        columns = {"L1H": spread(lost), "L1V": spread(-other)}
+        force = recorded(tmp_path / "r.csv", FAST | columns, slow_cells(), RATE).vector("force")
+        assert np.flatnonzero(np.isnan(force.values[:, 0])).tolist() == [7]
+        np.testing.assert_allclose(force.time, COUNTED)
 
 
 def test_a_time_column_wins_over_a_stated_rate_and_that_over_the_runs(tmp_path):
@@ -214,6 +213,19 @@ def test_a_time_column_with_gaps(tmp_path):
     np.testing.assert_allclose(force.time, T2, atol=1e-9)
     assert np.isnan(force.values[10:20]).all()
     np.testing.assert_allclose(np.delete(force.values, np.s_[10:20]), np.delete(F, np.s_[10:20]), atol=1e-9)
+
+
+def test_rows_that_a_time_dataset_left_out_are_readings_without_a_value(tmp_path):
+    columns, channels = two_times("r.h5", np.delete(T2, np.s_[10:20]))
+    columns |= {name: np.delete(columns[name], np.s_[10:20]) for name in ("L1H", "L1V")}
+    run = recorded(tmp_path / "r.h5", columns, channels)
+    assert [device.length for device in run.devices] == [2000, 500]
+    force = run.record("L1H")
+    np.testing.assert_allclose(force.time, T2, atol=1e-9)
+    assert np.flatnonzero(np.isnan(force.values)).tolist() == list(range(10, 20))
+    part = run.record("L1H", 5, 25)  # a slice begins and ends where its samples are
+    np.testing.assert_array_equal(part.values, force.values[5:25])
+    np.testing.assert_allclose(part.time, T2[5:25], atol=1e-9)
 
 
 def test_gaps_in_a_short_record_leave_its_rate_as_it_is():

@@ -18,7 +18,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (115.28, 13_743),
     "model": (75.20, 10_161),
-    "rigdata": (58.99, 7_983),
+    "rigdata": (59.14, 7_990),
     "diagnosis": (38.21, 4_698),
     "cli": (21.78, 2_987),
     "report": (22.37, 2_885),
@@ -32,6 +32,14 @@ LIMITS = {
     "view": (3.67, 471),
 }
 MEASUREMENT = ("check", "phasors", "bands", "estimate", "terms", "estimators", "runs", "identification", "results")
+#: Words that name nothing, and how many of a thousand names may be such: `np.where` and the like among them.
+NO_NOUNS = {
+    "found", "one", "ones", "own", "seen", "told", "tell", "what", "which", "left", "right", "known", "kept",
+    "keep", "rest", "other", "others", "those", "these", "this", "that", "its", "said", "say", "says", "stated",
+    "given", "give", "gives", "taken", "takes", "made", "makes", "whole", "apart", "beside", "beyond", "same",
+    "both", "each", "every", "all", "any", "some", "here", "there", "where",
+}  # fmt: skip
+MOST_NO_NOUNS = 9.0
 COUNTED = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
 Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -76,3 +84,16 @@ def test_rooms_do_not_grow():
         if sizes[name] > 1000 * most or lines[name] > longest
     ]
     assert grown == []
+
+
+def name_of(node: ast.AST) -> str | None:
+    """The name that a node reads, sets or declares."""
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    return getattr(node, "id" if isinstance(node, ast.Name) else "arg", None)
+
+
+def test_names_are_nouns():
+    names = [name for text in texts().values() for name in map(name_of, ast.walk(parsed(text))) if name]
+    others = Counter(name for name in names if name.strip("_") in NO_NOUNS)
+    assert others.total() < MOST_NO_NOUNS / 1000 * len(names), others.most_common(20)

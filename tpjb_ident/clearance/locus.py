@@ -25,7 +25,7 @@ from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples
 from tpjb_ident.pivot.blocks import time_bins
 from tpjb_ident.pivot.dry_record import refusal
 from tpjb_ident.pivot.refusals import usable_runs
-from tpjb_ident.pivot.sweep_witness import told
+from tpjb_ident.pivot.sweep_witness import as_witnessed
 from tpjb_ident.presentation import Presented
 from tpjb_ident.rounding import listed
 from tpjb_ident.schema import STATIC_KEY
@@ -152,7 +152,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     runs = campaign.of_kind("locus")
     if not runs:
         raise refuse("campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
-    channels = {} if polygon is None else polygon.told
+    channels = {} if polygon is None else polygon.sensors
     records, problems = usable_runs(runs, lambda run: _read(run, channels))
     if 2 * len(records) <= len(runs):
         raise RigDataError(problems)
@@ -203,7 +203,7 @@ def _from_down(direction: float) -> float:
 
 
 def _read(run: Run, channels: Channels) -> _Record:
-    time, force, place, good, _ = slow_samples(live_run(told(run, channels)))
+    time, force, place, good, _ = slow_samples(live_run(as_witnessed(run, channels)))
     if good.sum() < 50 or good.mean() < 0.5:
         what = f"has only {good.sum()} usable samples of {len(good)}"
         raise refusal(run, "record", what, "Repeat this direction")

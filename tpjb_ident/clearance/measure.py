@@ -18,7 +18,7 @@ from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.dry_record import axial_channels, refusal, relative_calibration
-from tpjb_ident.pivot.sweep_witness import told, witness_of
+from tpjb_ident.pivot.sweep_witness import as_witnessed, witness_of
 from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import TANGENT
 
@@ -75,10 +75,10 @@ class ClearancePolygon(Presented):
     relative_calibration : (n,) ndarray
         Standard uncertainty along the pads from the probes' certificates, relative; not in the standard errors, as in
         `PivotCurve`.
-    told : mapping of str to Channel
+    sensors : mapping of str to Channel
         Sensors that the sweep shows otherwise than stated, as they were read here, by name.
     as_read : tuple of (n,) ndarray, optional
-        Pushed clearances and fitted angles as the probes read them, where some are told.
+        Pushed clearances and fitted angles as the probes read them, where some are read otherwise.
     """
 
     run: str
@@ -100,7 +100,7 @@ class ClearancePolygon(Presented):
     temperature: float = np.nan
     status: Conditions = ()
     relative_calibration: FloatArray | float = 0.0
-    told: Channels = field(default_factory=dict, repr=False)
+    sensors: Channels = field(default_factory=dict, repr=False)
     as_read: tuple[FloatArray, FloatArray] | None = None
 
     def to_frame(self) -> pd.DataFrame:
@@ -191,9 +191,9 @@ def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotC
     witness, as_read = witness_of(run, angles), None
     if witness.channels:
         plain = _polygon(run, *_sides(run, angles, curves), angles)
-        run, as_read = told(run, witness.channels), (plain.clearance_pushed, plain.fitted_angle)
+        run, as_read = as_witnessed(run, witness.channels), (plain.clearance_pushed, plain.fitted_angle)
     contact, fit = _sides(run, angles, curves)
-    polygon = replace(_polygon(run, contact, fit, angles), told=witness.channels, as_read=as_read)
+    polygon = replace(_polygon(run, contact, fit, angles), sensors=witness.channels, as_read=as_read)
     # the push lies outside what the dry tests measured in most sweeps
     outside = [curve for curve in curves if curve.is_extrapolated(contact.push)]
     lowest = min((curve.valid_from for curve in outside), default=0.0)

@@ -79,8 +79,8 @@ def _untrusted_places(result: Identification) -> list[str]:
     for band in result.bands:  # where there are points, they say it
         serious = sentences(untrusted(band.quality))
         if not band.points and (serious or not band.lines):
-            why = "; ".join(serious) or "no line stands clear of the noise"
-            bad.append(f"{amount(band.point.static_load, 'load')}, {band.kind}: {why}")
+            reason = "; ".join(serious) or "no line stands clear of the noise"
+            bad.append(f"{amount(band.point.static_load, 'load')}, {band.kind}: {reason}")
     for p in result.points:
         serious = sentences(untrusted(p.quality))
         if serious or not math.isfinite(abs(p.stiffness.h.sum())):

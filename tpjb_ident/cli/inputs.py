@@ -46,14 +46,14 @@ def parse_values(text: str, dimension: str, option: str, is_positive: bool = Fal
     unit = ""
     for item in filter(str.strip, reversed(re.split(r"[,;]", text))):
         start, dots, end = item.partition("..")
-        where = f"{option}: the range {item.strip()!r}"
+        place = f"{option}: the range {item.strip()!r}"
         if dots and ":" not in end:
-            raise BadInputError(f'{where} has no step. Write from..to:step, for instance "2.5..8.75:1.25 kN".')
+            raise BadInputError(f'{place} has no step. Write from..to:step, for instance "2.5..8.75:1.25 kN".')
         quantities: list[float] = []
         for part in reversed([start, *end.split(":", 1)] if dots else [item]):
             quantity, unit = _quantity(part, unit, dimension, option)
             quantities.insert(0, quantity)
-        values[:0] = _range(quantities, where) if dots else quantities
+        values[:0] = _range(quantities, place) if dots else quantities
     if not values:
         raise BadInputError(f'{option}: is empty. Write, for instance, "5 {example_of(dimension)}".')
     if len(values) > MAX_VALUES:
@@ -78,15 +78,15 @@ def parse_share(text: str | None, option: str) -> float | None:
     return None if text is None else parse_value(text, "ratio", option, 0.0)
 
 
-def _range(quantities: Sequence[float], where: str) -> list[float]:
+def _range(quantities: Sequence[float], place: str) -> list[float]:
     start, stop, step = quantities
     steps = (stop - start) / step if step else -1.0
     if steps < 0:
         raise BadInputError(
-            f"{where} never reaches its end. Give a step that leads from the first to the second value."
+            f"{place} never reaches its end. Give a step that leads from the first to the second value."
         )
     if steps > MAX_VALUES:
-        raise BadInputError(f"{where} makes more than {MAX_VALUES} values. Take a larger step.")
+        raise BadInputError(f"{place} makes more than {MAX_VALUES} values. Take a larger step.")
     return [start + i * step for i in range(math.floor(steps + 1e-9) + 1)]
 
 

@@ -29,26 +29,26 @@ def choices(parameter: str) -> tuple[str, ...]:
 def option(command: str, parameter: str) -> ParameterInfo:
     """What can be typed for a parameter of a command."""
     row = _OPTIONS.get(f"{command} {parameter}") or _OPTIONS[parameter]
-    known = row["completes"].split()
-    about: dict[str, Any] = {"metavar": row["metavar"] or None, "help": row["help"].format(names=", ".join(known))}
+    candidates = row["completes"].split()
+    about: dict[str, Any] = {"metavar": row["metavar"] or None, "help": row["help"].format(names=", ".join(candidates))}
     about |= {end: json.loads(row[end]) for end in ("min", "max") if row[end]}
     if row["names"] == "argument":
         return Argument(**about)
-    if known:
-        about["autocompletion"] = lambda incomplete: [name for name in known if name.startswith(incomplete)]
+    if candidates:
+        about["autocompletion"] = lambda incomplete: [name for name in candidates if name.startswith(incomplete)]
     return Option(*row["names"].split(), **about)
 
 
-def refuse_unknown(value: str, known: Iterable[str], option: str) -> None:
+def refuse_unknown(value: str, candidates: Iterable[str], option: str) -> None:
     """Let a known name pass; answer another with the nearest."""
-    names = tuple(known)
+    names = tuple(candidates)
     if value not in names:
         raise BadInputError(f"{option}: {value!r} is not known. {hint(value, names, 'Use one of')}")
 
 
-def known_names(text: str, known: Iterable[str], option: str) -> tuple[str, ...]:
+def known_names(text: str, candidates: Iterable[str], option: str) -> tuple[str, ...]:
     """Names in a list with commas, each once; at least one."""
     names = tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip())) or ("",)
     for name in names:
-        refuse_unknown(name, known, option)
+        refuse_unknown(name, candidates, option)
     return names

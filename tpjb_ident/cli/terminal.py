@@ -152,10 +152,10 @@ class Terminal:
     @contextlib.contextmanager
     def conclusion(self, sentences: Sequence[str]) -> Iterator[None]:
         """Print the answer, what the block shows, and all else."""
-        answer, *more = sentences
+        answer, *tail = sentences
         self.print(answer)
         yield
-        for line in more:
+        for line in tail:
             self.print(line)
 
     @contextlib.contextmanager
@@ -175,8 +175,8 @@ class ProgressLines:
     With a time of its own between two lines, every step is reported as it comes.
     """
 
-    def __init__(self, activity: str, report: Callable[[str], None], every: float | None = None) -> None:
-        self._activity, self._report, self._every = activity, report, every
+    def __init__(self, activity: str, report: Callable[[str], None], interval: float | None = None) -> None:
+        self._activity, self._report, self._interval = activity, report, interval
         self._step, self._first = 0, 0
         self._began = self._last = time.monotonic()
 
@@ -188,7 +188,7 @@ class ProgressLines:
             self._began, self._first = now, done
         self._step = done
         is_counted = 0 < done < total
-        if now - self._last < (self._every or LINE_EVERY) or not (is_counted or self._every):
+        if now - self._last < (self._interval or LINE_EVERY) or not (is_counted or self._interval):
             return
         self._last = now
         if is_counted:
@@ -248,23 +248,23 @@ def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Co
     if _total(sizes) > width:  # headings break at spaces first
         longest = [max(column.split(), key=cell_len, default="") for column in columns]
         sizes = _sizes([longest, *rows])
-    beside = list(range(len(columns)))
-    while len(beside) > 1 and _total([sizes[i] for i in beside]) > width:
-        beside.remove(max([i for i in beside[1:] if i in words] or beside))
+    row_columns = list(range(len(columns)))
+    while len(row_columns) > 1 and _total([sizes[i] for i in row_columns]) > width:
+        row_columns.remove(max([i for i in row_columns[1:] if i in words] or row_columns))
 
     def line(texts: Sequence[str]) -> str:
         padded = []
-        for i, text in zip(beside, texts, strict=True):
+        for i, text in zip(row_columns, texts, strict=True):
             pad = " " * (sizes[i] - cell_len(text))
             padded.append(text + pad if i in words else pad + text)
         return _SPACE.join(padded).rstrip()
 
-    headings = [reversed(textwrap.wrap(columns[i], sizes[i] or 1, break_on_hyphens=False)) for i in beside]
+    headings = [reversed(textwrap.wrap(columns[i], sizes[i] or 1, break_on_hyphens=False)) for i in row_columns]
     lines = [line(texts) for texts in itertools.zip_longest(*headings, fillvalue="")][::-1]
-    lines.append("-" * min(width, _total([sizes[i] for i in beside])))
+    lines.append("-" * min(width, _total([sizes[i] for i in row_columns])))
     for row in rows:
-        lines.append(line([row[i] for i in beside]))
-        below = [i for i in range(len(columns)) if i not in beside and row[i].strip(" -")]
+        lines.append(line([row[i] for i in row_columns]))
+        below = [i for i in range(len(columns)) if i not in row_columns and row[i].strip(" -")]
         texts = [f"{columns[i]}: {row[i].strip()}".lstrip(": ") for i in below]
         if texts:
             lines += [f"    {part}" for part in wrapped("; ".join(texts), width - 4)]

@@ -70,8 +70,8 @@ def read_rows(path: Path) -> pd.DataFrame:
     rows["excitation_Hz"] = rows["excitation_Hz"].fillna(rows["shaft_speed_Hz"])
     rows["static_load_direction_deg"] = rows["static_load_direction_deg"].fillna(-90.0)
     low, high = (rows[ends[k::2]].to_numpy(float) for k in (0, 1))
-    stated = (high - low) / (2 * HALF_INTERVAL)  # our own tables have both: the interval holds calibration too
-    rows[ERRORS] = np.where(np.isnan(stated), rows[ERRORS], stated)
+    deviations = (high - low) / (2 * HALF_INTERVAL)  # our own tables have both: the interval holds calibration too
+    rows[ERRORS] = np.where(np.isnan(deviations), rows[ERRORS], deviations)
     flags = rows["quality"].where(rows["quality"] != "", rows["status"]).astype(object) + "; " + assumed
     rows["status"] = flags.map(_flags)
     rows["converged"] = rows["converged"].ne(False)
@@ -105,21 +105,21 @@ def described(rows: pd.DataFrame) -> list[str]:
     return texts
 
 
-def partners(rows: pd.DataFrame, others: pd.DataFrame, within: tuple[float, float, float]) -> IntArray:
+def partners(rows: pd.DataFrame, candidates: pd.DataFrame, within: tuple[float, float, float]) -> IntArray:
     """The nearest of other rows that is of the same operating point, for every row (n,); -1 where none is.
 
     `within` says how far two rows of one point may be apart: share of the load, direction [deg], share of the
     frequencies of shaft and excitation.
     """
     load, direction, frequency = within
-    if rows.empty or others.empty:
+    if rows.empty or candidates.empty:
         return np.full(len(rows), -1)
-    left, right = (frame[list(POINT_COLUMNS)].to_numpy(float) for frame in (rows, others))
-    apart = np.abs(right[None] - left[:, None])
-    apart[..., 1] = np.minimum(apart[..., 1] % 360.0, -apart[..., 1] % 360.0)
-    most = np.abs(left) * [load, 0.0, frequency, frequency] + [0.0, direction, 0.0, 0.0]
+    keys, candidate_keys = (frame[list(POINT_COLUMNS)].to_numpy(float) for frame in (rows, candidates))
+    gaps = np.abs(candidate_keys[None] - keys[:, None])
+    gaps[..., 1] = np.minimum(gaps[..., 1] % 360.0, -gaps[..., 1] % 360.0)
+    most = np.abs(keys) * [load, 0.0, frequency, frequency] + [0.0, direction, 0.0, 0.0]
     with np.errstate(invalid="ignore", divide="ignore"):  # a load or speed of zero has no share: equal or apart
-        distance = np.nan_to_num(apart / most[:, None], nan=0.0, posinf=np.inf).max(axis=2)
-    senses = [frame["rotation"].to_numpy(str) if "rotation" in frame else ROTATIONS[0] for frame in (rows, others)]
+        distance = np.nan_to_num(gaps / most[:, None], nan=0.0, posinf=np.inf).max(axis=2)
+    senses = [frame["rotation"].to_numpy(str) if "rotation" in frame else ROTATIONS[0] for frame in (rows, candidates)]
     distance = np.where(np.reshape(senses[0], (-1, 1)) != senses[1], np.inf, distance)
     return np.where(distance.min(axis=1) <= 1.0, distance.argmin(axis=1), -1)

@@ -237,13 +237,13 @@ def model_side(
     report("fitting pivot curves, clearance and locus", 0, 1)
     static = measure_static(campaign, bearing, "measured" in settings.variants)
     names, _ = possible_variants(settings.variants, static.curves, bearing)
-    wanted = list(dict.fromkeys([*points, *_stations(static)]))
+    targets = list(dict.fromkeys([*points, *_stations(static)]))
     predictions = {}
     for name in names:
         pivots = measured_laws(static.curves, len(bearing.pads), campaign.id) if name == "measured" else name
         model = ModelSettings(pivots, settings.thermal, settings.effects_with(name))
-        rows = predict_points(bearing, wanted, model, _labelled(report, f"predicting with {name} pivots"))
-        predictions[name] = pd.DataFrame(rows, index=pd.Index(wanted, tupleize_cols=False))
+        rows = predict_points(bearing, targets, model, _labelled(report, f"predicting with {name} pivots"))
+        predictions[name] = pd.DataFrame(rows, index=pd.Index(targets, tupleize_cols=False))
     return static, predictions
 
 

@@ -135,29 +135,29 @@ def _same_instrument(name: str, a: Side, b: Side) -> bool:
 
 def _alone(side: Side, used: IntArray) -> list[str]:
     alone = side.coefficients.drop(index=side.coefficients.index[used])
-    first, *others = described(alone) or [""]
-    return [f"{side.name}: {first}", *others] if first else []
+    first, *tail = described(alone) or [""]
+    return [f"{side.name}: {first}", *tail] if first else []
 
 
 def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.DataFrame:
     if not len(pairs):
         return pd.DataFrame()
-    left, right = (s.coefficients.iloc[pairs[:, k]].reset_index(drop=True) for k, s in enumerate((a, b)))
-    columns: dict[str, Any] = {name: left[name] for name in POINT_COLUMNS}
-    columns["rotation"] = left.get("rotation", ROTATIONS[0])  # a table that does not say means the usual one
+    frame_a, frame_b = (s.coefficients.iloc[pairs[:, k]].reset_index(drop=True) for k, s in enumerate((a, b)))
+    columns: dict[str, Any] = {name: frame_a[name] for name in POINT_COLUMNS}
+    columns["rotation"] = frame_a.get("rotation", ROTATIONS[0])  # a table that does not say means the usual one
     for name in ("static_load_measured_N", "quality"):
-        if name in left and name in right:
-            columns |= {f"{name}_a": left[name], f"{name}_b": right[name]}
+        if name in frame_a and name in frame_b:
+            columns |= {f"{name}_a": frame_a[name], f"{name}_b": frame_b[name]}
     common = np.zeros((len(pairs), 8))
     for parameter in shared:
         common += a.sensors[parameter][pairs[:, 0]] * b.sensors[parameter][pairs[:, 1]]
-    omega_squared = (2 * np.pi) ** 2 * (left["excitation_Hz"] * right["excitation_Hz"]).to_numpy(float)
+    omega_squared = (2 * np.pi) ** 2 * (frame_a["excitation_Hz"] * frame_b["excitation_Hz"]).to_numpy(float)
     common[:, 4:] /= omega_squared[:, None]
     for j, name in enumerate(COEFFICIENT_COLUMNS):
-        systematic = [frame.get(f"{name}_se_systematic", 0.0) ** 2 for frame in (left, right)]
-        none = _NO_CHANGE * _mean_direct(left, name)
-        columns |= _judged(name, (left, right), sum(systematic) - 2.0 * common[:, j], none, 8 * len(pairs))
-    flags = [frame.get("quality", pd.Series("", frame.index)) for frame in (left, right)]
+        systematic = [frame.get(f"{name}_se_systematic", 0.0) ** 2 for frame in (frame_a, frame_b)]
+        none = _NO_CHANGE * _mean_direct(frame_a, name)
+        columns |= _judged(name, (frame_a, frame_b), sum(systematic) - 2.0 * common[:, j], none, 8 * len(pairs))
+    flags = [frame.get("quality", pd.Series("", frame.index)) for frame in (frame_a, frame_b)]
     doubtful = (flags[0] + "; " + flags[1]).map(errors_in).astype(bool)
     for name in columns:
         if name.endswith("_changed"):
@@ -195,10 +195,10 @@ def _judged(
     columns: dict[str, Any] = {}
     for side, frame in zip("ab", frames, strict=True):
         columns |= {f"{name}_{side}{end}": frame[name + end] for end in _ENDS}
-    off = columns[f"{name}_b"] - columns[f"{name}_a"]
-    columns |= {f"{name}_difference": off, f"{name}_difference_lo": off - half, f"{name}_difference_hi": off + half}
-    verdict = np.where(off.abs() + half <= none, "no", "cannot tell")
-    return columns | {changed_column(name): np.where(off.abs() > sure, "yes", verdict)}
+    gap = columns[f"{name}_b"] - columns[f"{name}_a"]
+    columns |= {f"{name}_difference": gap, f"{name}_difference_lo": gap - half, f"{name}_difference_hi": gap + half}
+    verdict = np.where(gap.abs() + half <= none, "no", "cannot tell")
+    return columns | {changed_column(name): np.where(gap.abs() > sure, "yes", verdict)}
 
 
 def changed_column(name: str) -> str:
@@ -210,7 +210,7 @@ def _pivots(a: Side, b: Side) -> pd.DataFrame:
     """Tangent stiffness of every pad at loads that both curves were measured at."""
     if a.pivots is None or b.pivots is None:
         return pd.DataFrame()
-    same = a.campaign is not None and b.campaign is not None and a.campaign.channels == b.campaign.channels
+    is_one_rig = a.campaign is not None and b.campaign is not None and a.campaign.channels == b.campaign.channels
     curves = []
     for table in (a.pivots, b.pivots):
         sound = ~table["extrapolated"].astype(bool) & table["contact_complete"].astype(bool)
@@ -227,11 +227,11 @@ def _pivots(a: Side, b: Side) -> pd.DataFrame:
             tables.append(pd.DataFrame({"force_N": force, "pad": pad, **columns}))
     if not frames[0]:
         return pd.DataFrame()
-    left, right = (pd.concat(tables, ignore_index=True) for tables in frames)
-    before, after = left["systematic"], right["systematic"]
-    systematic = (after - before) ** 2 if same else before**2 + after**2
-    judged = _judged(TANGENT, (left, right), systematic, _NO_CHANGE * left[TANGENT], len(left))
-    return pd.DataFrame({"pad": left["pad"], "force_N": left["force_N"], **judged})
+    frame_a, frame_b = (pd.concat(tables, ignore_index=True) for tables in frames)
+    before, after = frame_a["systematic"], frame_b["systematic"]
+    systematic = (after - before) ** 2 if is_one_rig else before**2 + after**2
+    judged = _judged(TANGENT, (frame_a, frame_b), systematic, _NO_CHANGE * frame_a[TANGENT], len(frame_a))
+    return pd.DataFrame({"pad": frame_a["pad"], "force_N": frame_a["force_N"], **judged})
 
 
 def _clearance(a: Side, b: Side) -> pd.DataFrame:
@@ -267,8 +267,8 @@ def difference_sentences(difference: Difference) -> tuple[str, ...]:
             f"From {a.name} to {b.name} {yes} of {number} coefficients changed beyond what both intervals allow{most}."
         )
         unsure = f", of {number - yes - no} the records cannot tell" if number > yes + no else ""
-        same = f"{no} coefficients are the same within {100 * _NO_CHANGE:g} %"
-        sentences.append(f"At {counted(len(points), 'common operating point')}: {same}{unsure}.")
+        statement = f"{no} coefficients are the same within {100 * _NO_CHANGE:g} %"
+        sentences.append(f"At {counted(len(points), 'common operating point')}: {statement}{unsure}.")
     elif not (a.coefficients.empty and b.coefficients.empty):
         sentences.append(f"{a.name} and {b.name} have no operating point in common.")
     return (*sentences, *_sentences_beside(difference))

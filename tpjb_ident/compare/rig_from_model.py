@@ -44,8 +44,8 @@ def truth_of(setup: Setup, bearing_text: str = "") -> RigTruth:
         return solve(replace(point, excitation=0.0))
 
     def stiffness(point: OperatingPoint) -> ComplexArray:
-        seen = seen_by_shaft(setup, point.spin)
-        return bearing_impedance(seen, at(point).equilibrium, np.array([point.excitation]))[0]
+        shaft_setup = seen_by_shaft(setup, point.spin)
+        return bearing_impedance(shaft_setup, at(point).equilibrium, np.array([point.excitation]))[0]
 
     def position(point: OperatingPoint) -> FloatArray:
         # what stands in series with the bearing gives way under the static load too

@@ -66,8 +66,8 @@ def implausible_pivots(curves: Sequence[PivotCurve], formula: Formula | None) ->
     if not ratios:
         return []
     extent = " to ".join(dict.fromkeys(f"{end:.2g}" for end in (min(ratios.values()), max(ratios.values()))))
-    what = f"{extent} times as stiff as Kirk's formula: a unit or a sensitivity of cells or probes is wrong"
-    return [f"{', '.join(ratios)}: {what}, or it is another bearing's file"]
+    fault = f"{extent} times as stiff as Kirk's formula: a unit or a sensitivity of cells or probes is wrong"
+    return [f"{', '.join(ratios)}: {fault}, or it is another bearing's file"]
 
 
 def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Problem] = ()) -> list[Problem]:
@@ -107,6 +107,6 @@ def wrong_scale(run: Run, polygon: ClearancePolygon, bearing: Bearing) -> list[P
     if _SCALE[0] * drawn < measured < _SCALE[1] * drawn:
         return []
     channels = f"channels {' and '.join(channel.name for channel in run.of('displacement'))}"
-    what = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
+    fault = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
     cure = "Check the sensitivities of the probes, and whether it is this bearing's file"
-    return [Problem("error", run.file, channels, what, cure, run.id)]
+    return [Problem("error", run.file, channels, fault, cure, run.id)]

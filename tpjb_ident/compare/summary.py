@@ -40,12 +40,12 @@ def agreements(table: pd.DataFrame) -> pd.DataFrame:
     For every direct coefficient columns ``median`` and ``worst`` of predicted / measured - 1, the number of points
     ``n`` and of those ``inside`` the measured interval.
     """
-    off = table[[f"{column}_ratio" for column in DIRECT.values()]].set_axis(list(DIRECT), axis=1) - 1.0
+    deviations = table[[f"{column}_ratio" for column in DIRECT.values()]].set_axis(list(DIRECT), axis=1) - 1.0
     inside = {
         name: table[f"{column}_predicted"].between(table[f"{column}_lo"], table[f"{column}_hi"])
         for name, column in DIRECT.items()
     }
-    models = off.groupby(table["pivots"], sort=False)
+    models = deviations.groupby(table["pivots"], sort=False)
     columns = {
         "median": models.median(),
         "worst": models.agg(_largest),
@@ -55,9 +55,9 @@ def agreements(table: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(columns, axis=1)
 
 
-def _largest(off: pd.Series) -> float:
+def _largest(deviations: pd.Series) -> float:
     """What is farthest from zero."""
-    return max(off.dropna(), key=abs, default=math.nan)
+    return max(deviations.dropna(), key=abs, default=math.nan)
 
 
 def number_inside(agreement: pd.Series) -> str:
@@ -65,10 +65,10 @@ def number_inside(agreement: pd.Series) -> str:
     return f"{agreement['inside'].sum():.0f} of {agreement['n'].sum():.0f}"
 
 
-def closest(found: pd.DataFrame) -> pd.Series | None:
+def closest(agreement: pd.DataFrame) -> pd.Series | None:
     """The pivot model with the smallest mean size of its medians; None if nothing could be compared."""
-    sizes = found[["median"]].abs().mean(axis=1)
-    return found.T[sizes.idxmin()] if sizes.notna().any() else None
+    sizes = agreement[["median"]].abs().mean(axis=1)
+    return agreement.T[sizes.idxmin()] if sizes.notna().any() else None
 
 
 def is_off(agreement: pd.Series) -> bool:
@@ -119,14 +119,14 @@ def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
 
 def summary_sentences(comparison: Comparison) -> tuple[str, ...]:
     """Say what the comparison found, the answer first."""
-    found = agreements(comparison.table)
-    best = closest(found)
+    agreement = agreements(comparison.table)
+    best = closest(agreement)
     sentences = [_verdict_sentence(comparison, best), *_effects_sentences(comparison)]
     if best is not None:
         closest_words = f"The prediction comes closest with {_in_words(best.name)}: {_medians(best)}"
         sentences.append(f"{closest_words} (median over {best['n'].max():.0f} points).")
-        found = found.drop(index=best.name)
-    sentences += [f"With {_in_words(name)}: {_medians(row)}." for name, row in found.iterrows()]
+        agreement = agreement.drop(index=best.name)
+    sentences += [f"With {_in_words(name)}: {_medians(row)}." for name, row in agreement.iterrows()]
     sentences += _pivot_sentence(comparison) + _extrapolation_sentence(comparison)
     sentences += _clearance_sentence(comparison)
     loci = comparison.loci
@@ -161,11 +161,11 @@ def _extrapolation_sentence(comparison: Comparison) -> list[str]:
     points = comparison.predictions.get("measured")
     if points is None or not points["pivot_extrapolated"].any():
         return []
-    beyond = points[points["pivot_extrapolated"]]
-    largest = beyond.filter(regex=r"pad\d+_load_N").to_numpy().max()
+    overloads = points[points["pivot_extrapolated"]]
+    largest = overloads.filter(regex=r"pad\d+_load_N").to_numpy().max()
     tested = min(curve.valid_to for curve in comparison.curves)
     return [
-        f"At {len(beyond)} of {len(points)} points the measured pivots are extrapolated: pads press them with up to "
+        f"At {len(overloads)} of {len(points)} points the measured pivots are extrapolated: pads press them with up to "
         f"{amount(largest, 'load', '.3g')}, the dry tests went to {amount(tested, 'load', '.3g')}."
     ]
 
@@ -174,20 +174,20 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
     if comparison.clearance is None or comparison.bearing is None:
         return []
     drawn = np.array([pad.assembled_clearance for pad in comparison.bearing.pads])
-    off = comparison.clearance.clearance - drawn
-    if not np.isfinite(off).any():
+    gap = comparison.clearance.clearance - drawn
+    if not np.isfinite(gap).any():
         return []
-    pad = np.nanargmax(np.abs(off))
+    pad = np.nanargmax(np.abs(gap))
     digits, unit = 1 if size("length") < 1e-5 else 3, symbol("length")
-    mean, median, worst = (signed(v / size("length"), digits) for v in (np.nanmean(off), np.nanmedian(off), off[pad]))
+    mean, median, worst = (signed(v / size("length"), digits) for v in (np.nanmean(gap), np.nanmedian(gap), gap[pad]))
     status = comparison.clearance.status
     remarks = [f"The clearance sweep: {c.detail}." for c in status if c == "probe-gains-differ"]
     inseparable = [c.detail for c in status if c == "pads-not-separable"]
     if inseparable:
         first = f"The measured clearances differ from the drawing by {mean} {unit} on the mean; {inseparable[0]}."
         return [first, *remarks]
-    if abs(off[pad]) < _AS_DRAWN:
-        within = amount(abs(off[pad]), "length", ".1g")
+    if abs(gap[pad]) < _AS_DRAWN:
+        within = amount(abs(gap[pad]), "length", ".1g")
         return [f"The measured clearance is that of the drawing, within {within} at every pad.", *remarks]
     return [
         *remarks,

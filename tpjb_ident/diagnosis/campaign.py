@@ -215,12 +215,12 @@ def _sensor_positions(campaign: Campaign, bearing: Bearing) -> tuple[float, ...]
 
 def _instruments(campaign: Campaign, identification: Identification) -> Instruments:
     """The rig's housing mass, cell stiffness and probe axes; what the campaign does not show stays as assumed."""
-    known: dict[str, Any] = {}
+    measured: dict[str, Any] = {}
     axes = [float(c.axis) for c in campaign.channels.values() if c.quantity == "displacement" and c.axis is not None]
     if len(axes) == 2 and abs(math.sin(axes[0] - axes[1])) > 0.05:
-        known["probe_axes"] = tuple(axes)
+        measured["probe_axes"] = tuple(axes)
     if math.isfinite(campaign.housing_mass):
-        known["housing_mass"] = campaign.housing_mass
+        measured["housing_mass"] = campaign.housing_mass
     if identification.cell_stiffness is not None:
-        known["cell_stiffness"] = identification.cell_stiffness
-    return Instruments(**known)
+        measured["cell_stiffness"] = identification.cell_stiffness
+    return Instruments(**measured)

@@ -145,8 +145,8 @@ def points_of(given: Mapping[str, Any]) -> list[OperatingPoint]:
             raise ArgumentError(f"points: {name} is missing. Give load, speed and excitation.")
         value = given.get(name, -math.pi / 2)
         lists[name] = np.atleast_1d(np.asarray(to_si(value, dimension, f"points: {name}"), dtype=float)).tolist()
-    every = itertools.product(*lists.values())
-    return [OperatingPoint(load, angle, speed, line) for load, angle, speed, line in every]
+    combinations = itertools.product(*lists.values())
+    return [OperatingPoint(load, angle, speed, line) for load, angle, speed, line in combinations]
 
 
 def planned_layout(bearing: Bearing, points: Sequence[OperatingPoint], static: tuple[int, bool, float, bool]) -> Layout:

@@ -176,13 +176,13 @@ def grown(setup: Setup) -> Setup:
 
 
 def _dry(layout: Layout, pads: int) -> list[Design]:
-    every = range(1, pads + 1)
-    missing = [k for k in every if k not in {d.pad for d in layout.dry}]
+    numbers = range(1, pads + 1)
+    missing = [k for k in numbers if k not in {d.pad for d in layout.dry}]
     if missing:
         return [
             Design(f"a dry load-deflection test on pad #{k}, 0.5-5 kN", Layout((), dry=dry([k]))) for k in missing
         ]  # fmt: skip
-    return [Design("the dry tests repeated up to 8 kN on all pads", Layout((), dry=dry(every, (2e3, 5e3, 7.6e3))))]
+    return [Design("the dry tests repeated up to 8 kN on all pads", Layout((), dry=dry(numbers, (2e3, 5e3, 7.6e3))))]
 
 
 def reversible(setup: Setup) -> bool:
@@ -250,17 +250,17 @@ def together(tests: Sequence[Separation]) -> float:
     return float(np.linalg.norm([t.each for t in tests], axis=0).min())
 
 
-def say(best: Sequence[Separation], one: str, *rivals: str) -> str:
+def say(best: Sequence[Separation], first: str, *rivals: str) -> str:
     """In words: what `suggested` gives, and what it is expected to tell."""
     names = f"{', '.join(rivals[:-1])} and {rivals[-1]}" if len(rivals) > 1 else rivals[0]
     words, expected = " and ".join(t.design.words for t in best), together(best)
     if expected < Deciding.visible:
         return (
-            f"nothing on the list separates {one} from {names} (best: {words}, {expected:.1f} standard deviations); "
+            f"nothing on the list separates {first} from {names} (best: {words}, {expected:.1f} standard deviations); "
             "a change of hardware would, such as another oil or another bearing on the same rig"
         )
     least = "at least " if len(rivals) > 1 else ""
-    return f"{words}: expected to separate {one} from {names} by {least}{expected:.0f} standard deviations"
+    return f"{words}: expected to separate {first} from {names} by {least}{expected:.0f} standard deviations"
 
 
 @dataclass(frozen=True)

@@ -87,8 +87,8 @@ class CampaignPlan:
 
         rows = []
         for i, c in enumerate(self.candidates):
-            apart = zip(self.candidates, self.separation[i], strict=True)
-            like = [other.label for other, distance in apart if distance < Deciding.visible]
+            distances = zip(self.candidates, self.separation[i], strict=True)
+            like = [candidate.label for candidate, distance in distances if distance < Deciding.visible]
             end, (low,), (high,) = c.neutral + self.floor[i], *c.limits
             rows.append(
                 {
@@ -123,9 +123,9 @@ class _Signatures:
         # rows of a Cholesky factor have the covariance of those elements
         lower = np.asarray(np.linalg.qr(factor[rows].T, mode="r")).T
         white = np.asarray(np.linalg.solve(lower, self.columns[rows]))
-        apart = separations(white)
-        np.fill_diagonal(apart, np.nan)
-        return CampaignPlan(self.candidates, np.linalg.norm(white, axis=0), apart)
+        distance = separations(white)
+        np.fill_diagonal(distance, np.nan)
+        return CampaignPlan(self.candidates, np.linalg.norm(white, axis=0), distance)
 
 
 def _shown(setup: Setup, layout: Layout) -> _Signatures:

@@ -119,14 +119,14 @@ def export(
 
 def _write(target: Path, rows: pd.DataFrame, to: str, source: str, options: dict[str, int]) -> None:
     """Write rows in one form; intervals, and a table in US units, beside it."""
-    beside = writers.NAME
+    table_name = writers.NAME
     if to in ROTOR_PROGRAMS:
-        beside = writers.INTERVALS
+        table_name = writers.INTERVALS
         rows = turning_counter_clockwise(rows)
-        writers.write_csv(target, rows, "", beside)
+        writers.write_csv(target, rows, "", table_name)
     getattr(writers, f"write_{to}")(target, rows, source, **options)
     if in_us_units():
-        writers.write_us(target, rows, beside)
+        writers.write_us(target, rows, table_name)
 
 
 def _ross_options(to: str, version: int | None) -> dict[str, int]:

@@ -34,26 +34,26 @@ _ROUNDS = 4
 def without_creep(
     records: Sequence[DryRecord], noise: NoiseModel
 ) -> tuple[list[DryRecord], NoiseModel, dict[int, Conditions]]:
-    """Records less the creep that all holds show alike, else those of a pad; their noise, and conditions by pad.
+    """Records less the creep that the holds of a pad show, else those of all alike; their noise, conditions by pad.
 
     Without creep they are given back as they are.
     """
     less = list(records)
-    found: dict[int, Conditions] = {record.pad: () for record in records}
+    conditions: dict[int, Conditions] = {record.pad: () for record in records}
     for least, most in ((_ALONE, 0.0), (_BESIDE, 0.0), (_AMONG, 0.5)):
-        if sum(map(bool, found.values())) < most * len(found):
+        if sum(map(bool, conditions.values())) < most * len(conditions):
             break
-        for pad in [pad for pad, condition in found.items() if not condition]:
+        for pad in [pad for pad, condition in conditions.items() if not condition]:
             own = [record for record in less if record.pad == pad]
             if _less_alike(own, noise, _OF_ONE, 0.5 * least)[2]:  # hardly any is none
                 others = [record for record in less if record.pad != pad]  # whose noise no creep of this pad is part of
-                own, _, found[pad] = _less_alike(own, pooled_noise(others) if others else noise, _OF_ONE, least)
+                own, _, conditions[pad] = _less_alike(own, pooled_noise(others) if others else noise, _OF_ONE, least)
                 crept = iter(own)
                 less = [next(crept) if record.pad == pad else record for record in less]
-        if not any(found.values()):
+        if not any(conditions.values()):
             less, noise, shared = _less_alike(records, noise, _PLAUSIBLE, _LEAST)
-            return less, noise, dict.fromkeys(found, shared)
-    return less, pooled_noise(less), found
+            return less, noise, dict.fromkeys(conditions, shared)
+    return less, pooled_noise(less), conditions
 
 
 def _less_alike(

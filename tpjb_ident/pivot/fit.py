@@ -45,7 +45,7 @@ from tpjb_ident.pivot.refusals import (
     structure_behind,
     usable_runs,
 )
-from tpjb_ident.pivot.sweep_witness import SweepWitness, sweep_witness, told
+from tpjb_ident.pivot.sweep_witness import SweepWitness, as_witnessed, sweep_witness
 
 CONTACT_TOLERANCE = 0.05  # of the compliance: what incomplete contact may add where contact counts as complete
 _ANGLE_WARNING = math.radians(4.0)
@@ -124,7 +124,7 @@ def _read(
         if run.pad is None or not 1 <= run.pad <= len(angles):
             what = f"names pad {run.pad}, the bearing has pads 1 to {len(angles)}"
             raise refusal(run, "pad", what, "Correct the manifest")
-        return read_dry_run(told(run, witness.channels) if witness else run, float(angles[run.pad - 1]))
+        return read_dry_run(as_witnessed(run, witness.channels) if witness else run, float(angles[run.pad - 1]))
 
     return usable_runs(runs, read)
 

@@ -154,7 +154,7 @@ def _starts(record: DryRecord) -> tuple[float, float]:
     return deflection[np.argmin(load)], np.polyfit(load[upper], deflection[upper], 1)[1]
 
 
-def told(run: Run, channels: Channels) -> Run:
+def as_witnessed(run: Run, channels: Channels) -> Run:
     """A run whose channels are read as a sweep shows them."""
     known = {name: channels.get(name, stated) for name, stated in run.channels.items()}
     return replace(run, channels=known) if channels else run
@@ -216,5 +216,5 @@ def witness_of(run: Run, angles: FloatArray) -> SweepWitness:
             more = f"read {abs(share):.1f} % {'more' if share > 0.0 else 'less'} than"
             text = f"{evidence} as if {pair[0].name} {more} {pair[1].name}; half of it is taken off each"
             conditions.append(Condition(of_gain, text))
-    place = slow_samples(told(run, channels))[2] if channels else place
+    place = slow_samples(as_witnessed(run, channels))[2] if channels else place
     return SweepWitness(errors, channels, tuple(conditions), place[good], probes_of(run))

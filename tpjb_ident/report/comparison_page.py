@@ -184,8 +184,8 @@ def _flag_table(flagged: Sequence[tuple[str, Condition]]) -> Table:
         places[flag].append((place, flag.detail))
     rows = []
     for flag, occurrences in places.items():
-        where, details = zip(*occurrences, strict=True)
-        rows.append([flag, flag.meaning, "; ".join(where), "; ".join(filter(None, dict.fromkeys(details)))])
+        points, details = zip(*occurrences, strict=True)
+        rows.append([flag, flag.meaning, "; ".join(points), "; ".join(filter(None, dict.fromkeys(details)))])
     return Table("Flags", columns, rows)
 
 

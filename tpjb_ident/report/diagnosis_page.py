@@ -194,12 +194,12 @@ def write_diagnosis_report(
 
 
 def _gap_table(verdict: Verdict) -> Table:
-    rows = [
-        [words, fixed(verdict.gap.get(name, math.nan), 2)]
-        for name, words in _GAPS.items()
-        # where nothing was added, both are the same
-        if (verdict.effects or not name.endswith("after")) and (name in verdict.gap or not name.startswith("touched"))
-    ]
+    rows = []
+    for name, words in _GAPS.items():
+        if name.endswith("after") and not verdict.effects:
+            continue  # where nothing was added, both are the same
+        if name in verdict.gap or not name.startswith("touched"):
+            rows.append([words, fixed(verdict.gap.get(name, math.nan), 2)])
     return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows)
 
 
@@ -290,17 +290,16 @@ def _evidence_sections(verdict: Verdict) -> list[Section]:
     table = Table("Stated tolerances", columns, [_row(a) for a in verdict.assumptions])
     remainder = verdict.remainder
     share = f"{100 * remainder.share:.1f} % of the squared gap above noise, most in {in_words(remainder.where)}"
-    left = (
+    sentence = (
         f"On points that no fit has seen, with all that has a tolerance free within it, {remainder.sigma:.2f} sigma "
         f"are left: {share if remainder.share >= _LEFT else 'no more than noise'}; against noise and stated "
         f"tolerances p = {remainder.p:.2g}."
     )
-    return [Section("What is left", [left]), Section("What may be off", [note], tables=[table])]
+    return [Section("What is left", [sentence]), Section("What may be off", [note], tables=[table])]
 
 
 def _row(tolerance: Assumption) -> list[str]:
     """A tolerance in the units that people read; a ratio in per cent."""
     unit, scale = shown_unit(tolerance.unit)
-    far = signed(tolerance.deviation) if tolerance.deviation else ""
-    stated = f"{tolerance.stated / scale:.3g} {unit}"
-    return [label_in_words(tolerance.name), stated, tolerance.source, _fitted(tolerance), far]
+    words = [label_in_words(tolerance.name), f"{tolerance.stated / scale:.3g} {unit}", tolerance.source]
+    return [*words, _fitted(tolerance), signed(tolerance.deviation) if tolerance.deviation else ""]

@@ -273,7 +273,7 @@ def position_panels(
     drawn: tuple[FloatArray, FloatArray],
     measured: Locus | None,
     predicted: Mapping[str, FloatArray],
-    others: Sequence[ClearancePolygon] = (),
+    sweeps: Sequence[ClearancePolygon] = (),
 ) -> list[Panel]:
     """Draw polygon and locus in one square panel.
 
@@ -281,7 +281,7 @@ def position_panels(
     """
     if polygon is None and measured is None:
         return []
-    polygons = {} if polygon is None else {"measured": polygon} | {f"run {p.run}": p for p in others}
+    polygons = {} if polygon is None else {"measured": polygon} | {f"run {p.run}": p for p in sweeps}
     figure = functools.partial(clearance_and_locus, polygons, measured, predicted, drawing=drawn)
     return [Panel("locus-and-clearance", "Shaft centre locus inside the clearance polygon", figure)]
 

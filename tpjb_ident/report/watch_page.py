@@ -100,11 +100,10 @@ def points_table(points: Sequence[PointResult]) -> Table:
     """K and C of every point so far, with intervals and flags."""
     rows = []
     for p in points:
-        why, solved = lacking(p), p.stiffness.cells()
-        cells = ["–" if why else solved[i] for i in (0, 3, 4, 7)]
-        flags = why or ", ".join(q.sentence() for q in p.quality)
+        reason, solved = lacking(p), p.stiffness.cells()
+        cells = ["–" if reason else solved[i] for i in (0, 3, 4, 7)]
         place = [f"{p.point.static_load / size('load'):.6g}", f"{p.point.excitation_hz:g}", str(p.n_records)]
-        rows.append([*place, *cells, flags])
+        rows.append([*place, *cells, reason or ", ".join(q.sentence() for q in p.quality)])
     direct = [f"{name}, {symbol('stiffness' if name[0] == 'k' else 'damping')}" for name in DIRECT]
     columns = [f"load, {symbol('load')}", "excitation, Hz", "records", *direct, "flags"]
     return Table("Direct coefficients so far, 95 % intervals", columns, rows)
@@ -112,11 +111,12 @@ def points_table(points: Sequence[PointResult]) -> Table:
 
 def records_table(snapshot: Snapshot, runs: Collection[str]) -> Table:
     """Records of some runs that have landed, the newest first."""
-    why = {placed.run.id: placed.why for placed in snapshot.placed if placed.run is not None}
+    reasons = {placed.run.id: placed.why for placed in snapshot.placed if placed.run is not None}
     landed = sorted((s for s in snapshot.states if s.landed and s.run.id in runs), key=lambda s: s.landed, reverse=True)
     rows = []
     for s in landed:
         remarks = [located(f.problem) for f in s.findings if f.problem.severity != "note"][:3]
-        remarks += [f"not in the manifest; {why[s.run.id]}"] if s.run.id in why else []
+        if s.run.id in reasons:
+            remarks.append(f"not in the manifest; {reasons[s.run.id]}")
         rows.append([s.landed[11:19], s.run.id, described(s.run), _WORDS.get(s.state, s.state), "; ".join(remarks)])
     return Table("Newest first", ["time", "run", "set points", "verdict", "why"], rows)

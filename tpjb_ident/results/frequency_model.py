@@ -237,8 +237,8 @@ def with_frequency_outliers(points: Sequence[PointResult]) -> tuple[PointResult,
         if outlier is not None:
             k, distance = outlier
             share = np.linalg.norm(distance) / np.linalg.norm(points[places[k]].stiffness.h)
-            others = f"the other {len(places) - 1} frequencies of this load"
-            doubt = Condition("frequency-outlier", f"h is {100 * share:.0f} % from what {others} let expect")
+            neighbours = f"the other {len(places) - 1} frequencies of this load"
+            doubt = Condition("frequency-outlier", f"h is {100 * share:.0f} % from what {neighbours} let expect")
             result[places[k]] = _widened(points[places[k]], CHANGE_AS_DEVIATION * distance, doubt)
     return tuple(result)
 
@@ -264,14 +264,14 @@ def frequency_outlier(estimates: Sequence[DynamicStiffness]) -> tuple[int, Float
     noise = sum(np.trace(e.covariance) / s**2 for e, s in zip(estimates, size))
     w = omega / np.exp(np.log(omega).mean())
     smooth = np.sum(remainder(power_columns(w, _SMOOTH), y, root, slice(None)) ** 2) + noise
-    distance, rest = np.zeros((len(w), NUMBERS)), np.full(len(w), np.inf)
+    distance, misfit = np.zeros((len(w), NUMBERS)), np.full(len(w), np.inf)
     for k in range(len(w)):
-        others = np.arange(len(w)) != k
-        if np.abs(w[others] - w[k]).min() > _REACH * np.ptp(w[others]):
+        neighbours = np.arange(len(w)) != k
+        if np.abs(w[neighbours] - w[k]).min() > _REACH * np.ptp(w[neighbours]):
             continue  # the others are too far off to tell
-        left = remainder(power_columns(w, MODELS["K-C-M"]), y, root, others)[:, :, 0]
-        distance[k], rest[k] = left[k], np.sum(left[others] ** 2) + noise
-    place, second = np.argsort(rest)[:2].tolist()
-    is_clear = _CLEARLY * rest[place] < smooth and _ALONE * rest[place] < rest[second]
+        residuals = remainder(power_columns(w, MODELS["K-C-M"]), y, root, neighbours)[:, :, 0]
+        distance[k], misfit[k] = residuals[k], np.sum(residuals[neighbours] ** 2) + noise
+    place, second = np.argsort(misfit)[:2].tolist()
+    is_clear = _CLEARLY * misfit[place] < smooth and _ALONE * misfit[place] < misfit[second]
     is_apart = np.linalg.norm(distance[place]) > _NOTABLE and is_clear
     return (place, distance[place] * size[place]) if is_apart else None

@@ -154,8 +154,8 @@ class Identification(Presented):
             for condition in quality:
                 places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
         for name, listed in places.items():
-            more = f" (and at {counted(len(listed) - 1, 'more point')})" if listed[1:] else ""
-            remarks.append(f"{name} at {listed[0]}{more}")
+            addition = f" (and at {counted(len(listed) - 1, 'more point')})" if listed[1:] else ""
+            remarks.append(f"{name} at {listed[0]}{addition}")
         return tuple(remarks)
 
 

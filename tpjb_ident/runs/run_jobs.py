@@ -198,17 +198,17 @@ def all_runs(
     """What every dynamic run says; one that cannot be used is left out and named."""
     runs = campaign.of_kind("dynamic")
     progress(runs[0].id if runs else "", 0, len(runs))
-    jobs, kept = [], []
+    jobs, former_results = [], []
     for run in runs:  # workers may stand in another folder
         reader: Any = run.reader
         if not reader.path.is_absolute():
             reader = replace(reader, path=reader.path.absolute())
-        known, former = (None, None) if store is None else store.load(run)
-        jobs.append((replace(run, reader=reader), settings, known))
-        kept.append(former)
+        old_mark, former = (None, None) if store is None else store.load(run)
+        jobs.append((replace(run, reader=reader), settings, old_mark))
+        former_results.append(former)
     finished: list[Any] = []
     results = (workers or Workers()).map(process_run, jobs)
-    for run, former, (mark, result) in zip(runs, kept, results, strict=True):
+    for run, former, (mark, result) in zip(runs, former_results, results, strict=True):
         if store is not None and mark and isinstance(result, RunDigest):
             store.keep(mark, result)
         finished.append(result or former)
@@ -228,18 +228,18 @@ def _dead_accelerometers(digests: Sequence[RunDigest]) -> dict[str, Problem]:
     return dead if 2 * len(dead) < len(digests) else {}
 
 
-def process_run(run: Run, settings: PhasorSettings, known: str | None) -> tuple[str, RunDigest | ExcludedRun | None]:
-    """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
+def process_run(run: Run, settings: PhasorSettings, old_mark: str | None) -> tuple[str, RunDigest | ExcludedRun | None]:
+    """Fingerprint of a run, and its result unless the fingerprint is `old_mark`.
 
     The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
-    is kept anywhere (`known` is None) it is not asked for.
+    is kept anywhere (`old_mark` is None) it is not asked for.
     """
     try:
-        if known is None:
+        if old_mark is None:
             return "", one_run(run, settings)
         with run.opened():  # once for both
             mark = fingerprint(run, settings)
-            if mark and mark == known:
+            if mark and mark == old_mark:
                 return mark, None
             before = file_state(run.reader.path)
             result = one_run(run, settings)
@@ -348,8 +348,8 @@ def _sentence(problems: list[Problem]) -> str:
     """The first finding; how many more there are."""
     different = list(dict.fromkeys(f"{p.place} {p.what}".strip() for p in problems))
     first = f"{problems[0].run}: {different[0]}" if problems[0].run else different[0]
-    more = f"; and {len(different) - 1} more (see tpjb check)" if len(different) > 1 else ""
-    return f"{first}{more}. {problems[0].cure}"
+    addition = f"; and {len(different) - 1} more (see tpjb check)" if len(different) > 1 else ""
+    return f"{first}{addition}. {problems[0].cure}"
 
 
 @dataclass(frozen=True, repr=False)

@@ -87,9 +87,9 @@ def missed_load(misses: ComplexArray, members: Sequence[int]) -> complex:
 
 def static_loads(campaign: Campaign, points: Sequence[RunsOfPoint]) -> StaticLoads:
     """Zero of the cells, and the misses of all runs of a campaign's points."""
-    stated = max((c.zero_uncertainty for c in campaign.channels.values() if c.quantity == "force"), default=0.0)
+    uncertainty = max((c.zero_uncertainty for c in campaign.channels.values() if c.quantity == "force"), default=0.0)
     set_points = np.concatenate([np.full(len(data.mean_loads), _set_point(data)) for data in points])
-    zero, error = cell_zero(np.concatenate([data.mean_loads for data in points]), set_points, stated)
+    zero, error = cell_zero(np.concatenate([data.mean_loads for data in points]), set_points, uncertainty)
     return StaticLoads(*load_misses(points, zero), zero, error)
 
 
@@ -133,12 +133,12 @@ def load_conditions(miss: ComplexArray, common: complex) -> Conditions:
 
     `miss` (n,): of a point's runs.
     """
-    off, aside = (float(np.abs(part).max(initial=0.0)) for part in (miss.real, miss.imag))
+    error, aside = (float(np.abs(part).max(initial=0.0)) for part in (miss.real, miss.imag))
     size, turn = abs(common), float(np.angle(common))
     is_gain = _CONTRADICTS[0] <= size <= _CONTRADICTS[1] and abs(turn) <= _CONTRADICTS_TURN
     text = f"the static load by the cells is {size:.3g} times its set point and points {np.degrees(turn):+.1f} deg away"
     return holding(
-        (off > MAX_MISS, "static-load-off", f"a run's measured static load is {100 * off:.1f} % off its set point"),
+        (error > MAX_MISS, "static-load-off", f"a run's measured static load is {100 * error:.1f} % off its set point"),
         (
             not size,
             "no-static-force",

@@ -44,15 +44,15 @@ def compared(first: Path, second: Path, file: str, tolerance: float) -> Differen
     before, now = (dict(_values(_content(path))) for path in (old, new))
     if "" in before:  # no values with places
         return Difference(file, "not judged")
-    size, where = 0.0, ""
+    size, change = 0.0, ""
     for place in before | now:
         a, b = before.get(place), now.get(place)
         base = place.removesuffix("_lo").removesuffix("_hi")
         low, high = before.get(f"{base}_lo"), before.get(f"{base}_hi")
         half = 0.5 * (high - low) if isinstance(low, float) and isinstance(high, float) else 0.0
-        if (off := _off(a, b, half if math.isfinite(half) else 0.0)) > size:
-            size, where = off, f"{place}: {_shown(a)}, now {_shown(b)}"
-    return Difference(file, "differs" if size > tolerance else "numbers", size, where)
+        if (deviation := _deviation(a, b, half if math.isfinite(half) else 0.0)) > size:
+            size, change = deviation, f"{place}: {_shown(a)}, now {_shown(b)}"
+    return Difference(file, "differs" if size > tolerance else "numbers", size, change)
 
 
 def _content(path: Path) -> Any:
@@ -75,14 +75,14 @@ def _values(content: Any, place: str = "") -> Iterator[tuple[str, Any]]:
             yield from _values(value, f"{place}.{key}".lstrip("."))
 
 
-def _off(a: object, b: object, width: float) -> float:
+def _deviation(a: object, b: object, width: float) -> float:
     """Difference of two values over their size or, where that is larger, half the width of their interval."""
     if not (isinstance(a, int | float) and isinstance(b, int | float) and bool not in (type(a), type(b))):
         return 0.0 if (a, type(a)) == (b, type(b)) else math.inf
     if a == b or (math.isnan(a) and math.isnan(b)):
         return 0.0
-    off = abs(a - b) / max(abs(a), abs(b), width, _LEAST_SCALE)
-    return off if math.isfinite(off) else math.inf
+    deviation = abs(a - b) / max(abs(a), abs(b), width, _LEAST_SCALE)
+    return deviation if math.isfinite(deviation) else math.inf
 
 
 def _shown(value: object) -> str:

@@ -310,9 +310,9 @@ def _refuse_other_versions(client: Any, address: str, patience: float) -> None:
         ) from error
     ours = versions()
     for worker, theirs in installed.items():
-        others = [f"{name} {theirs[name]} (here {ours[name]})" for name in _SAME if theirs[name] != ours[name]]
-        if others:
-            raise ClusterError(f"worker {worker} has {', '.join(others)}. Install the same versions on all machines")
+        conflicts = [f"{name} {theirs[name]} (here {ours[name]})" for name in _SAME if theirs[name] != ours[name]]
+        if conflicts:
+            raise ClusterError(f"worker {worker} has {', '.join(conflicts)}. Install the same versions on all machines")
 
 
 def _reason(error: Exception) -> str:

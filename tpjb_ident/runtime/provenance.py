@@ -86,11 +86,11 @@ def read_document(path: Path, kind: str) -> Document:
         document = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise BadInputError(f"{path}: cannot be read as JSON ({error}). {remedy}.") from error
-    stated = document.get("schema") if isinstance(document, dict) else None
+    version = document.get("schema") if isinstance(document, dict) else None
     steps = _STEPS[kind]
     versions = [f"{kind}/{number}" for number in range(1, len(steps) + 2)]
-    if stated not in versions:
-        raise BadInputError(f"{path}: its schema is {str(stated)[:40]!r}. {remedy} and what is older.")
-    for step in steps[versions.index(stated) :]:
+    if version not in versions:
+        raise BadInputError(f"{path}: its schema is {str(version)[:40]!r}. {remedy} and what is older.")
+    for step in steps[versions.index(version) :]:
         document = step(document)
     return dict(document)

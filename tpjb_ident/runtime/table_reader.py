@@ -46,15 +46,15 @@ class _Header(NamedTuple):
 
     name: str
     size: float
-    known: Column | None
+    definition: Column | None
     ending: str
 
     def value(self, cell: str) -> object:
         """Text, truth value or number of a cell, in SI."""
-        known = self.known
-        if known is None or known.quantity == "text":
+        definition = self.definition
+        if definition is None or definition.quantity == "text":
             return cell
-        words = _WORDS.get(known.quantity, {})
+        words = _WORDS.get(definition.quantity, {})
         if words and cell not in words:
             names = " or ".join(filter(None, words))
             raise ValueError(f"{cell[:40]!r} is not known. Write {names}, or leave the cell empty.")
@@ -62,14 +62,14 @@ class _Header(NamedTuple):
             return words[cell]
         if cell in _NOTHING:
             return math.nan
-        if cell in _INFINITE and known.may_be_infinite(self.ending):
+        if cell in _INFINITE and definition.may_be_infinite(self.ending):
             return _INFINITE[cell]
         number = float(cell) if _NUMBER.fullmatch(cell) else math.nan
         if not math.isfinite(number):
             is_comma = _NUMBER.fullmatch(cell.replace(",", "."))
             remedy = "Write a decimal point" if is_comma else "Leave the cell empty where nothing is known"
             raise ValueError(f"{cell[:40]!r} is no number. {remedy}.")
-        least = known.least(self.ending)
+        least = definition.least(self.ending)
         if number < least:
             raise ValueError(f"{cell[:40]} is below {least:g}, the least that it can be. Correct the cell.")
         return self.size * number
@@ -92,7 +92,7 @@ def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str]
             hint = f"; {near!r} is not it" if near else ""
             raise BadInputError(f"{path.name}: column {name} is missing{hint}. Add it.")
     for column in header:
-        if misspelt is not None and column.known is None and misspelt.fullmatch(column.name):
+        if misspelt is not None and column.definition is None and misspelt.fullmatch(column.name):
             coefficients = [name + ending for name in COEFFICIENT_COLUMNS for ending in ("", "_se", "_lo", "_hi")]
             near = nearest_name(column.name, coefficients)
             raise BadInputError(f"{path.name}: column {column.name!r} is no coefficient. Did you mean {near}?")

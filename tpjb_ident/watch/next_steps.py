@@ -118,7 +118,7 @@ def next_steps(
         *stop,
         *_repeats([s for s in states if s.run.id not in stopped], at),
         *repairs,
-        *_more(states, points, within),
+        *_precision_steps(states, points, within),
         *_next(states, at),
     ]
 
@@ -145,8 +145,8 @@ def lacking(point: PointResult) -> str:
         return ""
     if point.n_records == 1:
         return "no K and C yet: they take a second record, excited in another direction"
-    why = "; ".join(q.sentence() for q in point.quality) or "the records do not determine them"
-    return f"no K and C from {point.n_records} records: {why}"
+    reason = "; ".join(q.sentence() for q in point.quality) or "the records do not determine them"
+    return f"no K and C from {point.n_records} records: {reason}"
 
 
 def located(problem: Problem) -> str:
@@ -189,7 +189,7 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
     return [step for _, step in sorted(steps, key=lambda pair: pair[0])]
 
 
-def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: float | None) -> list[Step]:
+def _precision_steps(states: Sequence[RunStatus], points: Sequence[PointResult], within: float | None) -> list[Step]:
     """Points that are measured as planned and still not as sure as wanted."""
     if within is None:
         return []
@@ -199,9 +199,9 @@ def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: fl
         direct, solved = list(_DIRECT.values()), point.stiffness
         mean = np.repeat(np.abs(solved.vector[direct]).reshape(2, 2).mean(axis=1), 2)
         # what is not known at all is told elsewhere
-        known = np.nan_to_num(solved.half_width()[direct] / mean, nan=-1.0, posinf=-1.0)
-        worst = known.argmax()
-        widest, name = known[worst], list(_DIRECT)[worst]
+        widths = np.nan_to_num(solved.half_width()[direct] / mean, nan=-1.0, posinf=-1.0)
+        worst = widths.argmax()
+        widest, name = widths[worst], list(_DIRECT)[worst]
         random_alone = (solved.half_width(systematic=False)[direct] / mean)[worst]
         if point.point in unfinished or not widest > within:
             continue
@@ -211,8 +211,8 @@ def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: fl
         if random_allowed <= 0.25 * within**2:
             steps.append(Step("more", f"{share}; calibration sets that, more records do not help."))
         else:
-            more = math.ceil(point.n_records * (random_alone**2 / random_allowed - 1.0))
-            many = f"about {counted(more, 'more record')} like those there would do"
+            count = math.ceil(point.n_records * (random_alone**2 / random_allowed - 1.0))
+            many = f"about {counted(count, 'more record')} like those there would do"
             steps.append(Step("more", f"{share}; {many}.", point.runs))
     return steps
 
@@ -226,11 +226,11 @@ def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
     if not waiting:
         unfinished = [s for s in states if s.state in ("repeat", "being written")]
         return [] if unfinished else [Step("next", "Every run of the plan has landed.")]
-    same = [run for run in waiting if at is not None and run.kind in _TURNING and _set_up(run) == _set_up(at)]
-    run = (same or waiting)[0]
-    more = f"{len(same) - 1} more at this load" if len(same) > 1 else f"{len(waiting) - 1} more in the plan"
-    change = "" if same or at is None else " (new set-up)"
-    return [Step("next", f"Next: {run.id}, {described(run)}{change}. After it {more}.", (run.id,))]
+    group = [run for run in waiting if at is not None and run.kind in _TURNING and _set_up(run) == _set_up(at)]
+    run = (group or waiting)[0]
+    remainder = f"{len(group) - 1} more at this load" if len(group) > 1 else f"{len(waiting) - 1} more in the plan"
+    change = "" if group or at is None else " (new set-up)"
+    return [Step("next", f"Next: {run.id}, {described(run)}{change}. After it {remainder}.", (run.id,))]
 
 
 def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:

@@ -86,7 +86,7 @@ class Watcher:
     _campaign: Campaign | None = None
     _manifest: FileState | None = None
     _records: dict[str, _Record] = field(default_factory=dict)
-    _made: dict[object, tuple[object, Any]] = field(default_factory=dict)
+    _cache: dict[object, tuple[object, Any]] = field(default_factory=dict)
     _last: tuple[object, ...] = ()
 
     def look(self) -> Snapshot | None:
@@ -115,9 +115,9 @@ class Watcher:
 
     def _unless_changed(self, key: object, mark: object, make: Callable[[], Any]) -> Any:
         """What was made last time, unless its mark is another one now."""
-        if key not in self._made or self._made[key][0] != mark:
-            self._made[key] = mark, make()
-        return self._made[key][1]
+        if key not in self._cache or self._cache[key][0] != mark:
+            self._cache[key] = mark, make()
+        return self._cache[key][1]
 
     def _is_within(self, path: Path, problems: list[Problem]) -> bool:
         """Whether a record is in the folder: a link that leads out of it may appear at any time, and is not opened."""
@@ -148,8 +148,8 @@ class Watcher:
         except RigDataError as error:
             if self._campaign is None:
                 raise
-            what = "cannot be read as it is; the watch goes on with the last one that could be"
-            problems = [Problem("warning", MANIFEST_NAME, "", what, "Finish editing it"), *error.problems]
+            fault = "cannot be read as it is; the watch goes on with the last one that could be"
+            problems = [Problem("warning", MANIFEST_NAME, "", fault, "Finish editing it"), *error.problems]
         return self._campaign, problems
 
     def _observe(self, runs: list[Run], stable: dict[Path, FileState]) -> list[str]:
@@ -225,7 +225,7 @@ class Watcher:
             runs = good.of_kind(kind)
             if runs and (angles or kind == "dynamic"):
                 mark = frozenset((run.id, self._records[run.id].mark) for run in runs)
-                former = self._made.get(name, (None, (None, "")))[1][0]
+                former = self._cache.get(name, (None, (None, "")))[1][0]
                 make = functools.partial(_unless_refused, f"{kind} runs", measure, former)
                 result, refusal = self._unless_changed(name, mark, make)
                 results |= {name: result} if result is not None else {}

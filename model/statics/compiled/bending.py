@@ -60,48 +60,48 @@ def bend_pads(bodies: BodyStack | None, problem: Problem) -> float:
 
     Returns the largest change asked for, as a share of the thinnest film.
     """
-    state, pads = problem.state, problem.pads.each
+    state, pads = problem.state, problem.pads.table
     if bodies is None or state.bent.size == 0:
         return 0.0
-    asked = np.zeros((len(pads), state.bent[0].size))
+    deformation = np.zeros((len(pads), state.bent[0].size))
     if len(bodies.shapes) > 0:
-        _ask_bodies(bodies, problem, asked)
+        _ask_bodies(bodies, problem, deformation)
     share = 0.0
     for m in range(len(pads)):
         if pads[m].solved:
-            change = asked[m] - state.bent[m].reshape(-1)
+            change = deformation[m] - state.bent[m].reshape(-1)
             tilted = _close_loop(bodies, problem, m, change)
             share = max(share, max(largest(change), tilted) / pads[m].least)
     return share
 
 
 @inner
-def _ask_bodies(bodies: BodyStack, problem: Problem, asked: FloatArray) -> None:
+def _ask_bodies(bodies: BodyStack, problem: Problem, deformation: FloatArray) -> None:
     """Deformation (pads, nodes) that pressure and temperature ask for; pads of one shape in one product [m]."""
-    pads, works, state, supply = problem.pads.each, problem.works, problem.state, problem.case.supply
+    pads, works, state, supply = problem.pads.table, problem.works, problem.state, problem.case.supply
     lines = bodies.gather.shape[1]
     stations, columns = works.pressure.shape[1], works.pressure.shape[2]
-    given = np.zeros((len(pads), bodies.answer.shape[2]))
+    inputs = np.zeros((len(pads), bodies.answer.shape[2]))
     moved = np.zeros((len(pads), columns * lines))
     loaded = works.unknown.shape[1] // (stations - 2) * lines
-    same = np.empty(len(pads), dtype=np.int64)
+    members = np.empty(len(pads), dtype=np.int64)
     for k in range(bodies.answer.shape[0]):
-        some = 0
+        count = 0
         for m in range(len(pads)):
-            if pads[m].solved and bodies.which[m] == k:
+            if pads[m].solved and bodies.kind[m] == k:
                 pressure = (works.unknown[m] + state.shift[m]).reshape((stations - 2, loaded // lines))
-                _columns(bodies.gather[k], pressure, given[m, :loaded])
-                _columns(bodies.corners[k], state.faces[m] - supply, given[m, loaded:])
-                same[some] = m
-                some += 1
+                _columns(bodies.gather[k], pressure, inputs[m, :loaded])
+                _columns(bodies.corners[k], state.faces[m] - supply, inputs[m, loaded:])
+                members[count] = m
+                count += 1
         for i in range(bodies.answer.shape[1]):  # every row is read once
-            for m in same[:some]:
-                moved[m, i] = product(bodies.answer[k, i], given[m])
-        for m in same[:some]:
+            for m in members[:count]:
+                moved[m, i] = product(bodies.answer[k, i], inputs[m])
+        for m in members[:count]:
             by_column = moved[m].reshape((columns, lines))
             for i in range(stations):
                 for j in range(columns):
-                    asked[m, i * columns + j] = product(by_column[j], bodies.spread[k, i])
+                    deformation[m, i * columns + j] = product(by_column[j], bodies.spread[k, i])
 
 
 @inner
@@ -116,9 +116,9 @@ def _columns(matrix: FloatArray, field: FloatArray, out: FloatArray) -> None:
 def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray) -> float:
     """One pad's part of a Newton step, see `model.pad.bending`; how far a tilt along the shaft moves the ends [m]."""
     grid, work = film_of(problem, m)
-    pad, state, case = problem.pads.each[m], problem.state, problem.case
+    pad, state, case = problem.pads.table[m], problem.state, problem.case
     bends = len(bodies.shapes) > 0
-    body, bending = (bodies.which[m], bodies.shapes.shape[3]) if bends else (0, 0)
+    body, bending = (bodies.kind[m], bodies.shapes.shape[3]) if bends else (0, 0)
     count = bending + (1 if case.axial else 0)
     unknowns = len(work.unknown)
     rows, columns = work.pressure.shape
@@ -127,29 +127,29 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
         shapes, response = bodies.shapes[body], bodies.response[body]
     elif bends:
         shapes[:, :, :bending], response[:bending] = bodies.shapes[body], bodies.response[body]
-    matrix, right = np.zeros((count, count)), np.zeros((count, 3))
+    matrix, constants = np.zeros((count, count)), np.zeros((count, 3))
     for r in range(bending):
-        matrix[r, r], right[r, 0] = 1.0, product(bodies.amplitudes[body, r], change)
+        matrix[r, r], constants[r, 0] = 1.0, product(bodies.amplitudes[body, r], change)
     if case.axial:
-        right[bending, 0], matrix[bending, bending] = _axial_moment(grid, work, problem, m, response[bending])
+        constants[bending, 0], matrix[bending, bending] = _axial_moment(grid, work, problem, m, response[bending])
         shapes[:, :, bending] = axial_shape(grid)
-    asked = right[:, 0].copy()
+    amplitudes = constants[:, 0].copy()
     wedge = (pad.clearance, pad.wedge[0], pad.wedge[1])
     slopes = shape_slopes(grid, work, conductances(grid, work, wedge), shapes)
     _answer(response, slopes, matrix, -1.0, 0)
-    _answer(response, work.slopes[:, :2], right, 1.0, 1)
+    _answer(response, work.slopes[:, :2], constants, 1.0, 1)
     felt = force_of(grid, grid.area, slopes)
-    solve(matrix, right)
+    solve(matrix, constants)
     for r in range(count):
-        pad.felt[:] += felt[:, r] * right[r, 0]
-        pad.felt_stiffness[:] += felt[:, r : r + 1] * right[r, 1:]
-    pad.amplitude[:bending] = right[:bending]
+        pad.felt[:] += felt[:, r] * constants[r, 0]
+        pad.felt_stiffness[:] += felt[:, r : r + 1] * constants[r, 1:]
+    pad.amplitude[:bending] = constants[:bending]
     flat = shapes.reshape((len(change), count))[:, :bending]
-    state.mismatch[m].reshape(-1)[:] = change - times(flat, asked)
+    state.mismatch[m].reshape(-1)[:] = change - times(flat, amplitudes)
     if not case.axial:
         return 0.0
-    pad.axial_step[:] = right[bending]
-    return abs(right[bending, 0]) * largest(shapes[:, :, bending].copy().reshape(-1))
+    pad.axial_step[:] = constants[bending]
+    return abs(constants[bending, 0]) * largest(shapes[:, :, bending].copy().reshape(-1))
 
 
 @inner
@@ -167,7 +167,7 @@ def _axial_moment(grid: FilmGrid, work: FilmWork, problem: Problem, m: int, leve
 
     `lever` (unknowns,) [m^3] is less what grows with the pad's load.
     """
-    pad, shift = problem.pads.each[m], problem.state.shift[m]
+    pad, shift = problem.pads.table[m], problem.state.shift[m]
     moment, stiffness, arm = held_moment(problem.case.hold, pad.axial, pad.corrected[0])
     levers = axial_levers(grid, 0.0)
     lever[:] = axial_levers(grid, arm)[grid.node]
@@ -183,10 +183,10 @@ def change_shape(bodies: BodyStack | None, problem: Problem, m: int, da: float, 
     """
     if bodies is None:
         return 0.0
-    pad, state, case = problem.pads.each[m], problem.state, problem.case
+    pad, state, case = problem.pads.table[m], problem.state, problem.case
     out = state.mismatch[m]
     if len(bodies.shapes) > 0:
-        shapes = bodies.shapes[bodies.which[m]]
+        shapes = bodies.shapes[bodies.kind[m]]
         for r in range(shapes.shape[2]):
             amount = pad.amplitude[r, 0] + pad.amplitude[r, 1] * da + pad.amplitude[r, 2] * db
             out += amount * shapes[:, :, r]

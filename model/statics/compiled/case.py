@@ -30,7 +30,7 @@ class Case(NamedTuple):
     thermal: int
     rupture: int | None  #: One of `model.film.models.FILM_MODELS`; None: a search of plain films and rigid pads alone.
     supply: float  #: Temperature of fresh oil [degC].
-    kept: float  #: Share of the dissipation that stays in the films; in `running.heat` where films are alone.
+    heat_share: float  #: Share of the dissipation that stays in the films; in `running.heat` where films are alone.
     mixing: float  #: lambda
     journal: bool  #: It takes up heat and gives it back.
     closing: float  #: What a kelvin of the journal's takes from every clearance [m/K].

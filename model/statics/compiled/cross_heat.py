@@ -94,8 +94,8 @@ def set_cross_viscosities(problem: Problem, across: Across) -> None:
     running, turbulent = problem.case.running, (0.0, 0.0)
     if problem.case.rupture == TURBULENT:
         turbulent = (running.speed, running.heat[0] / max(running.heat[1], 1e-9))
-    for m in range(len(problem.pads.each)):
-        if not problem.pads.each[m].idle:
+    for m in range(len(problem.pads.table)):
+        if not problem.pads.table[m].idle:
             set_cross_viscosity(_film(across.films, m), film_of(problem, m)[1], running.oil, turbulent)
 
 
@@ -106,26 +106,26 @@ def settle_cross_temperatures(problem: Problem, across: Across, relaxation: floa
     As `exchange_heat` of `model.statics.compiled.heat`.
     """
     pads, state, case = problem.pads, problem.state, problem.case
-    n, limits = len(pads.each), (relaxation, HEATING_STEP)
-    flows, outlets, taken = np.empty((n, 2)), np.zeros((n, 3)), np.zeros((n, 3))
+    n, limits = len(pads.table), (relaxation, HEATING_STEP)
+    flows, outlets, uptake = np.empty((n, 2)), np.zeros((n, 3)), np.zeros((n, 3))
     for m in range(n):
         note_flows(problem, m, math.inf, flows[m], outlets[m])
-        if pads.each[m].solved:
-            _answer(problem, across, m, outlets[m], taken[m])
-    inlets, journal = balance_heat(pads.order, (flows, outlets, taken), pads.each["solved"], case.supply, case.mixing)
+        if pads.table[m].solved:
+            _answer(problem, across, m, outlets[m], uptake[m])
+    inlets, journal = balance_heat(pads.order, (flows, outlets, uptake), pads.table["solved"], case.supply, case.mixing)
     change = 0.0
     for m in range(n):
-        pad = pads.each[m]
+        pad = pads.table[m]
         hotter = inlets[m] - pad.inlet
         pad.inlet += limited_share(hotter, limits) * hotter
         change = note_heat(pad, abs(hotter), (0.0, 0.0), change)
         if pad.solved:
             (grid, work), cross = film_of(problem, m), _film(across.films, m)
             running, weights = case.running, (inlets[m], journal)
-            asked = _warm(cross, across.fields[m], across.faces[m], weights, limits)
+            increment = _warm(cross, across.fields[m], across.faces[m], weights, limits)
             across.outlet[m] = outlets[m, 0] + outlets[m, 1] * inlets[m] + outlets[m, 2] * journal
-            more = cross_pressure_change(grid, work, cross, running.speed, running.oil, state.shift[m])
-            change = note_heat(pad, asked, more, change)
+            force_change = cross_pressure_change(grid, work, cross, running.speed, running.oil, state.shift[m])
+            change = note_heat(pad, increment, force_change, change)
     state.figures[JOURNAL] = journal
     return change
 
@@ -141,38 +141,38 @@ def _warm(
     """Change a film's temperatures by a share of what is asked for, no more than a limit; returns the largest [K]."""
     inlet, journal = weights
     cells = cross.temperature.reshape(fields.shape[:2])
-    asked = fields[:, :, 0] + inlet * fields[:, :, 1] + journal * fields[:, :, 2] - cells
+    increment = fields[:, :, 0] + inlet * fields[:, :, 1] + journal * fields[:, :, 2] - cells
     face = faces[0] + inlet * faces[1] + journal * faces[2] - cross.face
-    change = np.maximum(largest(asked.reshape(-1)), largest(face.reshape(-1)))
+    change = np.maximum(largest(increment.reshape(-1)), largest(face.reshape(-1)))
     share = limited_share(change, limits)
-    cells += share * asked
+    cells += share * increment
     cross.face[:] += share * face
     return change
 
 
 @inner
-def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken: FloatArray) -> None:
+def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, uptake: FloatArray) -> None:
     """What a film's temperatures are made of: with all else at zero, per kelvin of its inlet, of the journal.
 
     Of cells and faces; of the oil at the trailing edge (3,) [degC], and what the journal takes (3,) [W]. Which share of
     the oil runs back where it enters is noted in the figures.
     """
     (grid, work), cross = film_of(problem, m), _film(across.films, m)
-    pad, state, case = problem.pads.each[m], problem.state, problem.case
+    pad, state, case = problem.pads.table[m], problem.state, problem.case
     bodies, operator = problem.bodies, across.operator
     assert bodies is not None
     fields, faces, (specific, conductivity) = across.fields[m], across.faces[m], case.running.heat
     journal = state.figures[JOURNAL] if math.isfinite(state.figures[JOURNAL]) else case.supply
-    heat = (specific, conductivity, case.kept, 1.0, case.running.oil[1])
+    heat = (specific, conductivity, case.heat_share, 1.0, case.running.oil[1])
     back = cross_operator(grid, work, cross, case.running.speed, heat, operator)
     state.figures[BACKFLOW] = max(state.figures[BACKFLOW], back)
-    body = (bodies.flux[bodies.which[m]], bodies.to_coarse[bodies.which[m]], across.guesses[m])
+    body = (bodies.flux[bodies.kind[m]], bodies.to_coarse[bodies.kind[m]], across.guesses[m])
     around = 0.0  # what the grooves hold
-    for other in problem.pads.each:
-        around += other.inlet / len(problem.pads.each)
+    for entry in problem.pads.table:
+        around += entry.inlet / len(problem.pads.table)
     into_pad = times(body[0], times(body[1], (cross.face - around).reshape(-1))).reshape(cross.face.shape)
     operator.dissipation[:, :: len(cross.edges) - 1] -= station_heat(grid, into_pad)
-    taken[:] = march_cross(operator, fields, operator.dissipation)
+    uptake[:] = march_cross(operator, fields, operator.dissipation)
     for q in range(3):
         heat_flow = (1.0 if q == 0 else 0.0) * into_pad
         face_temperature(work, cross.edges, conductivity, fields[:, :, q], heat_flow, faces[q])
@@ -180,7 +180,7 @@ def _answer(problem: Problem, across: Across, m: int, outlet: FloatArray, taken:
     if 0.0 < largest(missing.reshape(-1)) < BOUNDLESS:
         solved = (grid, work, cross.edges, conductivity)
         tolerance = _ROUGH_TOLERANCE if pad.heating > _ROUGH else _CONDUCTION_TOLERANCE
-        taken[0] += conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
+        uptake[0] += conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
     carried = operator.carried.reshape(-1)
     for q in range(3):
         outlet[q] = product(carried, fields[-1, :, q]) / product(carried, np.ones(len(carried)))

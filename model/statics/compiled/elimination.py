@@ -24,19 +24,19 @@ def newton(case: Case, pads: PadStack, growing: float) -> tuple[float, FloatArra
 
     `growing`: what the journal's temperature changes by in this step [K].
     """
-    n, load, worst = len(pads.each), case.load, 0.0
+    n, load, worst = len(pads.table), case.load, 0.0
     system = np.zeros((2, 3))  # force per metre of the journal's move along x and y, and the load that is missing
     system[0, 0] = system[1, 1] = 1.0  # N/m: a pad that only touches leaves a direction free
     system[:, 2] = load
     follow = np.zeros((n, 2, 3))
     for m in range(n):
-        if pads.each[m].solved:
+        if pads.table[m].solved:
             worst = max(worst, _eliminate(case, pads, growing, m, follow[m], system))
     shift = system[:, 2:].copy()
     worst = max(worst, math.hypot(shift[0, 0], shift[1, 0])) / max(math.hypot(load[0], load[1]), 1.0)
     solve(system[:, :2], shift)
     for m in range(n):
-        pad = pads.each[m]
+        pad = pads.table[m]
         for q in range(2):
             pad.moves[q] = follow[m, q, 2] + follow[m, q, 0] * shift[0, 0] + follow[m, q, 1] * shift[1, 0]
             if not math.isfinite(pad.moves[q]):  # numpy's own question would load scipy
@@ -52,10 +52,10 @@ def _eliminate(case: Case, pads: PadStack, growing: float, m: int, follow: Float
 
     Sets how tilt and deflection follow the journal along x and y, and move by themselves, (2, 3).
     """
-    pad = pads.each[m]
+    pad = pads.table[m]
     frame, k, radius, load = pad.frame, pad.felt_stiffness, pad.pivot_radius, pad.felt[0]
     held, stiffness, arm = held_moment(case.hold, pad.tilt, load)
-    give = compliance(pad.law, pads.curves[m], max(load, 1e-6))
+    flexibility = compliance(pad.law, pads.curves[m], max(load, 1e-6))
     # a journal that grows comes nearer, all but at the pads' ends as if it were pushed
     closing = case.closing * growing
     force = (load + closing * k[0, 0], pad.felt[1] + closing * k[1, 0])
@@ -66,7 +66,7 @@ def _eliminate(case: Case, pads: PadStack, growing: float, m: int, follow: Float
         slopes[i, 2], slopes[i, 3] = k[i, 1] * radius, -k[i, 0]
     equations = np.empty((2, 4))  # of the moment over R_P [N] and of the pivot's deflection [m]
     equations[0] = slopes[1] + arm / radius * slopes[0]
-    equations[1] = -give * slopes[0]
+    equations[1] = -flexibility * slopes[0]
     equations[0, 2] += stiffness / radius
     equations[1, 3] += 1.0
     follow[:, :2] = -equations[:, :2]

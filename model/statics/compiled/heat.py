@@ -41,69 +41,69 @@ _LEAST_FRESH = 1e-3
 def heat_films(problem: Problem, relaxation: float) -> float:
     """Temperatures of the films that carry, each for itself; returns the largest change asked for [K]."""
     state, change = problem.state, 0.0
-    for m in range(len(problem.pads.each)):
-        pad = problem.pads.each[m]
+    for m in range(len(problem.pads.table)):
+        pad = problem.pads.table[m]
         if pad.solved:
             grid, work = film_of(problem, m)
             thermal = (pad.inlet, relaxation, HEATING_STEP)
-            found = heat_step(grid, work, problem.case.running, thermal, state.shift[m])
-            state.figures[BACKFLOW] = max(state.figures[BACKFLOW], found[1])
-            change = note_heat(pad, found[0], found[2:], change)
+            result = heat_step(grid, work, problem.case.running, thermal, state.shift[m])
+            state.figures[BACKFLOW] = max(state.figures[BACKFLOW], result[1])
+            change = note_heat(pad, result[0], result[2:], change)
     return change
 
 
 @inner
-def note_heat(pad: np.record, asked: float, more: tuple[float, float], change: float) -> float:
+def note_heat(pad: np.record, heating: float, force_change: tuple[float, float], change: float) -> float:
     """Note which change of temperature [K] a film asks for, and its force then [N]; the largest change so far."""
-    pad.heating = asked
-    pad.corrected[0] = pad.force[0] + more[0]
-    pad.corrected[1] = pad.force[1] + more[1]
-    return np.maximum(change, asked)  # a NaN is not to be lost
+    pad.heating = heating
+    pad.corrected[0] = pad.force[0] + force_change[0]
+    pad.corrected[1] = pad.force[1] + force_change[1]
+    return np.maximum(change, heating)  # a NaN is not to be lost
 
 
 @inner
 def rest_films(problem: Problem) -> None:
     """Say what the films of idle pads do."""
-    for m in range(len(problem.pads.each)):
-        pad = problem.pads.each[m]
+    for m in range(len(problem.pads.table)):
+        pad = problem.pads.table[m]
         if pad.idle:
             wedge = (pad.clearance, rigid_approach(pad, problem.state.position))
-            found = resting_film(grid_of(problem.grids, m), wedge, problem.case.running, pad.inlet)
+            result = resting_film(grid_of(problem.grids, m), wedge, problem.case.running, pad.inlet)
             for k in range(4):
-                pad.resting[k] = found[k]
+                pad.resting[k] = result[k]
 
 
 @inner
 def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> float:
     """Temperatures of all films, the inlets and the journal for their present flows; returns the largest change [K]."""
     pads, works, state, case = problem.pads, problem.works, problem.state, problem.case
-    n, fields = len(pads.each), 3 if case.journal else 2
+    n, fields = len(pads.table), 3 if case.journal else 2
     answers = np.zeros((n, fields, *works.temperature.shape[1:]))
     flows = np.empty((n, 2))
     outlets = np.zeros((n, 3))
-    taken = np.zeros((n, 3))
+    uptake = np.zeros((n, 3))
     change = 0.0
     for m in range(n):
-        pad = pads.each[m]
+        pad = pads.table[m]
         note_flows(problem, m, pad.supplied, flows[m], outlets[m])
         if pad.solved:
-            _answer(bodies, problem, m, answers[m], outlets[m], taken[m])
+            _answer(bodies, problem, m, answers[m], outlets[m], uptake[m])
         if case.fresh < math.inf and case.mixing > 0.0:  # who gets less oil has another film
-            more = case.mixing * abs(flows[m, 1] - pad.passed) / (case.fresh * case.length)
-            change = max(change, HEAT_PER_FORCE * more)
+            excess = case.mixing * abs(flows[m, 1] - pad.passed) / (case.fresh * case.length)
+            change = max(change, HEAT_PER_FORCE * excess)
         pad.passed = flows[m, 1]
-    inlets, journal = balance_heat(pads.order, (flows, outlets, taken), pads.each["solved"], case.supply, case.mixing)
+    inlets, journal = balance_heat(pads.order, (flows, outlets, uptake), pads.table["solved"], case.supply, case.mixing)
     for m in range(n):
-        pad = pads.each[m]
+        pad = pads.table[m]
         pad.inlet, pad.heating = inlets[m], 0.0
         if not pad.solved:
             continue
-        asked = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
+        increment = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
         if case.journal:
-            asked += journal * answers[m, 2]
+            increment += journal * answers[m, 2]
         (grid, work), limits = film_of(problem, m), (relaxation, HEATING_STEP)
-        found = warm(grid, work, case.running, asked, limits, state.shift[m])
-        change = note_heat(pad, found[0], found[1:], change)
+        result = warm(grid, work, case.running, increment, limits, state.shift[m])
+        change = note_heat(pad, result[0], result[1:], change)
     if case.journal:
         state.figures[JOURNAL] = journal
     return change
@@ -112,7 +112,7 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
 @inner
 def note_flows(problem: Problem, m: int, supplied: float, flows: FloatArray, outlet: FloatArray) -> None:
     """Set a pad's flows over its leading and trailing edge [kg/s]; an idle one passes its inlet on, somewhat warmer."""
-    pad = problem.pads.each[m]
+    pad = problem.pads.table[m]
     if pad.solved:
         grid, work = film_of(problem, m)
         entering, sides = edge_flows(grid, work, supplied)
@@ -124,7 +124,7 @@ def note_flows(problem: Problem, m: int, supplied: float, flows: FloatArray, out
 
 @inner
 def _answer(
-    bodies: BodyStack, problem: Problem, m: int, fields: FloatArray, outlet: FloatArray, taken: FloatArray
+    bodies: BodyStack, problem: Problem, m: int, fields: FloatArray, outlet: FloatArray, uptake: FloatArray
 ) -> None:
     """Temperature of a film, of what leaves it, and what the journal takes up [W].
 
@@ -139,7 +139,7 @@ def _answer(
     if case.journal:
         work.exchange[:] = _NUSSELT * case.running.heat[1] / work.thickness * (grid.dx * grid.height)
         sources[2] = work.exchange
-    sources[0], loss = heat_sources(grid, work, case.running, case.kept)
+    sources[0], loss = heat_sources(grid, work, case.running, case.heat_share)
     fields[1, 0] = 1.0
     conducts = len(bodies.flux) > 0
     if conducts:
@@ -155,8 +155,8 @@ def _answer(
     weight[-1] *= 0.5
     for k in range(len(fields)):
         outlet[k] = product(fields[k, -1], flow) / product(np.ones(len(flow)), flow)
-        taken[k] = product(weight.reshape(-1), fields[k].reshape(-1))
-    taken[2] -= product(np.ones(weight.size), weight.reshape(-1))
+        uptake[k] = product(weight.reshape(-1), fields[k].reshape(-1))
+    uptake[2] -= product(np.ones(weight.size), weight.reshape(-1))
 
 
 @inner
@@ -167,7 +167,7 @@ def _conduct(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, fiel
     """
     state = problem.state
     journal = state.figures[JOURNAL] if math.isfinite(state.figures[JOURNAL]) else problem.case.supply
-    hot = (1.0, problem.pads.each[m].inlet, journal)
+    hot = (1.0, problem.pads.table[m].inlet, journal)
     temperature = problem.works.temperature[m].reshape(-1)
     answers = fields.reshape((len(fields), len(temperature)))
     missing = -temperature
@@ -184,7 +184,7 @@ def _conduct(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, fiel
 @inner
 def _into_pad(grid: FilmGrid, bodies: BodyStack, m: int, rise: FloatArray) -> FloatArray:
     """What a pad takes from its film at every station, (nt + 1, nz + 1) [W], for the rise (nodes,) of its face [K]."""
-    to_coarse, flux = bodies.to_coarse[bodies.which[m]], bodies.flux[bodies.which[m]]
+    to_coarse, flux = bodies.to_coarse[bodies.kind[m]], bodies.flux[bodies.kind[m]]
     heat = times(flux, times(to_coarse, rise)).reshape((len(grid.angle), len(grid.height)))
     return heat * (grid.dx * grid.height)
 
@@ -194,9 +194,9 @@ def _cooled(held: tuple[BodyStack, Problem, int, FloatArray], change: FloatArray
     """A change of a film's temperature (nodes,), and A^-1 F added to it: what it would be if the pad took nothing."""
     bodies, problem, m, loss = held
     grid, work = film_of(problem, m)
-    taken, fields = np.empty((1, *loss.shape)), np.zeros((1, *loss.shape))
-    taken[0] = -_into_pad(grid, bodies, m, change)
-    march(grid, work, problem.case.running, loss, fields, between(taken))
+    sources, fields = np.empty((1, *loss.shape)), np.zeros((1, *loss.shape))
+    sources[0] = -_into_pad(grid, bodies, m, change)
+    march(grid, work, problem.case.running, loss, fields, between(sources))
     return change, change - fields[0].reshape(-1)
 
 
@@ -213,28 +213,28 @@ def balance_heat(
     Answers: flows (n, 2) over leading and trailing edge [kg/s], outlets (n, 3), heat that the journal takes up (n, 3),
     both with all else at zero, per kelvin of the inlet and of the journal.
     """
-    flows, outlets, taken = answers
+    flows, outlets, uptake = answers
     n = len(order)
     shares = _mixing_shares(order, flows, mixing)
     matrix = np.zeros((n + 1, n + 1))
-    right = np.full((n + 1, 1), supply)
-    fresh, own = 0.0, 0.0
+    constants = np.full((n + 1, 1), supply)
+    fresh, conductance = 0.0, 0.0
     for k in range(n):
         m, after = order[k], order[(k + 1) % n]
         share = shares[after]
         matrix[after, after] += 1.0
-        right[after, 0] = supply * (1.0 - share) + share * outlets[m, 0]
+        constants[after, 0] = supply * (1.0 - share) + share * outlets[m, 0]
         matrix[after, m] -= share * outlets[m, 1]
         matrix[after, n] -= share * outlets[m, 2]
         if solved[m]:
-            fresh, own = fresh + taken[m, 0], own + taken[m, 2]
+            fresh, conductance = fresh + uptake[m, 0], conductance + uptake[m, 2]
     matrix[n, n] = 1.0
-    if own != 0.0:
-        right[n, 0] = -fresh / own
+    if conductance != 0.0:
+        constants[n, 0] = -fresh / conductance
         for m in range(n):
-            matrix[n, m] = taken[m, 1] / own if solved[m] else 0.0
-    solve(matrix, right)
-    return right[:n, 0].copy(), right[n, 0]
+            matrix[n, m] = uptake[m, 1] / conductance if solved[m] else 0.0
+    solve(matrix, constants)
+    return constants[:n, 0].copy(), constants[n, 0]
 
 
 @inner

@@ -63,7 +63,7 @@ def fresh_memory(problem: Problem) -> Memory:
     """Of an iteration that has not begun: films begin warm, and nothing is relaxed; vectors are `_write_vector`'s."""
     state = problem.state
     faces = state.faces.size if problem.case.thermal == ACROSS else 0
-    size = 3 + 3 * len(problem.pads.each) + state.warmth.size + faces + state.bent.size
+    size = 3 + 3 * len(problem.pads.table) + state.warmth.size + faces + state.bent.size
     trail = np.zeros(TRAIL)
     trail[[HEAT, _BEST, _LEFT, _BEST_LEFT]] = math.inf
     trail[RELAXED] = 1.0
@@ -108,8 +108,8 @@ def iterate(problem: Problem, memory: Memory) -> int:
         if residual < accuracy and trail[HEAT] < HEAT_PER_FORCE * accuracy:
             trail[_COUNT] = 0
             if trail[STABLE] == 0.0:
-                for m in range(len(pads.each)):
-                    if pads.each[m].solved and is_doubtful(case, pads.each[m], pads.curves[m]):
+                for m in range(len(pads.table)):
+                    if pads.table[m].solved and is_doubtful(case, pads.table[m], pads.curves[m]):
                         return ASKS_STABLE
             solve_pressures(problem, True)  # derivatives once more, with the rupture line between the nodes
             return SETTLED
@@ -141,10 +141,10 @@ def _go_on(problem: Problem, memory: Memory, residual: float, shift: FloatArray)
     trail[_STALLED] = 0.0 if residual < _PROGRESS * trail[_BEST] else trail[_STALLED] + 1.0
     trail[_BEST] = min(trail[_BEST], residual)
     damping = 0.5 if trail[_STALLED] > _PATIENCE else 1.0
-    whole = move(problem, shift, damping)
+    full_step = move(problem, shift, damping)
     # steps that were cut short, or still far off, say nothing of the iteration's slow modes
     mixes = problem.case.thermal != ISOTHERMAL or problem.state.bent.size > 0
-    if mixes and was_slow and whole and near and trail[_LEFT] > slow * trail[_BEST_LEFT]:
+    if mixes and was_slow and full_step and near and trail[_LEFT] > slow * trail[_BEST_LEFT]:
         count = _remember(memory)
         _write_vector(problem, memory.images[count - 1])
         memory.residuals[count - 1] = memory.images[count - 1] - memory.before
@@ -171,10 +171,10 @@ def _write_vector(problem: Problem, out: FloatArray) -> None:
     pads, state = problem.pads, problem.state
     out[:2] = state.position / _MICROMETRE
     out[2] = state.figures[GROWN]
-    parts = out[3:].reshape((len(pads.each), -1))
+    parts = out[3:].reshape((len(pads.table), -1))
     warm, bent = 3 + state.warmth.shape[1], parts.shape[1] - state.bent[0].size
-    for m in range(len(pads.each)):
-        pad, part = pads.each[m], parts[m]
+    for m in range(len(pads.table)):
+        pad, part = pads.table[m], parts[m]
         unit = pad.pivot_radius / _MICROMETRE
         part[0] = pad.tilt * unit
         part[1] = pad.deflection / _MICROMETRE
@@ -190,12 +190,12 @@ def _write_vector(problem: Problem, out: FloatArray) -> None:
 def _read_vector(problem: Problem, vector: FloatArray) -> None:
     """Undo `_write_vector`."""
     pads, state = problem.pads, problem.state
-    shift, moves = vector[:2] * _MICROMETRE - state.position, np.empty((len(pads.each), 3))
+    shift, moves = vector[:2] * _MICROMETRE - state.position, np.empty((len(pads.table), 3))
     state.figures[GROWING] = vector[2] - state.figures[GROWN]
-    parts = vector[3:].reshape((len(pads.each), -1))
+    parts = vector[3:].reshape((len(pads.table), -1))
     warm, bent = 3 + state.warmth.shape[1], parts.shape[1] - state.bent[0].size
-    for m in range(len(pads.each)):
-        pad, part = pads.each[m], parts[m]
+    for m in range(len(pads.table)):
+        pad, part = pads.table[m], parts[m]
         unit = _MICROMETRE / pad.pivot_radius
         moves[m, 0] = part[0] * unit - pad.tilt
         moves[m, 1] = part[1] * _MICROMETRE - pad.deflection

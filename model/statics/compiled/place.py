@@ -86,8 +86,8 @@ def is_stable(case: Case, pad: np.record, curve: FloatArray, k: FloatArray) -> b
     if case.hold.slip == 0.0 and (pad.force[0] <= none or (opens and case.thermal not in _WARM)):
         return False
     load, radius = pad.force[0], pad.pivot_radius
-    give = compliance(pad.law, curve, max(load, 1e-6))
+    flexibility = compliance(pad.law, curve, max(load, 1e-6))
     _, stiffness, arm = held_moment(case.hold, pad.tilt, load)
     arm = arm / radius
     turning = k[1, 1] + arm * k[0, 1] + stiffness / radius**2
-    return turning * (1.0 + give * k[0, 0]) > give * (k[1, 0] + arm * k[0, 0]) * k[0, 1]
+    return turning * (1.0 + flexibility * k[0, 0]) > flexibility * (k[1, 0] + arm * k[0, 0]) * k[0, 1]

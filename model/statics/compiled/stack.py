@@ -17,7 +17,7 @@ class BodyStack(NamedTuple):
     Those of pads that do not bend, or do not conduct, are empty.
     """
 
-    which: IntArray  #: (pads,) of int: Body of every film.
+    kind: IntArray  #: (pads,) of int: Body of every film.
     #: (k, lines, loads + temperatures): Deformation of the solid's lines by both [m/Pa, m/K], and what maps between
     #: them and the film, see `PadDeformation`.
     answer: FloatArray
@@ -75,7 +75,7 @@ PAD = np.dtype(
 class PadStack(NamedTuple):
     """The pads of a search."""
 
-    each: np.ndarray  #: (n,) of `PAD`.
+    table: np.ndarray  #: (n,) of `PAD`.
     order: IntArray  #: (n,) of int: The pads in the order in which oil passes them.
     curves: FloatArray  #: (n, 5, m): Measured curves of their pivots.
 

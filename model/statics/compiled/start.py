@@ -31,12 +31,12 @@ def pivot_curve(
     attitude: tuple[FloatArray, FloatArray, FloatArray],
     clearance: float,
     pivot: tuple[FloatArray, FloatArray],
-    gives: FloatArray,
+    deflections: FloatArray,
     out: FloatArray,
 ) -> int:
     """A pad's loaded attitudes on its pivot, rising from the fold: r = a + delta(W), a, b [m], W [N]; how many.
 
-    `attitude` is (A, B, W); `pivot` its law and curve; `gives` (n,) what it gives, empty where the law says it.
+    `attitude` is (A, B, W); `pivot` its law and curve; `deflections` (n,) of the pivot, empty where the law says it.
     """
     curvature, wedge, load = attitude
     count = len(load)
@@ -45,7 +45,7 @@ def pivot_curve(
     share = clearance / (1.0 + curvature)
     reach = share * curvature
     for k in range(count):
-        reach[k] += gives[k] if len(gives) > 0 else deflection(pivot[0], pivot[1], load[k])
+        reach[k] += deflections[k] if len(deflections) > 0 else deflection(pivot[0], pivot[1], load[k])
     low = count - 1
     while low > 0 and reach[low - 1] < reach[low]:
         low -= 1
@@ -60,10 +60,10 @@ def first_position(load: FloatArray, pads: np.ndarray) -> tuple[FloatArray, Bool
     position, loaded = np.zeros(2), pads["rows"] >= 2
     while stand_on_curves(load, pads, loaded, position):
         reach = pads["preload"] + pads["frame"][:, 0] @ position
-        beyond = np.where(loaded, (pads["attitudes"][:, 0, 0] - reach) / pads["clearance"], -1.0)
-        if beyond.max() < _FOLD:
+        excess = np.where(loaded, (pads["attitudes"][:, 0, 0] - reach) / pads["clearance"], -1.0)
+        if excess.max() < _FOLD:
             break
-        loaded[np.flatnonzero(beyond > beyond.max() - _ALIKE)[-1]] = False
+        loaded[np.flatnonzero(excess > excess.max() - _ALIKE)[-1]] = False
     return position, loaded
 
 

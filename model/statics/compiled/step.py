@@ -31,21 +31,21 @@ def solve_pressures(problem: Problem, sharp: bool) -> bool:
     pads, state, case, lost = problem.pads, problem.state, problem.case, False
     for k in range(len(pads.order)):
         m = pads.order[k]
-        pad, (grid, work) = pads.each[m], film_of(problem, m)
-        pad.supplied = case.fresh + case.mixing * pads.each[pads.order[k - 1]].passed / case.length
+        pad, (grid, work) = pads.table[m], film_of(problem, m)
+        pad.supplied = case.fresh + case.mixing * pads.table[pads.order[k - 1]].passed / case.length
         while not pad.idle:
             if not sharp and case.thermal != ACROSS:
                 set_viscosity(work, case.running.oil)
             a = rigid_approach(pad, state.position) - pad.deflection
             b = along(pad, state.position) + pad.pivot_radius * pad.tilt
             wedge, speed = (pad.clearance, a, b), case.running.speed
-            found = solve_by(case.rupture, grid, work, wedge, speed, sharp, pad.supplied)
+            forces = solve_by(case.rupture, grid, work, wedge, speed, sharp, pad.supplied)
             pad.wedge[0], pad.wedge[1], pad.solved = a, b, True
-            pad.least, pad.steps = found.min_film, found.steps
-            pad.force[:], pad.stiffness[:], pad.damping[:] = found.force, found.stiffness, found.damping
+            pad.least, pad.steps = forces.min_film, forces.steps
+            pad.force[:], pad.stiffness[:], pad.damping[:] = forces.force, forces.stiffness, forces.damping
             if not sharp:
-                pad.corrected[:] = found.force
-            if sharp or found.steps < 0 or found.force[0] > 0.0 or case.hold.flexure > 0.0:
+                pad.corrected[:] = forces.force
+            if sharp or forces.steps < 0 or forces.force[0] > 0.0 or case.hold.flexure > 0.0:
                 break
             if not rescue(pad, work, state.position):
                 let_idle(pad)
@@ -61,7 +61,7 @@ def solve_pressures(problem: Problem, sharp: bool) -> bool:
 @inner
 def grow_and_bend(problem: Problem, relaxation: float, change: float) -> float:
     """What a journal grows, what pads bend; returns the largest change asked for, from `change` on [K]."""
-    figures, pads = problem.state.figures, problem.pads.each
+    figures, pads = problem.state.figures, problem.pads.table
     if problem.case.closing > 0.0 and change < BOUNDLESS:
         warmth = figures[JOURNAL]
         if not math.isfinite(warmth):  # as the films that carry, by area; as the oil where it enters if none does
@@ -72,9 +72,9 @@ def grow_and_bend(problem: Problem, relaxation: float, change: float) -> float:
                     area += product(weight, np.ones(len(weight)))
                     warmth += product(weight, problem.works.temperature[m].reshape(-1))
             warmth = warmth / area if area > 0.0 else pads[0].inlet
-        asked = warmth - figures[GROWN]
-        figures[GROWING] = relaxation * min(max(asked, -HEATING_STEP), HEATING_STEP)
-        change = max(change, abs(asked))
+        increment = warmth - figures[GROWN]
+        figures[GROWING] = relaxation * min(max(increment, -HEATING_STEP), HEATING_STEP)
+        change = max(change, abs(increment))
     for m in range(len(pads)):
         pad = pads[m]
         pad.felt[:], pad.felt_stiffness[:] = pad.corrected, pad.stiffness
@@ -89,10 +89,10 @@ def move(problem: Problem, shift: FloatArray, damping: float) -> bool:
     pads, state, case = problem.pads, problem.state, problem.case
     scale, extra = damping, np.empty((0, 0))
     closing = case.closing * state.figures[GROWING]
-    moves = np.zeros((len(pads.each), 3))
+    moves = np.zeros((len(pads.table), 3))
     length = max(math.hypot(shift[0], shift[1]), 1e-30)
-    for m in range(len(pads.each)):
-        pad = pads.each[m]
+    for m in range(len(pads.table)):
+        pad = pads.table[m]
         scale = min(scale, _LONGEST_STEP * pad.clearance / length)
         moves[m, 0], moves[m, 1] = pad.moves[0], pad.moves[1]
         if pad.solved:
@@ -120,8 +120,8 @@ def change_state(problem: Problem, shift: FloatArray, moves: FloatArray, scale: 
     state.position[:] += scale * shift
     state.figures[GROWN] += hotter
     state.figures[GROWING] = 0.0
-    for m in range(len(pads.each)):
-        pad = pads.each[m]
+    for m in range(len(pads.table)):
+        pad = pads.table[m]
         pad.clearance -= problem.case.closing * hotter
         # a pad that friction stops where it does not tilt stops there, whatever the step's length
         pad.tilt = 0.0 if moves[m, 0] == -pad.tilt else pad.tilt + scale * moves[m, 0]

@@ -41,8 +41,8 @@ _MAX_MEMBERS, _LISTED = 4096, 20
 _RATE = "sample_rate_hz"
 #: Key of an open group among the opened members; no dataset can have this name.
 _GROUP = "/"
-#: Samples of a time dataset that tell its rate.
-_LOOK = 100_000
+#: Samples of a time dataset that tell its rate, and which rows a logger left out.
+_LOOK = 2**26
 #: Bytes of unpacked chunks that the library keeps per dataset.
 _LEAST_CACHE, _MOST_CACHE = 2**20, 2**25
 _MAX_TEXT = 8 * 2**20
@@ -179,8 +179,8 @@ class Hdf5Reader(RunReader):
                 fault = "the group holds no dataset of numbers"
                 empty = self.problem("error", "", fault, "Store one dataset per channel")
                 raise RigDataError(problems[:_LISTED] or empty)
-            stated = self._checked_rate(group.attrs)
-            run_rate = stated or self.stated_rate
+            rate = self._checked_rate(group.attrs)
+            run_rate = rate or self.stated_rate
             names = [name for name in self.channels if name in lengths]
             if run_rate is None:  # else nobody needs times that are not described
                 names += [name for name in lengths if name not in self.channels]
@@ -189,12 +189,12 @@ class Hdf5Reader(RunReader):
             for clock in [names[i] for i in clocks]:
                 time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
                 grid = timed_grid(lengths[clock], clock, time, clock, run_rate)
-                timed[clock] = grid if stated is None or self.channels[clock].clock else replace(grid, rate=stated)
+                timed[clock] = grid if rate is None or self.channels[clock].clock else replace(grid, rate=rate)
             timings = {name: Grid(length) for name, length in lengths.items() if name not in timed}
             for name, i in zip(names, serving(names, clocks, self.channels), strict=True):
                 if i is not None and name in timings:
-                    same = [clock for clock in (names[i], *timed) if lengths[clock] == lengths[name]]
-                    timings[name] = timed[same[0]] if same else Grid(lengths[name], times=lengths[names[i]])
+                    matches = [clock for clock in (names[i], *timed) if lengths[clock] == lengths[name]]
+                    timings[name] = timed[matches[0]] if matches else Grid(lengths[name], times=lengths[names[i]])
             remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
             grids, faults = self._planned(timings, run_rate, "dataset", remedy)
             unserved = Grid(max(lengths.values()), "", run_rate or np.nan)
@@ -222,8 +222,7 @@ class Hdf5Reader(RunReader):
         with self._group() as group:
             return self._seconds(group, clock, start, stop)
 
-    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of channels of one device; only the chunks of the slice are read."""
+    def _stored(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         if stop - start > MAX_REQUEST:
             raise self.refuse("", f"{stop - start} samples asked for at once", "Read the run in slices")
         with self._group() as group:
@@ -260,8 +259,8 @@ class Hdf5Reader(RunReader):
 
     def _unit(self, group: Any, name: str) -> str:
         attributes = self._dataset(group, name).attrs
-        stated = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]
-        return str(_text(attributes[stated[0]]) or "") if stated else ""
+        keys = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]
+        return str(_text(attributes[keys[0]]) or "") if keys else ""
 
 
 def _text(value: Any) -> object:

@@ -27,15 +27,15 @@ _BOMS = (
 _ASCII = bytes(range(128)) + b"\x7f" * 128
 
 
-def text_encoding(path: Path, stated: str | None) -> str:
+def text_encoding(path: Path, encoding: str | None) -> str:
     """Codec of a text file: its byte-order mark, else what is stated, else detected."""
     with path.open("rb") as stream:
         head = stream.read(65536)
     for mark, codec in _BOMS:
         if head.startswith(mark):
             return codec
-    if stated is not None:
-        return stated
+    if encoding is not None:
+        return encoding
     for first, codec in ((1, "utf-16-le"), (0, "utf-16-be")):
         half = head[first:400:2]
         if len(head) >= 4 and half.count(0) > 0.9 * len(half):

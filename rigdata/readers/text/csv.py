@@ -200,8 +200,8 @@ def _judged(head: Head, places: Sequence[int], odd_lines: int) -> tuple[Problem,
     problems = []
     for i, cells_of_text in texts.items():
         number, cell = cells_of_text[0] if cells_of_text else (head.data_line, "?")
-        more = f", and in {len(cells_of_text) - 1} more lines" if len(cells_of_text) > 1 else ""
-        fault = f"{cell!r} is not a {'time stamp' if i in head.stamps else 'number'}{more}"
+        addition = f", and in {len(cells_of_text) - 1} more lines" if len(cells_of_text) > 1 else ""
+        fault = f"{cell!r} is not a {'time stamp' if i in head.stamps else 'number'}{addition}"
         remedy = "Delete or repair these cells; an empty cell counts as missing"
         problems.append(record.problem("error", f"line {number}, column {i + 1} ({head.names[i]})", fault, remedy))
     if not problems and odd_lines == len(wrong) == 1 and wrong[0][0] == last and wrong[0][1] < width:

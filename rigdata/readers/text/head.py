@@ -131,20 +131,20 @@ class _HeadFinder:
             names = ", ".join(sorted(self.channels)[:6])
             remedy = "Name the manifest's channels as the columns are named"
             raise self._refuse(0, f"no line holds a channel name of the manifest ({names}, ..)", remedy)
-        stated = self._best(self.delimiters, every_line[line - 1 : line] if line else every_line)
-        matched = 0 if stated is None else stated.matched
-        if stated is not None and (matched >= best.matched or stated.line != best.line):
-            return stated
+        candidate = self._best(self.delimiters, every_line[line - 1 : line] if line else every_line)
+        matched = 0 if candidate is None else candidate.matched
+        if candidate is not None and (matched >= best.matched or candidate.line != best.line):
+            return candidate
         keys = ("header_line", "delimiter")
-        said = " and ".join(f"{key} {getattr(self.spec, key)!r}" for key in keys if getattr(self.spec, key))
-        fault = f"{said} of the manifest: {matched} channel names; line {best.line} with {best.delimiter!r} holds"
+        settings = " and ".join(f"{key} {getattr(self.spec, key)!r}" for key in keys if getattr(self.spec, key))
+        fault = f"{settings} of the manifest: {matched} channel names; line {best.line} with {best.delimiter!r} holds"
         raise self._refuse(0, f"{fault} {best.matched}", "Correct [csv], or leave it out")
 
-    def _best(self, delimiters: tuple[str, ...], where: range) -> _NamesLine | None:
+    def _best(self, delimiters: tuple[str, ...], numbers: range) -> _NamesLine | None:
         """Find the line with most of the channel names; of equals the one that numbers follow."""
         best = None
         best_rank = (0, True)
-        for number in where:
+        for number in numbers:
             if not any(name in self.lines[number] for name in self.channels):
                 continue
             for delimiter in delimiters:
@@ -215,12 +215,12 @@ class _HeadFinder:
         """Decimal mark; None where the sample holds whole numbers only."""
         commas = [cell for cell in cells if "," in cell and is_number(cell, ",")]
         points = [cell for cell in cells if "." in cell and is_number(cell, ".")]
-        stated = self.spec.decimal
+        mark = self.spec.decimal
         if len(commas) == len(points):
-            return stated or ("." if points else None)
+            return mark or ("." if points else None)
         observed, example = (",", commas[0]) if len(commas) > len(points) else (".", points[0])
-        if stated is not None and stated != observed:
-            fault = f"decimal is {stated!r} in the manifest, but numbers look like {example!r}"
+        if mark is not None and mark != observed:
+            fault = f"decimal is {mark!r} in the manifest, but numbers look like {example!r}"
             raise self._refuse(0, fault, f"Set [csv] decimal = {observed!r}, or leave it out")
         return observed
 

@@ -111,6 +111,6 @@ def _drawing_problems(c: Command, campaign: Campaign, problems: list[Problem]) -
         return bearing_problems(campaign, c.bearing_of(campaign), problems)
     except BearingError as error:
         file = campaign.bearing_name
-        what, _, remedy = str(error).partition("\n")[0].removeprefix(file).lstrip(",: ").partition(". ")
+        fault, _, remedy = str(error).partition("\n")[0].removeprefix(file).lstrip(",: ").partition(". ")
         cure = f"{remedy} Or give --bearing FILE where one is needed".strip()
-        return [Problem("warning", file, "", what.rstrip("."), cure)]
+        return [Problem("warning", file, "", fault.rstrip("."), cure)]

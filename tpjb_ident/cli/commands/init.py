@@ -53,8 +53,8 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
             "or move the file away."
         )
     before = manifest.read_text("utf-8-sig") if update else ""
-    stated = [p for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]]
-    bearing = bearing or (stated[0].name if len(stated) == 1 else None)
+    drawings = [p for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]]
+    bearing = bearing or (drawings[0].name if len(drawings) == 1 else None)
     exports, problems = _read_exports(c, folder, column_names(before) if update else ())
     drawing = (folder if bearing else c.target) / (bearing or BEARING)
     angles: list[float] = []
@@ -73,8 +73,8 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
         _write(c, MANIFEST, text, before)
     open_places = open_summary(open_paths(tomllib.loads(text)))
     undrawn = drawing.read_text("utf-8", "replace").count(f'"{MARK}') if drawing.is_file() else 0
-    beside = f"; {drawing.name}: {counted(undrawn, 'place')} open ({MARK})" if undrawn else ""
-    c.print(f"{manifest}: {count}; {open_places or 'no place is open'}{beside}.")
+    remark = f"; {drawing.name}: {counted(undrawn, 'place')} open ({MARK})" if undrawn else ""
+    c.print(f"{manifest}: {count}; {open_places or 'no place is open'}{remark}.")
     if channels:
         c.show(f"{folder.name}: channels", words("channel", "quantity", "unit", "axis", "axis by"), channels)
     for problem in problems:

@@ -95,10 +95,9 @@ def _show(c: Command, result: CampaignPlan) -> None:
         size = _detected_from(row["seen_from"], candidate.parameter)
         like = label_in_words(row["mistaken_for"]) or "-"
         rows.append([label_in_words(row["effect"]), row["typical_size_sigma"], size, like])
-    seen = len(rows) - len(result.below_floor)
     c.print(
-        f"{seen} of {counted(len(rows), 'effect')} would be seen at a typical size; {len(result.confusable)} of "
-        f"{result.pairs} pairs could not be told apart."
+        f"{len(rows) - len(result.below_floor)} of {counted(len(rows), 'effect')} would be seen at a typical size; "
+        f"{len(result.confusable)} of {result.pairs} pairs could not be told apart."
     )
     columns = [*words("effect"), Column("sigma", ".1f"), "seen from", *words("like")]
     c.show("What this campaign could tell", columns, rows)

@@ -48,10 +48,10 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
             c.note(f"{name} is not repeated")
             continue
         repeated[name] = entry
-        for known in files_of(folder, name, entry, ()):
-            if known["role"] == "input" and known["state"] != "same":
-                place = f"{folder}: input {known['file']} of {name}"
-                raise BadInputError(f"{place} {STATES[known['state']]}. Bring it back to where it was.")
+        for source in files_of(folder, name, entry, ()):
+            if source["role"] == "input" and source["state"] != "same":
+                place = f"{folder}: input {source['file']} of {name}"
+                raise BadInputError(f"{place} {STATES[source['state']]}. Bring it back to where it was.")
     if not repeated:
         raise BadInputError(f"{record}: names no command that can be repeated ({', '.join(_REPEATABLE)}).")
     pairs = []
@@ -96,9 +96,9 @@ def _typed(parameters: Iterable[Any], entry: Mapping[str, Any], folder: Path) ->
     for parameter in parameters:
         if parameter.name in _OURS:
             continue
-        given = options.get(parameter.name)
+        option = options.get(parameter.name)
         files = [str(folder / place) for key, place in places.items() if key.partition(".")[0] == parameter.name]
-        values = given if isinstance(given, list) else [given]
+        values = option if isinstance(option, list) else [option]
         for value in files or values:
             if isinstance(value, bool):
                 flags += (parameter.opts if value else parameter.secondary_opts)[:1]

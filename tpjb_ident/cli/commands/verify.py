@@ -30,10 +30,10 @@ def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
     files = [file for name, entry in entries.items() for file in files_of(results, name, entry, given or ())]
     if not files:
         raise BadInputError(f"{results}: {RECORD} names no results. Run the command again.")
-    others = [file for file in files if file["state"] != "same"]
-    count = f"{len(files) - len(others)} of {len(files)}" if others else "all"
+    mismatches = [file for file in files if file["state"] != "same"]
+    count = f"{len(files) - len(mismatches)} of {len(files)}" if mismatches else "all"
     c.print(f"{results}: {count} results and inputs are the same bytes as when the commands ended.")
-    for file in others:
+    for file in mismatches:
         c.print(f"{file['command']}: {file['role']} {file['file']} {STATES[file['state']]}")
     for name, entry in entries.items():
         former = texts_of(entry, "versions")
@@ -45,9 +45,9 @@ def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
         c.options = {"results": results}
         with c.results():
             c.json("verify.json", {"schema": "tpjb-verify/1", "folder": results.name, "files": files})
-    missing = [file["file"] for file in others if (file["role"], file["state"]) == ("input", "missing")]
-    if len(missing) < len(others):
-        names = [file["file"] for file in others if file["file"] not in missing]
+    missing = [file["file"] for file in mismatches if (file["role"], file["state"]) == ("input", "missing")]
+    if len(missing) < len(mismatches):
+        names = [file["file"] for file in mismatches if file["file"] not in missing]
         raise NotTrustedError(f"{results}: not as it was computed: {listed(names)}. Run the command again.")
     if missing:
         raise BadInputError(
@@ -71,7 +71,7 @@ def recorded(results: Path) -> dict[str, dict[str, Any]]:
     return entries
 
 
-def files_of(results: Path, name: str, entry: Mapping[str, Any], given: Sequence[Path]) -> Iterator[dict[str, str]]:
+def files_of(results: Path, name: str, entry: Mapping[str, Any], inputs: Sequence[Path]) -> Iterator[dict[str, str]]:
     """Compare the files of one command with its entry: as verify.json lists them."""
     from rigdata.campaign import campaign_place
 
@@ -79,7 +79,7 @@ def files_of(results: Path, name: str, entry: Mapping[str, Any], given: Sequence
     for file in outputs_of(entry):
         yield {"command": name, "role": "result", "file": file, "state": _state([results], file, hashes[file])}
     folders = []
-    for place in given or [results / place for place in texts_of(entry, "inputs_at").values()]:
+    for place in inputs or [results / place for place in texts_of(entry, "inputs_at").values()]:
         inner = campaign_place(place)
         folders += [inner if inner.is_dir() else inner.parent, *([place] if place.is_dir() else ())]
     around = [parent for folder in folders for parent in folder.resolve().parents]

@@ -89,19 +89,19 @@ class Levels:
     """Columns beside a model at every scale of the model's error, the model's own numbers integrated out."""
 
     errors: ErrorModel
-    rest: FloatArray  #: (n, c)
+    rotated: FloatArray  #: (n, c)
     lower: FloatArray  #: (scales, k, k): Cholesky factors of the numbers' inverse covariance, in prior widths
     shared: FloatArray  #: (scales, k, c)
 
     @classmethod
-    def of(cls, errors: ErrorModel, linear: Linear, beside: FloatArray) -> Levels:
+    def of(cls, errors: ErrorModel, linear: Linear, columns: FloatArray) -> Levels:
         """The model's residual where nothing is off comes first, then what is `beside` it, (n, c - 1)."""
-        own = errors.basis @ (linear.jacobian * linear.width)
+        scaled = errors.basis @ (linear.jacobian * linear.width)
         offset = linear.residual + linear.jacobian @ linear.theta
-        rest = errors.basis @ np.column_stack([offset, beside])
-        weighted = np.swapaxes(own[None] * errors.shrink[:, :, None] ** 2, 1, 2)
-        lower = np.asarray(np.linalg.cholesky(weighted @ own + np.eye(own.shape[1])), float)
-        return cls(errors, rest, lower, np.linalg.solve(lower, weighted @ rest))
+        rotated = errors.basis @ np.column_stack([offset, columns])
+        weighted = np.swapaxes(scaled[None] * errors.shrink[:, :, None] ** 2, 1, 2)
+        lower = np.asarray(np.linalg.cholesky(weighted @ scaled + np.eye(scaled.shape[1])), float)
+        return cls(errors, rotated, lower, np.linalg.solve(lower, weighted @ rotated))
 
     @property
     def half_det(self) -> FloatArray:
@@ -111,9 +111,9 @@ class Levels:
     def product(self, columns: slice) -> FloatArray:
         """Products of some columns with each other, the residual first among them, (scales, 1 + c, 1 + c)."""
         chosen = [0, *range(columns.start, columns.stop)]
-        rest, shared = self.rest[:, chosen], self.shared[:, :, chosen]
-        weighted = np.swapaxes(rest[None] * self.errors.shrink[:, :, None] ** 2, 1, 2)
-        return np.asarray(weighted @ rest - np.swapaxes(shared, 1, 2) @ shared)
+        part, shared = self.rotated[:, chosen], self.shared[:, :, chosen]
+        weighted = np.swapaxes(part[None] * self.errors.shrink[:, :, None] ** 2, 1, 2)
+        return np.asarray(weighted @ part - np.swapaxes(shared, 1, 2) @ shared)
 
     def mean(self, level: int, at: slice, weights: FloatArray) -> FloatArray:
         """The model's own numbers beside columns with some weights, in prior widths, (k,)."""
@@ -130,7 +130,7 @@ def posterior(errors: ErrorModel, linear: Linear) -> Posterior:
     width = linear.width
     levels = Levels.of(errors, linear, linear.residual)
     square = levels.product(slice(1, 1))[:, 0, 0]
-    solved = errors.shrink**2 @ levels.rest[:, 1] ** 2 + np.sum((linear.theta / width) ** 2)
+    solved = errors.shrink**2 @ levels.rotated[:, 1] ** 2 + np.sum((linear.theta / width) ** 2)
     weighted = -0.5 * (square + errors.log_norm) - levels.half_det + errors.log_weights
     total = float(logsumexp(weighted))
     weights = np.exp(weighted - total)

@@ -155,16 +155,16 @@ def _combinations(unknowns: Unknowns) -> tuple[list[str], FloatArray]:
     All of prior variance 1.
     """
     listed = {int(i): unknowns.problem.nuisances[i - unknowns.amplitudes] for i in unknowns.tolerances}
-    each = np.eye(len(unknowns.width))
-    names, rows = [n.label for n in listed.values()], list(each[unknowns.tolerances])
+    unit = np.eye(len(unknowns.width))
+    names, rows = [n.label for n in listed.values()], list(unit[unknowns.tolerances])
     sigma = {n.name: n.sigma for n in listed.values()}
     for scatter, common in _MEANS.items():
-        members = each[[i for i, n in listed.items() if n.name == scatter]].sum(axis=0)
+        members = unit[[i for i, n in listed.items() if n.name == scatter]].sum(axis=0)
         if members.sum() > 1:
-            whole = each[[i for i, n in listed.items() if n.name == common]].sum(axis=0)
+            common_row = unit[[i for i, n in listed.items() if n.name == common]].sum(axis=0)
             names.append(f"{scatter}, mean of all pads")
-            rows.append(sigma[scatter] * members / members.sum() + sigma.get(common, 0.0) * whole)
-    table = np.reshape(rows, (-1, len(each)))
+            rows.append(sigma[scatter] * members / members.sum() + sigma.get(common, 0.0) * common_row)
+    table = np.reshape(rows, (-1, len(unit)))
     return names, table / np.linalg.norm(table, axis=1)[:, None]
 
 

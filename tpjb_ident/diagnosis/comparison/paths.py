@@ -46,8 +46,8 @@ class Path:
         if self.nodes is None:
             return amplitudes
         inside = self._inside(amplitudes, self.nodes)
-        beyond = amplitudes - inside[:, None]
-        return np.asarray(self.pieces(inside) + beyond * self.pieces(inside, 1))
+        excess = amplitudes - inside[:, None]
+        return np.asarray(self.pieces(inside) + excess * self.pieces(inside, 1))
 
     def slopes(self, amplitudes: FloatArray) -> FloatArray:
         """Of the columns in the derivatives at amplitudes (t, k), (t, c, k)."""
@@ -78,7 +78,7 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
 
     Those without an equilibrium anywhere are left out.
     """
-    stated = np.zeros(len(problem.nuisances))
+    baseline = np.zeros(len(problem.nuisances))
     curved = [f for f in problem.faults if len(f.width) == 1]
     straight = [f for f in problem.faults if f not in curved]
     columns = problem.scaled(problem.columns)
@@ -93,12 +93,12 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
             side = 0.0 if problem.nuisances[fault.own].place else float(towards[fault.own])
         begun.append(path)
         sizes.append(side * _NEAR * float(fault.width[0]))
-    paths = [path for path in lengthened(run, ((), stated), begun, sizes, 1) if path.columns.size]
-    jobs = [((f,), np.append(np.zeros(len(f.width)), stated), tuple(range(len(f.width)))) for f in straight]
-    for fault, found in zip(straight, run(derivatives, jobs), strict=True):
-        whole = [column for column in found if column is not None]
-        if len(whole) == len(fault.width):
-            paths.append(Path(fault, np.column_stack(whole)))
+    paths = [path for path in lengthened(run, ((), baseline), begun, sizes, 1) if path.columns.size]
+    jobs = [((f,), np.append(np.zeros(len(f.width)), baseline), tuple(range(len(f.width)))) for f in straight]
+    for fault, derived in zip(straight, run(derivatives, jobs), strict=True):
+        valid = [column for column in derived if column is not None]
+        if len(valid) == len(fault.width):
+            paths.append(Path(fault, np.column_stack(valid)))
     return tuple(paths)
 
 
@@ -110,8 +110,8 @@ def _wanted(fault: Fault, size: float) -> list[float]:
     _, width, low, high = fault.prior[:, 0].tolist()
     side = math.copysign(width, size)
     near, back, end = np.clip([_NEAR * side, -_NEAR * side, side], low, high).tolist()
-    beyond = [0.5 * (near + end), end] if abs(size) > _NEAR * width else []
-    return [node for node in dict.fromkeys([near, back, *beyond]) if node]
+    outer = [0.5 * (near + end), end] if abs(size) > _NEAR * width else []
+    return [node for node in dict.fromkeys([near, back, *outer]) if node]
 
 
 def lengthened(
@@ -124,15 +124,15 @@ def lengthened(
     out, asked = list(paths), []
     for i, (path, size) in enumerate(zip(paths, sizes, strict=True)):
         if size and path.nodes is not None:
-            known = {} if place[0] else {node: path.columns[:, k] for k, node in enumerate(path.nodes) if node}
-            nodes = [node for node in _wanted(path.fault, size) if node not in known]
-            asked.append((i, known, (path.fault, nodes)))
+            changes = {} if place[0] else {node: path.columns[:, k] for k, node in enumerate(path.nodes) if node}
+            nodes = [node for node in _wanted(path.fault, size) if node not in changes]
+            asked.append((i, changes, (path.fault, nodes)))
     parts = [asked[k :: run.opened.count] for k in range(run.opened.count)]
     jobs = [(place, [job for _, _, job in part], most) for part in parts]
     for part, rows in zip(parts, run(path_changes, jobs), strict=True):
-        for (i, known, (fault, _)), row in zip(part, rows, strict=True):
-            if known or row:
-                out[i] = path_through(fault, [*known.items(), *row])
+        for (i, changes, (fault, _)), row in zip(part, rows, strict=True):
+            if changes or row:
+                out[i] = path_through(fault, [*changes.items(), *row])
     return tuple(out)
 
 

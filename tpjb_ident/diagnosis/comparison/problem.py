@@ -68,9 +68,9 @@ def faults_of(pool: Sequence[Candidate], nuisances: Sequence[Nuisance]) -> tuple
     out = []
     numbers = {nuisance.effect: i for i, nuisance in enumerate(nuisances)}
     for candidate in pool:
-        own = numbers.get(candidate.label)
-        if own is not None:
-            out.append(_on_tolerance(candidate, own, nuisances[own]))
+        index = numbers.get(candidate.label)
+        if index is not None:
+            out.append(_on_tolerance(candidate, index, nuisances[index]))
         elif candidate.name not in _TOLERANCES_ALREADY:
             label = candidate.name if "direction" in candidate.fixed else candidate.label
             out.append(Fault(label, candidate, candidate.prior))

@@ -163,9 +163,9 @@ class _Search:
             before, fit = fit, self._renewed(fit)
             if fit is before:  # refused once, they would be refused again
                 return fit
-        right = min(f.posterior.scale for f in (leader or fit, fit)) <= Deciding.right
-        nats = Deciding.mistaken if start.coarse else Deciding.worth_derivatives if right else 0.0
-        tenable_first = right and leader is None  # whether it is tenable tells none that has not arrived
+        is_right = min(f.posterior.scale for f in (leader or fit, fit)) <= Deciding.right
+        nats = Deciding.mistaken if start.coarse else Deciding.worth_derivatives if is_right else 0.0
+        tenable_first = is_right and leader is None  # whether it is tenable tells none that has not arrived
         return self._renewed(fit) if tenable_first or self._near(fit, fit.posterior.promised, nats) else fit
 
     def _fit(self, proposal: Start) -> None:
@@ -182,8 +182,8 @@ class _Search:
             self.begun[proposal.labels] = -math.inf
             coarse = self._reached(replace(proposal, coarse=True))  # its end lies astray
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
-        known = self.fits.get(proposal.labels)
-        if known is not None and known.posterior.total >= fit.posterior.total:
+        earlier = self.fits.get(proposal.labels)
+        if earlier is not None and earlier.posterior.total >= fit.posterior.total:
             return
         self.fits[proposal.labels] = fit
         self.estimates[proposal.labels] = math.inf if proposal.coarse else proposal.estimate
@@ -213,7 +213,8 @@ class _Search:
         if fit.p < Deciding.untenable or fit.on_bound:
             return False
         without = [self.fits.get(fit.labels - {label}) for label in fit.unsized]
-        return all(rest is not None and rest.posterior.total < fit.posterior.total - Deciding.near for rest in without)
+        most = fit.posterior.total - Deciding.near
+        return all(simpler is not None and simpler.posterior.total < most for simpler in without)
 
     def _log_probability(self, fit: Fit) -> float:
         return fit.posterior.total + self._log_prior(fit.faults)
@@ -283,8 +284,8 @@ class _Search:
         members = self.problem.said_by(path.fault)
         if not members:
             return path
-        own = fit.linear.jacobian[:, fit.unknowns.amplitudes :]
-        column = np.sum([share * own[:, i] for i, share in members.items()], axis=0)
+        columns = fit.linear.jacobian[:, fit.unknowns.amplitudes :]
+        column = np.sum([share * columns[:, i] for i, share in members.items()], axis=0)
         return Path(path.fault, column[:, None])
 
     def _propose(self, score: Score, faults: tuple[Fault, ...], linear: Linear, coarse: bool = False) -> None:
@@ -331,16 +332,16 @@ class _Search:
 
     def _offer(self, proposal: Start) -> None:
         """Keep the likeliest start of every explanation that was not fitted yet, or less well than from there."""
-        known, fit = self.proposals.get(proposal.labels), self.fits.get(proposal.labels)
+        queued, fit = self.proposals.get(proposal.labels), self.fits.get(proposal.labels)
         if proposal.coarse:
             better = proposal.estimate > self.begun.get(proposal.labels, -math.inf)
         else:
             better = fit is None or proposal.estimate > self._log_probability(fit) + Deciding.better
-        if known is not None and known.coarse and not proposal.coarse:  # a start that would lead is past the jumps
+        if queued is not None and queued.coarse and not proposal.coarse:  # a start that would lead is past the jumps
             best = self._leader() or (self._best_of_all if self._passed else None)
             better &= best is not None and proposal.estimate > self._log_probability(best)
-        elif known is not None:
-            better &= (known.coarse, known.estimate) < (proposal.coarse, proposal.estimate)
+        elif queued is not None:
+            better &= (queued.coarse, queued.estimate) < (proposal.coarse, proposal.estimate)
         if better:
             self.proposals[proposal.labels] = proposal
 
@@ -354,5 +355,5 @@ class _Search:
         total = logsumexp([*counted, *(start.estimate for start in waiting)])
         probabilities = np.exp(counted - total)
         order = np.lexsort((-logs, -probabilities))
-        rest = tuple(({fault.name for fault in s.faults}, math.exp(s.estimate - total)) for s in waiting)
-        return Comparison({rows[i]: float(probabilities[i]) for i in order}, rest, tenable, self.paths)
+        promised = tuple(({fault.name for fault in s.faults}, math.exp(s.estimate - total)) for s in waiting)
+        return Comparison({rows[i]: float(probabilities[i]) for i in order}, promised, tenable, self.paths)

@@ -5,7 +5,6 @@ width of its prior. All are counted from their priors' means.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -43,9 +42,9 @@ class Unknowns:
         #: where the faults' numbers are
         self.of_faults = [i for at in self.slices for i in range(at.start, at.stop)]
         self.origin, self.width, self.low, self.high = priors
-        stated = np.delete(np.arange(plain.shape[1]), [fault.own for fault in faults if fault.own >= 0])
+        plain_rows = np.delete(np.arange(plain.shape[1]), [fault.own for fault in faults if fault.own >= 0])
         #: (t,): where tolerances with their stated prior are
-        self.tolerances = self.amplitudes + stated
+        self.tolerances = self.amplitudes + plain_rows
 
     @property
     def is_reading(self) -> list[bool]:
@@ -70,15 +69,12 @@ class Unknowns:
             return None
 
 
-def prediction(forward: Forward, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray) -> FloatArray | None:
-    """Job: the prediction at a point."""
+def prediction(
+    forward: Forward, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray, patient: bool = False
+) -> FloatArray | None:
+    """Job: the prediction at a point; patient: whatever it takes to find an equilibrium."""
+    forward.cache.patient = patient
     return Unknowns(problem, faults).predict(forward, theta)
-
-
-def patient_prediction(forward: Forward, *asked: Any) -> FloatArray | None:
-    """Job: the same, whatever it takes to find an equilibrium."""
-    forward.cache.patient = True
-    return prediction(forward, *asked)
 
 
 def derivatives(
@@ -102,10 +98,10 @@ def _difference(
     """One difference; the other way where the first is out of bounds or has no equilibrium."""
     index, step = moved
     for signed in (step, -step):
-        there = theta.copy()
-        there[index] += signed
-        if unknowns.low[index] <= there[index] <= unknowns.high[index]:
-            changed = unknowns.predict(forward.fresh(near=True), there)
+        neighbour = theta.copy()
+        neighbour[index] += signed
+        if unknowns.low[index] <= neighbour[index] <= unknowns.high[index]:
+            changed = unknowns.predict(forward.fresh(near=True), neighbour)
             if changed is not None:
                 return np.asarray((changed - at_point) / signed)
     return None
@@ -133,10 +129,10 @@ def _changes(
         theta = np.insert(theta, at, 0.0)
     out: list[tuple[float, FloatArray]] = []
     for node in nodes:
-        there = theta.copy()
-        there[at] = node
+        node_place = theta.copy()
+        node_place[at] = node
         if len(out) < most and unknowns.low[at] <= node <= unknowns.high[at]:
-            changed = unknowns.predict(forward.fresh(), there)
+            changed = unknowns.predict(forward.fresh(), node_place)
             if changed is not None:
                 out.append((node, changed - base))
     return out

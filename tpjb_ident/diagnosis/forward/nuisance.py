@@ -86,8 +86,8 @@ class Nuisance:
     def change(self, setup: Setup, size: float) -> Setup:
         """Apply the effect of the size that this being off is."""
         effect, *place = self.effect.split()
-        kind, where = kind_of(effect), {name: int(number) for name, number in zip(place[::2], place[1::2], strict=True)}
-        return kind.apply(setup, **where, **{kind.parameters[-1].name: OWN_NUMBERS[effect].parameter(size)})
+        kind, fixed = kind_of(effect), dict(zip(place[::2], map(int, place[1::2]), strict=True))
+        return kind.apply(setup, **fixed, **{kind.parameters[-1].name: OWN_NUMBERS[effect].parameter(size)})
 
 
 def shifted(setup: Setup, known: Sequence[Nuisance], size: Sequence[float]) -> Setup:
@@ -105,14 +105,14 @@ def nuisances(
     pads = np.where(named(elements, "family") == "temperature", places(elements, "pad"), math.nan)
     warm = sorted({int(pad) for pad in pads[np.isfinite(pads)]})
     listed = []
-    for effect, own in OWN_NUMBERS.items():
-        reads = own.tolerance == "thermometer"
-        count = len(setup.bearing.pads) * by_pad if own.place == "pad" else 2
-        numbers = warm if reads else range(1, count + 1) if own.place else (0,)
+    for effect, kind in OWN_NUMBERS.items():
+        reads = kind.tolerance == "thermometer"
+        count = len(setup.bearing.pads) * by_pad if kind.place == "pad" else 2
+        numbers = warm if reads else range(1, count + 1) if kind.place else (0,)
         for number in numbers:
-            sigma, place = tolerances[own.tolerance], f"{own.place} {number}" if own.place else ""
+            sigma, place = tolerances[kind.tolerance], f"{kind.place} {number}" if kind.place else ""
             column = np.where(pads == number, sigma, 0.0) if reads else None
-            listed.append(Nuisance(own.tolerance, sigma, own.unit, place, column, f"{effect} {place}".strip()))
+            listed.append(Nuisance(kind.tolerance, sigma, kind.unit, place, column, f"{effect} {place}".strip()))
     shifts = centre_shifts(elements) * tolerances.centre
     listed += [
         Nuisance("centre", tolerances.centre, "m", letter, column=shifts[:, axis])

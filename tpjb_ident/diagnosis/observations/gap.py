@@ -29,12 +29,12 @@ def held_out(observations: Observations) -> BoolArray:
     swept = usual & (family == "h")
     points = set(zip(load[swept].tolist(), direction[swept].tolist(), strict=True))
     for weight, way in points:
-        there = (load == weight) & (direction == way)
-        lines = np.unique(line[swept & there])
+        at_point = (load == weight) & (direction == way)
+        lines = np.unique(line[swept & at_point])
         if len(lines) >= Deciding.sweep:
-            out |= usual & there & np.isin(line, lines[[0, -1]])
+            out |= usual & at_point & np.isin(line, lines[[0, -1]])
         elif len(points) > 2 and weight == load[swept].max():
-            out |= usual & there
+            out |= usual & at_point
     return out if out.any() else ~out
 
 
@@ -129,9 +129,9 @@ def localise(observations: Observations, prediction: FloatArray) -> tuple[Disagr
     total, names = float(np.sum(z**2)), named(observations.elements, "observable")
     rows: list[Disagreement] = []
     for name in dict.fromkeys(names.tolist()):
-        for where, part in _regions(observations.elements, names == name):
+        for region, part in _regions(observations.elements, names == name):
             square = float(np.sum(z[part] ** 2))
-            rows.append(Disagreement(name, where, math.sqrt(square / part.sum()), square / total if total else 0.0))
+            rows.append(Disagreement(name, region, math.sqrt(square / part.sum()), square / total if total else 0.0))
     return tuple(sorted(rows, key=lambda d: -d.share)[:_MOST])
 
 
@@ -141,21 +141,21 @@ _TWICE = 1.75, 2.3
 
 def contradictions(observations: Observations, base: FloatArray) -> tuple[str, ...]:
     """What static tests say of the bearing file without any search; `base` (n,)."""
-    names, said = named(observations.elements, "observable"), []
+    names, sentences = named(observations.elements, "observable"), []
     polygon = names == "clearance_pushed"
     if polygon.any():
         measured, drawn = float(np.mean(observations.value[polygon])), float(np.mean(base[polygon]))
         low, high = _TWICE
         ratio = max(measured / drawn, drawn / measured)
         if low <= ratio <= high:
-            said.append(
+            sentences.append(
                 f"The clearance polygon measures {1e6 * measured:.0f} um where the bearing file leads to "
                 f"{1e6 * drawn:.0f} um, a factor of {ratio:.2f}: look whether the file gives a diameter for a radius."
             )
     loads = names == "load_ratio"
     if loads.any() and abs(off := float(np.median(observations.value[loads] / base[loads])) - 1.0) > _LOADS:
-        said.append(f"The cells read {100 * (1 + off):.0f} % of the loads that were set.")
-    return tuple(said)
+        sentences.append(f"The cells read {100 * (1 + off):.0f} % of the loads that were set.")
+    return tuple(sentences)
 
 
 #: Share by which cells and set loads may part before that is said.

@@ -108,7 +108,7 @@ _LOCUS = [("locus", "locus_x"), ("locus", "locus_y"), ("load", "load_ratio"), ("
 
 def _elements(names: Iterable[tuple[str, str]], *places: Where) -> list[Element]:
     """Every observable at every place."""
-    return [Element(family, observable, where) for where in places for family, observable in names]
+    return [Element(family, observable, place) for place in places for family, observable in names]
 
 
 def all_elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
@@ -179,10 +179,10 @@ Part = tuple[FloatArray, FloatArray]
 def _gathered(layout: Layout, angles: Sequence[float], parts: Sequence[Part], model: float) -> Observations:
     """All that was measured, as one vector."""
     value, covariance = np.concatenate([v for v, _ in parts]), block_diag(*(c for _, c in parts))
-    known = np.isfinite(value) & np.isfinite(np.diag(covariance))
-    elements, value = tuple(itertools.compress(all_elements(layout, angles), known)), value[known]
+    is_measured = np.isfinite(value) & np.isfinite(np.diag(covariance))
+    elements, value = tuple(itertools.compress(all_elements(layout, angles), is_measured)), value[is_measured]
     sigma = stated_sigma(elements, value, model)
-    return Observations(layout, value, covariance[np.ix_(known, known)], sigma, elements)
+    return Observations(layout, value, covariance[np.ix_(is_measured, is_measured)], sigma, elements)
 
 
 def observe(
@@ -243,11 +243,11 @@ def _add_locus(parts: list[Part], locus: Locus, identification: Identification) 
     points = [p.point for p in locus.points]
     tests = [LocusTest(point.static_load, point.static_load_direction, point.spin) for point in points]
     chosen, moved = _spread(tests), moved_by_miss(locus, identification)
-    for test, p, give in zip(tests, locus.points, moved, strict=True):
+    for test, p, moved_by in zip(tests, locus.points, moved, strict=True):
         if test not in chosen:
             continue
         turn = math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)
-        stacked = np.vstack([give, np.eye(2)])
+        stacked = np.vstack([moved_by, np.eye(2)])
         covariance = stacked @ spread @ stacked.T
         covariance[:2, :2] += p.covariance
         parts.append((np.array([*p.position, p.load / test.load, turn]), covariance))

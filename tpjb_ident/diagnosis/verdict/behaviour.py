@@ -66,10 +66,10 @@ def _pads(fit: Fit) -> list[Behaviour]:
         if nuisance is None or abs(deviation.significance) < Deciding.visible:
             continue
         effect, _, number = nuisance.effect.split()
-        own, pad = OWN_NUMBERS[effect], float(number)
+        number_kind, pad = OWN_NUMBERS[effect], float(number)
         error = math.sqrt(max(1.0 - deviation.heard, 0.0))
         half = HALF_INTERVAL * error
-        size, low, high = (own.parameter((deviation.size + off) * nuisance.sigma) for off in (0.0, -half, half))
+        size, low, high = (number_kind.parameter((deviation.size + off) * nuisance.sigma) for off in (0.0, -half, half))
         parameter = kind_of(effect).parameters[-1]
         estimate = Estimate(size, low, high, parameter.unit)
         words = finding(effect, {"pad": Estimate(pad, pad, pad), parameter.name: estimate})
@@ -134,12 +134,12 @@ def _over(fit: Fit, fault: Fault, index: int, row: tuple[str, str, int]) -> tupl
     name, coordinate, levels = row
     elements = fit.problem.observations.elements
     moving = np.isin(named(elements, "family"), ["h", "temperature"])
-    where = np.where(moving, np.abs(places(elements, coordinate)), math.nan)
-    finite_values = np.unique(where[np.isfinite(where)]).tolist()
+    coordinates = np.where(moving, np.abs(places(elements, coordinate)), math.nan)
+    finite_values = np.unique(coordinates[np.isfinite(coordinates)]).tolist()
     if len(finite_values) < levels:
         return None
     middle = float(np.mean(finite_values))
-    slope = np.nan_to_num(where / middle - 1.0)
+    slope = np.nan_to_num(coordinates / middle - 1.0)
     linear, moved, errors = fit.linear, float(fit.posterior.mean[index]), fit.problem.errors
     # per unit of relative growth; a prior of one: up to twice, down to nothing
     wider = Linear(
@@ -159,11 +159,11 @@ def _over(fit: Fit, fault: Fault, index: int, row: tuple[str, str, int]) -> tupl
     return rise, Drift(fault.label, first, name, ends[0], ends[1], _words(ends, finite_values, name))
 
 
-def _words(ends: list[float], known: list[float], over: str) -> str:
+def _words(ends: list[float], levels: list[float], over: str) -> str:
     spoken = over.replace("_", " ")
     if not 0.0 < ends[0] * ends[1] < math.inf:
         return f"changes from {ends[0]:.3g} to {ends[1]:.3g} over the {spoken}"
-    power = math.log(ends[1] / ends[0]) / math.log(known[-1] / known[0])
+    power = math.log(ends[1] / ends[0]) / math.log(levels[-1] / levels[0])
     if 0.8 < power < 1.2:
         return f"grows in proportion to the {spoken}"
     how = "grows" if abs(ends[1]) > abs(ends[0]) else "falls"

@@ -59,15 +59,15 @@ class Decision:
     after: FloatArray = field(repr=False)  #: (n,)
 
 
-def decide(run: Map, problem: Problem, comparison: Comparison, known: Tolerances) -> Decision:
+def decide(run: Map, problem: Problem, comparison: Comparison, tolerances: Tolerances) -> Decision:
     """Turn a comparison into a verdict."""
     observations, judgement = problem.observations, judge(run, comparison)
     held, model = judgement.held, judgement.held.fit
     rows = held.rows
     effects = _effects(run, comparison, judgement) if judgement.has_effects else ()
     after = unseen = problem.base
-    if effects and held.stated is not None:
-        unseen, exact = held.stated, as_stated(run, model, model.posterior.mean)
+    if effects and held.exact is not None:
+        unseen, exact = held.exact, as_stated(run, model, model.posterior.mean)
         after = unseen if exact is None else exact
     heldout_after = gap(observations, unseen, rows)
     worst = localise(observations, free_prediction(model))
@@ -97,7 +97,7 @@ def decide(run: Map, problem: Problem, comparison: Comparison, known: Tolerances
         ),
         behaves_like=() if judgement.name in {"consistent", "named"} else behaviours(model),
         drift=judgement.drift,
-        assumptions=_assumptions(problem, model, known),
+        assumptions=_assumptions(problem, model, tolerances),
         reasons=judgement.reasons,
         beforehand=contradictions(observations, problem.base),
     )  # fmt: skip
@@ -147,16 +147,17 @@ def _below_floor(problem: Problem, comparison: Comparison) -> tuple[str, ...]:
     typical = [problem.sigma * (path.neutral_slope @ path.fault.width) / Deciding.width for path in paths]
     factor = usual_factor(problem.observations, problem.columns)
     white = np.linalg.solve(factor, np.reshape(typical, (-1, len(factor))).T)
-    seen = np.linalg.norm(white, axis=0) >= Deciding.visible
-    names, best = [path.fault.name for path in paths], comparison.best
-    beyond = {d.name for d in best.tolerances if abs(d.significance) > Deciding.visible}
-    told = {n.effect.split()[0] for n in problem.nuisances if n.label in beyond and n.effect} | best.names
-    return tuple(sorted({*names} - {name for name, is_seen in zip(names, seen, strict=True) if is_seen} - told))
+    hidden = np.linalg.norm(white, axis=0) < Deciding.visible
+    names, best = {path.fault.name for path in paths}, comparison.best
+    exceeding = {d.name for d in best.tolerances if abs(d.significance) > Deciding.visible}
+    listed = {n.effect.split()[0] for n in problem.nuisances if n.label in exceeding and n.effect} | best.names
+    visible = {path.fault.name for path, is_hidden in zip(paths, hidden, strict=True) if not is_hidden}
+    return tuple(sorted(names - visible - listed))
 
 
 def _ranked(comparison: Comparison) -> tuple[RankedCandidate, ...]:
     """The most probable explanations with their sizes; score: log evidence beside no fault at all."""
-    rest = comparison.nothing.posterior.total
+    reference = comparison.nothing.posterior.total
     out = []
     for fit, probability in comparison.probabilities.items():
         if fit.faults:
@@ -164,21 +165,21 @@ def _ranked(comparison: Comparison) -> tuple[RankedCandidate, ...]:
                 fault.label: {k: vars(p) for k, p in parameters_of(fit, i).items()}
                 for i, fault in enumerate(fit.faults)
             }
-            score, problem = fit.posterior.total - rest, fit.problem
-            left = gap(problem.observations, free_prediction(fit), problem.held)
-            out.append(RankedCandidate(fit.label, score, left, parameters, probability))
+            score, problem = fit.posterior.total - reference, fit.problem
+            held_gap = gap(problem.observations, free_prediction(fit), problem.held)
+            out.append(RankedCandidate(fit.label, score, held_gap, parameters, probability))
     return tuple(out[:_MOST_LISTED])
 
 
-def _assumptions(problem: Problem, fit: Fit, known: Tolerances) -> tuple[Assumption, ...]:
+def _assumptions(problem: Problem, fit: Fit, tolerances: Tolerances) -> tuple[Assumption, ...]:
     """Every tolerance that took part, with what the fit made of it, and how far out its farthest number is."""
     farthest = {d.name.split(" ")[0]: d.significance for d in reversed(fit.tolerances)}
     out = []
     for name, rows in itertools.groupby(zip(problem.nuisances, fit.sizes.tolist()), key=lambda row: row[0].name):
         members = list(rows)
         first, values = members[0][0], [size * nuisance.sigma for nuisance, size in members]
-        source = known.stated[name].source if name in known.stated else "default"
+        source = tolerances.stated[name].source if name in tolerances.stated else "default"
         value = values if len(values) > 1 else values[0]
         out.append(Assumption(name, first.sigma, value, first.unit, source, farthest.get(name, 0.0)))
-    stated = known["model"]
-    return (*out, Assumption("model", stated, stated * fit.posterior.scale, "1", known.stated["model"].source))
+    model = tolerances.stated["model"]
+    return (*out, Assumption("model", model.value, model.value * fit.posterior.scale, "1", model.source))

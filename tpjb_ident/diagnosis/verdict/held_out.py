@@ -10,7 +10,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Fault
-from tpjb_ident.diagnosis.comparison.unknowns import patient_prediction, prediction
+from tpjb_ident.diagnosis.comparison.unknowns import prediction
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap, noise_floor
@@ -40,14 +40,14 @@ class HeldOut:
 
     fit: Fit
     #: (n,): its faults alone, every tolerance as stated; None: no equilibrium
-    stated: FloatArray | None = field(repr=False)
+    exact: FloatArray | None = field(repr=False)
     touched: tuple[Touched, ...] = ()  #: by fault, the largest remainder first; none where one has no equilibrium
 
     @property
     def rows(self) -> BoolArray:
         """Elements that judge it: those left out, or all where these do not show every fault, (n,)."""
         held = self.fit.problem.held
-        return held if all(one.unseen for one in self.touched) else np.ones_like(held)
+        return held if all(row.unseen for row in self.touched) else np.ones_like(held)
 
     def gap(self, predicted: FloatArray) -> float:
         """Gap of a prediction (n,) on them."""
@@ -56,7 +56,7 @@ class HeldOut:
     @property
     def as_stated(self) -> float:
         """Gap with exactly the faults, every tolerance as stated."""
-        return math.inf if self.stated is None else self.gap(self.stated)
+        return math.inf if self.exact is None else self.gap(self.exact)
 
     @functools.cached_property
     def free(self) -> float:
@@ -91,47 +91,47 @@ class HeldOut:
 
 
 def _share(after: float, before: float, floor: float) -> float:
-    rest, room = (max(value**2 - floor**2, 0.0) for value in (after, before))
-    return rest / max(room, 1e-300)
+    remainder, room = (max(value**2 - floor**2, 0.0) for value in (after, before))
+    return remainder / max(room, 1e-300)
 
 
 def held_out_gap(run: Map, fit: Fit) -> HeldOut:
     """Solve a model with amplitudes from all other points, without its generic terms, every tolerance as stated."""
     # tolerances are integrated out about the fit: elsewhere a pad may have let go, and K and C have jumped
-    theta, others, at = fit.linear.theta.copy(), _from_others(fit), fit.unknowns.of_faults
-    theta[at] = others[at]
-    stated = as_stated(run, fit, theta)
-    if stated is None:
+    theta, refitted, at = fit.linear.theta.copy(), _from_others(fit), fit.unknowns.of_faults
+    theta[at] = refitted[at]
+    exact = as_stated(run, fit, theta)
+    if exact is None:
         return HeldOut(fit, None)
-    there, known = _without_terms(fit, theta)
-    whole, changes = _acting(run, fit, there, known)
-    if whole is not None and known and not changes:
+    place, parts = _without_terms(fit, theta)
+    complete, changes = _acting(run, fit, place, parts)
+    if complete is not None and parts and not changes:
         # without a fault there is no equilibrium there: what each does where all tolerances are as stated
-        _, changes = _acting(run, fit, _neutral(there, fit.unknowns.tolerances), known)
-    if whole is None or not changes:
-        return HeldOut(fit, stated)
-    pairs = zip(known, changes, strict=True)
-    touched = [_touched(fit, there, fault, (whole, change)) for (fault, _), change in pairs]
-    return HeldOut(fit, stated, tuple(sorted(touched, key=lambda one: -one.remaining)))
+        _, changes = _acting(run, fit, _neutral(place, fit.unknowns.tolerances), parts)
+    if complete is None or not changes:
+        return HeldOut(fit, exact)
+    pairs = zip(parts, changes, strict=True)
+    touched = [_touched(fit, place, fault, (complete, change)) for (fault, _), change in pairs]
+    return HeldOut(fit, exact, tuple(sorted(touched, key=lambda row: -row.remaining)))
 
 
 def _acting(
-    run: Map, fit: Fit, there: FloatArray, known: Sequence[tuple[Fault, slice]]
+    run: Map, fit: Fit, place: FloatArray, parts: Sequence[tuple[Fault, slice]]
 ) -> tuple[FloatArray | None, list[FloatArray]]:
     """The prediction somewhere, (n,), and what each fault does to it beside all else; none: one has no equilibrium."""
-    places = [there, *(_neutral(there, at) for _, at in known)]
-    whole, *partial = run(prediction, [(fit.faults, place) for place in places])
-    changes = [whole - part for part in partial if whole is not None and part is not None]
-    return whole, changes if len(changes) == len(known) else []
+    places = [place, *(_neutral(place, at) for _, at in parts)]
+    complete, *partial = run(prediction, [(fit.faults, theta) for theta in places])
+    changes = [complete - part for part in partial if complete is not None and part is not None]
+    return complete, changes if len(changes) == len(parts) else []
 
 
 def as_stated(run: Map, fit: Fit, theta: FloatArray) -> FloatArray | None:
     """What the faults of a fit predict alone, every tolerance as stated, SI, (n,); None: no equilibrium."""
-    there = _neutral(_without_terms(fit, theta)[0], fit.unknowns.tolerances)
-    (stated,) = run(prediction, [(fit.faults, there)])
-    if stated is None:  # a verdict hangs on it
-        (stated,) = run(patient_prediction, [(fit.faults, there)])
-    return None if stated is None else np.asarray(stated * fit.problem.sigma)
+    place = _neutral(_without_terms(fit, theta)[0], fit.unknowns.tolerances)
+    (exact,) = run(prediction, [(fit.faults, place)])
+    if exact is None:  # a verdict hangs on it
+        (exact,) = run(prediction, [(fit.faults, place, True)])
+    return None if exact is None else np.asarray(exact * fit.problem.sigma)
 
 
 def _without_terms(fit: Fit, theta: FloatArray) -> tuple[FloatArray, list[tuple[Fault, slice]]]:
@@ -156,16 +156,16 @@ def _touched(fit: Fit, theta: FloatArray, fault: Fault, acting: tuple[FloatArray
     `acting`: the prediction with it and what it does, where the fit has put the tolerances, which derivatives count
     back to what is stated: no covariance has how they bend.
     """
-    (whole, change), free, held = acting, fit.unknowns.tolerances, fit.problem.held
-    stated = fit.linear.jacobian[:, free]
-    rest = fit.problem.measured - whole + stated @ theta[free]
+    (complete, change), free, held = acting, fit.unknowns.tolerances, fit.problem.held
+    columns = fit.linear.jacobian[:, free]
+    residual = fit.problem.measured - complete + columns @ theta[free]
     for rows in (held, np.ones_like(held)):
         moved = change[rows]
-        weights = np.linalg.solve(_covariance(fit, rows, stated[rows]), moved)
+        weights = np.linalg.solve(_covariance(fit, rows, columns[rows]), moved)
         size = math.sqrt(max(float(weights @ moved), 1e-300))
         if size >= Deciding.enough:
             break
-    after = float(weights @ rest[rows]) / size
+    after = float(weights @ residual[rows]) / size
     return Touched(fault.label, abs(after + size), abs(after), rows is held and not held.all())
 
 

@@ -75,8 +75,8 @@ def _without_effects(held: HeldOut) -> Judgement:
 def _exactly(comparison: Comparison, sure: frozenset[str]) -> Fit | None:
     """The most probable tenable fit with exactly these names, unless it is as sure that one of a few stands beside."""
     fit = next((f for f in comparison.fits if sure and f.names == sure and f in comparison.tenable), None)
-    beside = fit is not None and comparison.probabilities[fit] <= 1.0 - Deciding.included
-    return None if beside and _family(comparison, sure) else fit
+    is_ambiguous = fit is not None and comparison.probabilities[fit] <= 1.0 - Deciding.included
+    return None if is_ambiguous and _family(comparison, sure) else fit
 
 
 def _family(comparison: Comparison, sure: frozenset[str]) -> tuple[str, ...]:
@@ -130,14 +130,14 @@ def _named(held: HeldOut, drift: Sequence[Drift], places: tuple[str, ...]) -> Ju
 
 def _shrunk(held: HeldOut) -> str:
     name = "gap" if held.rows.all() else "held-out gap"
-    whole = f"the {name} goes from {held.before:.2f} to {held.as_stated:.2f} sigma with all tolerances as stated"
+    overall = f"the {name} goes from {held.before:.2f} to {held.as_stated:.2f} sigma with all tolerances as stated"
     if not held.touched:
-        return whole
-    one = held.touched[0]
-    where = "on points left out of the fit" if one.unseen else "over all points (those left out do not show it)"
+        return overall
+    touched = held.touched[0]
+    points = "on points left out of the fit" if touched.unseen else "over all points (those left out do not show it)"
     return (
-        f"along what {one.label} does the gap goes from {one.before:.2f} to {one.after:.2f} standard deviations of all "
-        f"else that may be off, {where}; over everything {whole}"
+        f"along what {touched.label} does the gap goes from {touched.before:.2f} to {touched.after:.2f} standard "
+        f"deviations of all else that may be off, {points}; over everything {overall}"
     )
 
 

@@ -306,12 +306,12 @@ def points_table(points: Sequence[PointResult]) -> pd.DataFrame:
 
 def point_labels(table: pd.DataFrame) -> list[str]:
     """Load and excitation of every row, in words, and what else tells the rows apart."""
-    return [", ".join([place_of(load, excitation), *others]) for load, excitation, others in _set_points(table)]
+    return [", ".join([place_of(load, excitation), *extras]) for load, excitation, extras in _set_points(table)]
 
 
 def set_point_ticks(axes: Axes, table: pd.DataFrame) -> None:
     """Name places 0 to n - 1 of a panel by operating points: a line for load, excitation and what else differs."""
-    lines = [[f"{load / size('load'):.4g}", f"{hz:g}", *others] for load, hz, others in _set_points(table)]
+    lines = [[f"{load / size('load'):.4g}", f"{hz:g}", *extras] for load, hz, extras in _set_points(table)]
     axes.set_xticks(range(len(lines)), ["\n".join(texts) for texts in lines], fontsize=SMALL)
     shrink(axes, bottom=0.09 + _TICKS * (len(lines[0]) - 1 if lines else 0))
 

@@ -71,14 +71,14 @@ def coefficient(comparison: Comparison | pd.DataFrame, name: str, over: str = "l
     kind = KINDS[name[0]]
     scale, key = kind.display_scale, coefficient_column(name)
     predicted = series[f"{key}_predicted"]
-    off = 100.0 * (predicted / series[key] - 1.0)
-    series = series.assign(predicted=predicted / scale, off=off)
+    deviation = 100.0 * (predicted / series[key] - 1.0)
+    series = series.assign(predicted=predicted / scale, off=deviation)
     series["beyond"] = series.get("pivot_extrapolated", False) & (series["pivots"] == "measured")
     measured = series.drop_duplicates("at").dropna(subset=[key])
     value, errors = with_errors(measured, key, scale)
     shares = 100.0 * errors / np.maximum(np.abs(value), np.finfo(float).tiny)
-    apart = len(value) > 0 and np.median(shares) < _SMALL
-    figure, grid = new_pictures(2 if apart else 1, 1, height=(2.3, 1.5) if apart else 3.1)
+    is_split = len(value) > 0 and np.median(shares) < _SMALL
+    figure, grid = new_pictures(2 if is_split else 1, 1, height=(2.3, 1.5) if is_split else 3.1)
     axes = grid[0, 0]
     label(axes, axis_label(over), f"{name}, {kind.display_unit}")
     _draw_predictions(axes, series, "predicted")
@@ -87,13 +87,13 @@ def coefficient(comparison: Comparison | pd.DataFrame, name: str, over: str = "l
     if name in DIRECT:
         from_zero(axes)
     add_legend(axes)
-    if apart:  # predicted / measured - 1, as far as the closest prediction reaches
+    if is_split:  # predicted / measured - 1, as far as the closest prediction reaches
         axes = grid[1, 0]
         label(axes, axis_label(over), "deviation, %")
         _draw_predictions(axes, series, "off")
         axes.errorbar(measured["at"], np.zeros(len(measured)), yerr=shares, **_BARS)
         axes.margins(x=0.06)
-        reach = off.abs().groupby(series["pivots"]).max()
+        reach = deviation.abs().groupby(series["pivots"]).max()
         limit = 1.4 * max(np.max(shares), reach[reach > _EXACT].min() if (reach > _EXACT).any() else 1.0)
         axes.set_ylim(-limit, limit)
     return figure
@@ -106,10 +106,10 @@ def _draw_predictions(axes: Axes, series: pd.DataFrame, column: str) -> None:
     for name, rows in predictions.items():
         style = styles[name] | ({} if len(rows) >= CURVE else {"linestyle": "none"})
         axes.plot(rows["at"], rows[column], **style, markersize=4, label=MODEL_LABELS.get(name, name))
-        beyond = rows[rows["beyond"]]
-        if len(beyond):
+        overloads = rows[rows["beyond"]]
+        if len(overloads):
             frame = style | {"linestyle": "none", "markerfacecolor": "none", "markersize": 8.5}
-            axes.plot(beyond["at"], beyond[column], **frame, label="beyond the dry tests")
+            axes.plot(overloads["at"], overloads[column], **frame, label="beyond the dry tests")
 
 
 @plot

@@ -215,9 +215,9 @@ def gap(
         raise ValueError("there is no gap by observable to draw")
     before, after = (np.array([gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
     words = []
-    for (name, values), left, right in zip(gaps.items(), before, after, strict=True):
+    for (name, values), old, new in zip(gaps.items(), before, after, strict=True):
         star = "" if any(key.startswith("heldout") for key in values) else "*"
-        worse = " (worse)" if right > max(1.05 * left, 1.0) else ""
+        worse = " (worse)" if new > max(1.05 * old, 1.0) else ""
         words.append(f"{name.replace('_', ' ')}{star}{worse}")
     figure, axes = new_picture("gap, sigma", "", height=0.2 * len(words) + 1.3)
     shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))

@@ -148,7 +148,7 @@ def pad_projection(curves: Sequence[PivotCurve]) -> Figure:
     return figure
 
 
-def _draw_vectors(axes: Axes, curve: PivotCurve, vectors: FloatArray, off: float) -> None:
+def _draw_vectors(axes: Axes, curve: PivotCurve, vectors: FloatArray, angle: float) -> None:
     """One pad's points (n, 2) along and across its direction, measured and projected, and the direction."""
     frame = pad_axes(curve.angle)
     axis, measured = frame[0], vectors @ frame
@@ -158,7 +158,7 @@ def _draw_vectors(axes: Axes, curve: PivotCurve, vectors: FloatArray, off: float
     style = style_of(curve.pad - 1) | {"linestyle": "none"}
     axes.plot(*measured.T, **style, markersize=5.5, markerfacecolor="none")
     axes.plot(*projected.T, **style, markersize=3.0)
-    text = f"#{curve.pad}\n{signed(math.degrees(off))}°"
+    text = f"#{curve.pad}\n{signed(math.degrees(angle))}°"
     axes.annotate(text, tuple(end), tuple(12.0 * axis), textcoords="offset points", ha="center", va="center",
                   fontsize=SMALL)  # fmt: skip
 
