@@ -102,12 +102,12 @@ def test_a_repeated_direction_shows_the_drift(campaign):
 def test_intervals_hold_how_well_the_shaft_comes_back_where_repeats_tell_it(campaign, monkeypatch):
     """Of positions that scatter by half a micrometre from run to run, beside a drift, 95 % intervals hold 95 %."""
     source, rng, inside = Repeated(campaign, [0, 1, 2, 3], np.zeros((10, 2))), np.random.default_rng(3), []
-    records = {run.id: locus._read(run) for run in source.runs}
+    records = {run.id: locus._read(run, {}) for run in source.runs}
     truth = {name: record.position for name, record in records.items()}
     for _ in range(40):
         offsets = np.outer(np.arange(10), [1e-7, -2e-7]) + 5e-7 * rng.standard_normal((10, 2))
         moved = {name: replace(r, position=r.position + o) for (name, r), o in zip(records.items(), offsets)}
-        monkeypatch.setattr(locus, "_read", lambda run, moved=moved: moved[run.id])
+        monkeypatch.setattr(locus, "_read", lambda run, _, moved=moved: moved[run.id])
         found = measure_locus(source)
         assert not {"drift-unknown", "scatter-unknown"} & set(found.status)
         first = [p for p in found.points if p.run in {f"l-{k}" for k in range(6)}]
@@ -135,15 +135,15 @@ def test_a_shaft_that_moves_within_a_record_is_known_no_better_than_it_moves(cam
 
 def test_a_repeat_under_a_turned_load_is_no_drift(campaign, monkeypatch):
     source = Repeated(campaign, [0, 1], np.zeros((8, 2)))
-    records = {run.id: locus._read(run) for run in source.runs}
+    records = {run.id: locus._read(run, {}) for run in source.runs}
     centre = np.mean([r.position for r in records.values()], axis=0)
     for name, turn in (("l-6", 0.02), ("l-7", 0.015)):
         cos, sin = np.cos(turn), np.sin(turn)
         place = centre + np.array([[cos, -sin], [sin, cos]]) @ (records[name].position - centre)
         records[name] = replace(records[name], position=place, direction=records[name].direction + turn)
-    monkeypatch.setattr(locus, "_read", lambda run: records[run.id])
-    found = measure_locus(source, SimpleNamespace(centre=centre, centre_covariance=np.zeros((2, 2)), angles=ANGLES,
-                                                  clearance=np.full(5, 1.0)))  # fmt: skip
+    monkeypatch.setattr(locus, "_read", lambda run, channels: records[run.id])
+    known = {"centre": centre, "centre_covariance": np.zeros((2, 2)), "clearance": np.full(5, 1.0)}
+    found = measure_locus(source, SimpleNamespace(**known, angles=ANGLES, sensors={}))
     # turned by about a degree the shaft stands 0.8 um aside
     assert np.abs(found.drift).max() * 7 < 0.1e-6
 

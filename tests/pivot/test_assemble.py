@@ -13,6 +13,7 @@ from rigdata.record import VectorRecord
 from tpjb_ident.conditions import sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
+from tpjb_ident.pivot.bad_steps import sound_parts
 from tpjb_ident.pivot.blocks import Blocks, Hold, LoadCourse
 from tpjb_ident.pivot.dry_record import (
     FRICTION_SE,
@@ -25,21 +26,20 @@ from tpjb_ident.pivot.dry_record import (
     read_dry_run,
     with_load_zero,
 )
-from tpjb_ident.pivot.fit import (
-    LAG,
-    MODEL_ERROR,
-    REFERENCE_SHARE,
-    UNKNOWN_ZERO,
-    assemble_curve,
-    bad_blocks,
-    fit_data,
-    with_friction,
-    with_shared_errors,
-)
+from tpjb_ident.pivot.fit import assemble_curve
 from tpjb_ident.pivot.law_fit import FRICTION, LawFit, fit_law
 from tpjb_ident.pivot.law_fit import SCALE as LN_SCALE
 from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.pickup import PickupSignature
+from tpjb_ident.pivot.readings import (
+    LAG,
+    MODEL_ERROR,
+    REFERENCE_SHARE,
+    UNKNOWN_ZERO,
+    fit_data,
+    with_friction,
+    with_shared_errors,
+)
 from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, check_spares, structure_behind
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
@@ -214,11 +214,10 @@ def curve(*records, fits=None, weights=(1.0,), good=None, directions=(STRAIGHT, 
     return assemble_curve(records, (fits or (law(),), np.array(weights)), NOISE, **options)
 
 
-def test_steps_are_the_means_of_holds_from_the_lowest_loads_reading():
-    made = curve(fits=(law(zero=-2e-6, friction=0.02),))
+def test_steps_are_the_means_of_holds_from_zero_load():
+    made = curve(fits=(law(zero=-2e-6, scale=SCALE / 0.98, friction=0.02),))
     np.testing.assert_allclose(made.steps.load, 0.98 * LEVELS)
-    # the zero reading of the law is counted from the first load's reading
-    np.testing.assert_allclose(made.steps.deflection, SCALE * (LEVELS - 500.0) + 2e-6, atol=1e-15)
+    np.testing.assert_allclose(made.steps.deflection, SCALE * LEVELS, atol=1e-15)
     np.testing.assert_allclose(made.steps.deflection_se, math.sqrt(NOISE.mean_variance(0.6)))
     np.testing.assert_allclose(made.steps.across_load, 0.0, atol=1e-9)
     np.testing.assert_allclose(made.steps.across_deflection, 0.0, atol=1e-15)
@@ -233,15 +232,15 @@ def test_steps_are_the_means_of_holds_from_the_lowest_loads_reading():
     np.testing.assert_allclose(aside.steps.across_deflection, moved, atol=1e-15)
 
 
-def test_runs_of_one_pad_have_one_zero():
-    """The second run starts lower: its first reading is where all deflections are counted from."""
+def test_every_run_of_a_pad_has_its_zero():
     low = record(levels=LEVELS[::-1] - 250.0, name="down", branch=-1)
     made = curve(record(), low, fits=(law(friction=0.01),))
     assert made.runs == ("p-1", "down")
     np.testing.assert_allclose(made.steps.load[:10], 0.99 * LEVELS)
     np.testing.assert_allclose(made.steps.load[10:], 1.01 * (LEVELS[::-1] - 250.0))
-    np.testing.assert_allclose(made.steps.deflection[:10], SCALE * (LEVELS - 250.0), atol=1e-15)
-    np.testing.assert_allclose(made.steps.deflection[10:], SCALE * (LEVELS[::-1] - 500.0), atol=1e-15)
+    held_back = 0.01 * SCALE * np.array([LEVELS.mean(), LEVELS.mean() - 250.0])
+    np.testing.assert_allclose(made.steps.deflection[:10], SCALE * LEVELS - held_back[0], atol=1e-15)
+    np.testing.assert_allclose(made.steps.deflection[10:], SCALE * (LEVELS[::-1] - 250.0) + held_back[1], atol=1e-15)
     # the loop of a straight law with a share mu of friction: 2 mu s F over the loads of both
     width = 2 * 0.01 * SCALE * np.array([500.0, 4750.0])
     assert made.hysteresis.energy == pytest.approx(0.5 * width.sum() * 4250.0, rel=1e-6)
@@ -332,9 +331,9 @@ def test_what_a_law_is_fitted_to_has_all_its_variances():
     np.testing.assert_array_equal(both.branch, np.r_[np.ones(60), -np.ones(59)])
 
 
-def noisy(one, seed, off):
+def noisy(one, seed, off, noise=NOISE):
     rng = np.random.default_rng(seed)
-    error = np.linalg.cholesky(NOISE.covariance(one.blocks.time, one.blocks.duration)) @ rng.standard_normal(len(off))
+    error = np.linalg.cholesky(noise.covariance(one.blocks.time, one.blocks.duration)) @ rng.standard_normal(len(off))
     return replace(one, blocks=replace(one.blocks, deflection=one.blocks.deflection + error + off))
 
 
@@ -361,8 +360,29 @@ def stairs():
 )
 def test_what_slipped_is_left_out_and_no_more(one, slipped, left_out):
     number = np.arange(len(one.blocks))
-    found = np.flatnonzero(bad_blocks(noisy(one, 5, 8e-7 * np.isin(number, number[slipped])), NOISE))
-    np.testing.assert_array_equal(found, number[left_out])
+    (part,) = sound_parts(noisy(one, 5, 8e-7 * np.isin(number, number[slipped])), NOISE)
+    np.testing.assert_array_equal(np.flatnonzero(~part.good), number[left_out])
+
+
+@pytest.mark.parametrize("size", [6e-7, -6e-7])
+def test_from_a_slip_on_a_record_has_another_zero(size):
+    """The ramp on which it happened is left out; all else stays, and the curve is what it was without."""
+    number = np.arange(80)
+    parts = sound_parts(noisy(stairs(), 5, size * (number > 40)), NOISE)
+    assert [len(part.blocks) for part in parts] == [42, 38]
+    assert [np.sum(~part.good) for part in parts] == [2, 0]
+    curve = assemble_curve(parts, ((fit_law(LAWS["linear"], False, fit_data(parts, NOISE)),), np.ones(1)), NOISE)
+    np.testing.assert_allclose(curve.stiffness([1000.0, 4000.0]), 1 / SCALE, rtol=0.01)
+    np.testing.assert_allclose(curve.steps.deflection, curve.deflection(curve.steps.load), atol=1e-8)
+    detail = {str(condition): condition.detail for condition in curve.status}["shaft-slipped"]
+    assert detail == f"by {1e6 * size:+.2g} um at 3000 N of p-1"
+
+
+def test_a_kink_is_no_slip():
+    one, noise = stairs(), NoiseModel(white=1e-17, flicker=1e-16, drift=5e-9)
+    bent = 0.5 * SCALE * np.minimum(one.blocks.load - 2000.0, 0.0)
+    (part,) = sound_parts(noisy(one, 5, bent, noise), noise)
+    assert part.good.all()
 
 
 class Run:

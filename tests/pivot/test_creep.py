@@ -54,7 +54,7 @@ def test_records_without_holds_tell_no_creep():
     assert without_creep(ramps, NOISE) == (ramps, NOISE, dict.fromkeys(PADS, ()))
 
 
-@pytest.mark.parametrize("creeping", [(2,), (3, 5)])
+@pytest.mark.parametrize("creeping", [(2,), (3, 5), (1, 2, 3, 4)])
 def test_what_a_pad_alone_shows_is_taken_off_and_the_others_stay(creeping):
     given = campaign(0.1, creeping=creeping)
     less, _, conditions = without_creep(given, NOISE)

@@ -25,7 +25,6 @@ from tests.good_campaigns import (
 )  # fmt: skip
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.clearance.measure import measure_run
-from tpjb_ident.clearance.polygon import gain_ratio
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 
@@ -90,11 +89,11 @@ def test_good_probes_are_not_doubted(campaign, tmp_path):
 @pytest.mark.parametrize(
     ("command", "channel", "value", "code", "says"),
     [
-        ("check", "X1A", 1.1, 0, "X1A read 9"),
-        ("check", "X1B", 1.03, 0, "X1A read 2.9 % (se 0."),
+        ("check", "X1A", 1.1, 0, "X1A read 10.0 % more"),
+        ("check", "X1B", 1.03, 0, "X1A read 2.9 % less"),
         ("check", "X1A", 0.95, 0, "less"),
         ("check", "X1*", 0.1, 2, "the bearing file says 80 µm"),
-        ("pivot", "X1A", 1.1, 0, "the sides stand as if X1A read 9"),
+        ("pivot", "X1A", 1.1, 0, "the sides stand as if X1A read 10.0 %"),
     ],
 )
 def test_unequal_gains_show_in_the_angles_of_the_polygon(campaign, tmp_path, command, channel, value, code, says):
@@ -111,18 +110,6 @@ def test_unequal_gains_show_in_the_angles_of_the_polygon(campaign, tmp_path, com
         polygon = measure_run(source.of_kind("clearance")[0], ANGLES)
         (sentence,) = (s.sentence() for s in polygon.status if s == "probe-gains-differ")
         assert says in sentence
-
-
-@pytest.mark.parametrize("axes", [(np.pi / 4, 3 * np.pi / 4), (0.3, 1.2)])
-def test_gains_are_found_from_turned_normals(axes):
-    rows = np.array([[np.cos(a), np.sin(a)] for a in axes])
-    stretch = np.linalg.inv(rows) @ np.diag([1.002, 1.0]) @ rows
-    normal = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)]) @ np.linalg.inv(stretch)
-    tilt = np.arctan2(normal[:, 1], normal[:, 0]) - ANGLES
-    tilt = np.remainder(tilt + np.pi, 2 * np.pi) - np.pi
-    ratio, _ = gain_ratio(ANGLES, tilt + 0.01, np.full(5, 1e-4), axes)
-    assert ratio == pytest.approx(0.002, rel=0.01)
-    assert np.isnan(gain_ratio(ANGLES[:3], tilt[:3], np.full(3, 1e-4), axes)[0])
 
 
 SHORT = replace(PLAN, locus=(), dry=())

@@ -13,11 +13,11 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.problem import RigDataError
 from rigdata.vector import directions
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.clearance.measure import coldest_first, measure_run
-from tpjb_ident.clearance.polygon import SIDES
-from tpjb_ident.clearance.probe_errors import MIN_PADS, beside_the_usual, probe_errors
+from tpjb_ident.clearance.measure import coldest_first
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
+from tpjb_ident.phasors.slow_samples import live_run
+from tpjb_ident.pivot.sweep_witness import SIDES, witness_of
 
 #: Condition of the loads' directions up to which they tell cells apart, and runs.
 _TELLING, _MIN_RUNS = 30.0, 4
@@ -81,18 +81,14 @@ def check_probes(sweeps: Sequence[Observation], dry: Sequence[Observation]) -> N
     """Two probes against the pads' directions, as the dry runs state them, in the coldest sweep."""
     angles = _pad_directions(dry)
     usable = {observation.run.id: observation for observation in sweeps if not observation.report.cells_doubted}
-    first = coldest_first([observation.run for observation in usable.values()])[:1]
-    if len(angles) < MIN_PADS or not first:
-        return
-    observation = usable[first[0].id]
-    probes = observation.of("displacement")
-    try:
-        polygon = measure_run(first[0], angles)
-    except RigDataError:  # said by its own check
-        return
-    if len(probes) == 2:
-        logarithms = probe_errors(polygon, [probe.axis or 0.0 for probe in probes])
-        _ask([observation], observation.names("displacement"), logarithms, SIDES)
+    for run in coldest_first([observation.run for observation in usable.values()])[:1]:
+        try:
+            errors = witness_of(live_run(run), np.array(angles)).errors
+        except RigDataError:  # said by its own check
+            return
+        observation = usable[run.id]
+        names = sorted(errors.keys() & observation.names("displacement"))
+        _ask([observation], names, np.array([errors[name] for name in names]), SIDES)
 
 
 def _pad_directions(runs: Sequence[Observation]) -> list[float]:
@@ -112,7 +108,7 @@ def _ask(observations: Sequence[Observation], names: Sequence[str], logarithms: 
     """Report sensors (m,) that are off against the others and the witness, each of which counts as one."""
     if not np.isfinite(logarithms).all():
         return
-    errors = beside_the_usual(logarithms)
+    errors = logarithms - complex(np.median([*logarithms.real, 0.0]), np.median([*logarithms.imag, 0.0]))
     for name, gain, turn in zip(names, errors.real, errors.imag):
         angle = float(np.degrees(turn))
         for observation in observations:
@@ -120,5 +116,7 @@ def _ask(observations: Sequence[Observation], names: Sequence[str], logarithms: 
             of_gain = report.ask("sensor gain", abs(gain), name, share=float(np.expm1(gain)), witness=witness)
             of_axis = report.ask("sensor axis", abs(angle), name, angle=angle, witness=witness)
             if of_gain or of_axis:
-                sizes = abs(gain) if of_gain else 0.0, abs(turn) if of_axis else 0.0
-                report.doubted[name] = CHANGE_AS_DEVIATION * sizes[0], CHANGE_AS_DEVIATION * sizes[1]
+                report.doubted[name] = (
+                    CHANGE_AS_DEVIATION * abs(gain) * bool(of_gain),
+                    CHANGE_AS_DEVIATION * abs(turn) * bool(of_axis),
+                )

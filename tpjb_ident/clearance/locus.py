@@ -25,6 +25,7 @@ from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples
 from tpjb_ident.pivot.blocks import time_bins
 from tpjb_ident.pivot.dry_record import refusal
 from tpjb_ident.pivot.refusals import usable_runs
+from tpjb_ident.pivot.sweep_witness import as_witnessed
 from tpjb_ident.presentation import Presented
 from tpjb_ident.rounding import listed
 from tpjb_ident.schema import STATIC_KEY
@@ -32,6 +33,7 @@ from tpjb_ident.schema import STATIC_KEY
 if TYPE_CHECKING:
     import pandas as pd
 
+    from rigdata.calibration import Channels
     from rigdata.campaign import Campaign, Run
 
 
@@ -150,7 +152,8 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     runs = campaign.of_kind("locus")
     if not runs:
         raise refuse("campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
-    records, problems = usable_runs(runs, _read)
+    channels = {} if polygon is None else polygon.sensors
+    records, problems = usable_runs(runs, lambda run: _read(run, channels))
     if 2 * len(records) <= len(runs):
         raise RigDataError(problems)
     orders = np.array([runs.index(record.run) for record in records], dtype=float)
@@ -199,8 +202,8 @@ def _from_down(direction: float) -> float:
     return (direction + math.pi / 2 + 1e-9) % (2 * math.pi)
 
 
-def _read(run: Run) -> _Record:
-    time, force, place, good, _ = slow_samples(live_run(run))
+def _read(run: Run, channels: Channels) -> _Record:
+    time, force, place, good, _ = slow_samples(live_run(as_witnessed(run, channels)))
     if good.sum() < 50 or good.mean() < 0.5:
         what = f"has only {good.sum()} usable samples of {len(good)}"
         raise refusal(run, "record", what, "Repeat this direction")

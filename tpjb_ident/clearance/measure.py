@@ -11,20 +11,21 @@ import numpy as np
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.problem import refuse
 from rigdata.vector import directions
-from tpjb_ident.clearance.polygon import SideFit, alike, corners, find_centre, fit_sides, gain_ratio, untested
+from tpjb_ident.clearance.polygon import SideFit, corners, find_centre, fit_sides, untested
 from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals, read_sweep
-from tpjb_ident.conditions import Condition, Conditions, holding, sentences
+from tpjb_ident.conditions import Conditions, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.dry_record import axial_channels, refusal, relative_calibration
+from tpjb_ident.pivot.sweep_witness import as_witnessed, witness_of
 from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import TANGENT
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from rigdata.calibration import Channel
+    from rigdata.calibration import Channels
     from rigdata.campaign import Campaign, Run
     from rigdata.operating_point import OperatingPoint
 
@@ -33,8 +34,6 @@ _SAME_TEMPERATURE = 4.0  # [K]
 _IRREGULAR = 3.0  # standard errors
 _LEAST_ERROR = 1e-3  # of a preload, drawn or measured
 _LARGEST_WALK = 1.5e-6  # [m], of a zero over a sweep: no probe's
-_UNEQUAL = 0.02  # gains of two probes: twice what a usual certificate leaves open
-_GAIN_ERRORS = 4.0  # standard errors, of few sides
 _RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
 _DISAGREES = 0.1  # share: a shaft that slides into its corner slowly makes up for some per cent
 
@@ -76,8 +75,10 @@ class ClearancePolygon(Presented):
     relative_calibration : (n,) ndarray
         Standard uncertainty along the pads from the probes' certificates, relative; not in the standard errors, as in
         `PivotCurve`.
+    sensors : mapping of str to Channel
+        Sensors that the sweep shows otherwise than stated, as they were read here, by name.
     as_read : tuple of (n,) ndarray, optional
-        Pushed clearances from `centre` and fitted angles as the probes read them, where unlike gains were shared.
+        Pushed clearances and fitted angles as the probes read them, where some are read otherwise.
     """
 
     run: str
@@ -99,6 +100,7 @@ class ClearancePolygon(Presented):
     temperature: float = np.nan
     status: Conditions = ()
     relative_calibration: FloatArray | float = 0.0
+    sensors: Channels = field(default_factory=dict, repr=False)
     as_read: tuple[FloatArray, FloatArray] | None = None
 
     def to_frame(self) -> pd.DataFrame:
@@ -186,6 +188,23 @@ def measure_clearance(
 def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotCurve] = ()) -> ClearancePolygon:
     """Measure the polygon of one run; parameters as `measure_clearance`."""
     angles, run = np.asarray(pivot_angles, dtype=float), live_run(run)
+    witness, as_read = witness_of(run, angles), None
+    if witness.channels:
+        plain = _polygon(run, *_sides(run, angles, curves), angles)
+        run, as_read = as_witnessed(run, witness.channels), (plain.clearance_pushed, plain.fitted_angle)
+    contact, fit = _sides(run, angles, curves)
+    polygon = replace(_polygon(run, contact, fit, angles), sensors=witness.channels, as_read=as_read)
+    # the push lies outside what the dry tests measured in most sweeps
+    outside = [curve for curve in curves if curve.is_extrapolated(contact.push)]
+    lowest = min((curve.valid_from for curve in outside), default=0.0)
+    pads = " of all pads" if len(outside) == len(angles) else _of_pads([curve.pad for curve in outside])
+    detail = f"pushed with {contact.push:.0f} N, the dry tests{pads} hold from {lowest:.0f} N on; the sweep corrects it"
+    extrapolated = holding((outside, "give-extrapolated", detail))
+    return replace(polygon, status=(*_status(fit, polygon, curves), *witness.conditions, *extrapolated))
+
+
+def _sides(run: Run, angles: FloatArray, curves: Sequence[PivotCurve]) -> tuple[ContactIntervals, SideFit]:
+    """Averages and sides of a sweep whose shaft and probes stood still."""
     contact, fit = _read_sides(run, angles, curves, LARGEST_DEFLECTION)
     if (largest := fit.deflection.max()) > LARGEST_DEFLECTION:  # pads that seemed not to be touched were
         contact, fit = _read_sides(run, angles, curves, largest)
@@ -193,24 +212,7 @@ def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotC
     if walk > _LARGEST_WALK:
         what = f"has a shaft that was turned, or probes that moved: their zero walks by {1e6 * walk:.1f} µm"
         raise refusal(run, "record", what, "Keep shaft and probes still")
-    polygon = _polygon(run, contact, angles, fit)
-    probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
-    ratio, differ = _gains_differ(probes, polygon)
-    if differ:
-        fit = alike(fit, angles, [probe.axis or 0.0 for probe in probes], ratio)
-        shared = _polygon(run, contact, angles, fit)
-        pushed = polygon.clearance_pushed + directions(angles) @ (polygon.centre - shared.centre)
-        polygon = replace(shared, as_read=(pushed, polygon.fitted_angle))
-    # which of two unequal probes is right is as unknown as how far they are apart
-    calibration = [np.hypot(relative_calibration(probes, angle), 0.5 * ratio) for angle in angles]
-    polygon = replace(polygon, relative_calibration=np.array(calibration))
-    # the push lies outside what the dry tests measured in most sweeps
-    outside = [curve for curve in curves if curve.is_extrapolated(contact.push)]
-    lowest = min((curve.valid_from for curve in outside), default=0.0)
-    pads = " of all pads" if len(outside) == len(angles) else _of_pads([curve.pad for curve in outside])
-    detail = f"pushed with {contact.push:.0f} N, the dry tests{pads} hold from {lowest:.0f} N on; the sweep corrects it"
-    extrapolated = holding((outside, "give-extrapolated", detail))
-    return replace(polygon, status=(*_status(fit, polygon, curves), *differ, *extrapolated))
+    return contact, fit
 
 
 def _read_sides(
@@ -225,7 +227,7 @@ def _read_sides(
     return contact, fit_sides(contact, angles, pads, curves)
 
 
-def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideFit) -> ClearancePolygon:
+def _polygon(run: Run, contact: ContactIntervals, fit: SideFit, angles: FloatArray) -> ClearancePolygon:
     """Clearances about the centre, with the errors of both; NaN where a pad was not reached."""
     n, covariance = directions(angles[fit.pads]), fit.covariance
     centre = find_centre(angles[fit.pads], fit.distance, covariance)
@@ -240,6 +242,7 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
                                      angles[fit.pads] + fit.tilt, fit.tilt_se])  # fmt: skip
     clearance, clearance_se, deflection, deflection_se, fitted, fitted_se = columns
     # another run meets the probes' zero elsewhere: by about what it drifts within this one
+    probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
     span = np.ptp(contact.time)
     drift = ((fit.noise.drift * span) ** 2 + fit.noise.walk**2 * span) * np.eye(2)
     return ClearancePolygon(
@@ -260,22 +263,8 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
         pivot_scale_se=fit.scale_se,
         noise=fit.noise,
         temperature=run.mean_temperature() or np.nan,
+        relative_calibration=np.array([relative_calibration(probes, angle) for angle in angles]),
     )
-
-
-def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple[float, Conditions]:
-    """One probe reads more than the other, by which share: sizes do not tell, the angles between the sides do."""
-    if len(probes) != 2:
-        return 0.0, ()
-    first, second = probes
-    axes = [probe.axis or 0.0 for probe in probes]
-    ratio, se = gain_ratio(polygon.angles, polygon.fitted_angle - polygon.angles, polygon.fitted_angle_se, axes)
-    if not abs(ratio) > max(_UNEQUAL, _GAIN_ERRORS * se):
-        return 0.0, ()
-    share = f"{100 * abs(ratio):.1f} % (se {100 * se:.1f} %)"
-    more = "more" if ratio > 0 else "less"
-    detail = f"the sides stand as if {first.name} read {share} {more} than {second.name}; half of it is taken off each"
-    return ratio, (Condition("probe-gains-differ", detail),)
 
 
 def coldest_first(runs: Sequence[Run]) -> list[Run]:

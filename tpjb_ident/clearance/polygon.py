@@ -25,7 +25,7 @@ its error reaches to every such explanation. Three pads fit any centre: their di
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
@@ -39,7 +39,6 @@ from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.pivot.curve import PivotCurve
 
-SIDES = "the sides of the clearance polygon"  # what tells of probes, in words
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
 _DEVIATES = 2.0  # such widths from which a pad stands off clearly
 TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
@@ -101,57 +100,11 @@ def corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:
     return np.linalg.solve(pairs[..., :2], pairs[..., 2:])[..., 0]
 
 
-def gain_ratio(angles: FloatArray, tilt: FloatArray, tilt_se: FloatArray, axes: Sequence[float]) -> tuple[float, float]:
-    """How much more the first probe reads than the second, and its standard error, as the turns (n,) of the sides tell.
-
-    A probe that reads (1 + g) times the truth stretches the measured plane along its axis. What it does to sizes cannot
-    be told from another clearance or another stiffness; what it does to directions can, since the pads' directions are
-    known: with b and c the dual pair of that probe (position = .. + b (c . position)), the normal n_k of side k turns
-    by
-
-        -g (b . n_k) (n_k x c)
-
-    which no common turn of the frame imitates. A gain that both probes share leaves all directions as they are.
-    """
-    usable = np.isfinite(tilt) & np.isfinite(tilt_se) & (tilt_se > 0)
-    if usable.sum() < 4 or abs(np.linalg.det(directions(axes))) < 0.05:
-        return np.nan, np.nan
-    shear = _stretch(angles[usable], axes)[1]
-    design = np.column_stack([np.ones(len(shear)), shear]) / tilt_se[usable, None]
-    target = tilt[usable] / tilt_se[usable]
-    covariance = np.linalg.inv(design.T @ design)
-    solution = covariance @ design.T @ target
-    chi_square = np.sum((target - design @ solution) ** 2) / (len(target) - 2)
-    return solution[1], np.sqrt(covariance[1, 1] * max(chi_square, 1.0))
-
-
-def _stretch(angles: FloatArray, axes: Sequence[float]) -> tuple[FloatArray, FloatArray]:
-    """Part (n,) of a gain of the first probe that sides show along their normals, and by which they turn [rad]."""
-    n, rows = directions(angles), directions(axes)
-    probe, dual = rows[0], np.linalg.inv(rows)[:, 0]
-    return (n @ dual) * (n @ probe), -(n @ dual) * (n[:, 0] * probe[1] - n[:, 1] * probe[0])
-
-
-def alike(fit: SideFit, angles: FloatArray, axes: Sequence[float], ratio: float) -> SideFit:
-    """The sides as two probes would show them that read alike; nothing tells which is wrong: each has half of it."""
-    along, turn = _stretch(angles[fit.pads], axes)
-    # what one probe reads less the other reads more: along a side the parts of both are one together
-    scale = 1.0 - ratio * (along - 0.5)
-    foot = directions(angles[fit.pads]) @ fit.foot
-    return replace(
-        fit,
-        distance=foot + scale * (fit.distance - foot),
-        tilt=fit.tilt - ratio * turn,
-        deflection=scale * fit.deflection,
-    )
-
-
 @dataclass(frozen=True)
 class SideFit:
     """The r sides of the pads that a sweep reached, from the probes' zero."""
 
     pads: IntArray  #: (r,) from 0
-    foot: FloatArray  #: (2,) about which the sides were turned [m]
     distance: FloatArray  #: (r,) [m]
     covariance: FloatArray  #: (r, r) of the distances [m^2]
     tilt: FloatArray  #: (r,) [rad]
@@ -228,7 +181,7 @@ def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, cur
     count = np.count_nonzero(unknown)
     deflection[unknown], deflection_se[unknown] = pivots[:count], errors[:count]
     return SideFit(
-        pads, foot, distance, distances, tilt, tilt_se, deflection, deflection_se, scale, scale_se, noise, misfit
+        pads, distance, distances, tilt, tilt_se, deflection, deflection_se, scale, scale_se, noise, misfit
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ So the force vector says how much each pad carries, and the position says which 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -18,13 +19,16 @@ from rigdata.vector import directions, wrapped
 from tpjb_ident.phasors.line_fit import robust_deviation, white_noise
 from tpjb_ident.phasors.slow_samples import REMEDY, contradictions, level_error, piece_means, slow_samples, spare_slopes
 from tpjb_ident.pivot.dry_record import pad_axes, refusal
+from tpjb_ident.pivot.sweep_witness import push_circle
 
 _BLOCK = 0.1  # [s]; five mains periods
 _CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its deflection
 _SHORTEST = 5  # samples in a piece, where a whole one has as many
 _MOVING = 2.0  # robust standard deviations of the speed in corners above which the shaft is still on its way
+_ASIDE = 5.0  # robust deviations of the places in a corner
 LARGEST_DEFLECTION = 6.0e-6  # [m], of a pivot under the push load where no curve says it
 _LARGEST_LAG = np.radians(25.0)  # of the shaft: friction of a quarter, or oil that lets it slide hardly in time
+_UNTARED = 0.1  # of the push: a smaller zero of the cells may be a push that is not the same all around
 _RELEASED = 0.1  # of the push: below it the load has no direction
 _LARGEST_GAP = np.radians(60.0)  # between directions of the load: half of it from a pad's own, both corners are beyond
 
@@ -78,6 +82,9 @@ def sweep_samples(run: Run) -> tuple[FloatArray, FloatArray, FloatArray]:
     for what in contradictions(run.channels, [slopes], {"force": [0.0], "displacement": [0.0]}):
         raise refusal(run, "channels", f"cannot be used: {what}", REMEDY)
     load, position = load[good], position[good]
+    circle = push_circle(load)
+    if circle is not None and np.hypot(*circle.zero) > _UNTARED * math.sqrt(0.5 * np.trace(circle.spread)):
+        load = load - circle.zero
     _check_turn(run, load, position)
     return time[good], load, position
 
@@ -173,5 +180,9 @@ def _settled(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArr
     ordinary = np.median(speed[corner])
     spread = robust_deviation(speed[corner] - ordinary)
     moving = corner & (speed > ordinary + _MOVING * spread)
+    state = touched @ (1 << np.arange(touched.shape[1]))
+    for members in (state == number for number in np.unique(state[corner])):  # one that stopped on its way is elsewhere
+        away = np.hypot(*(place[members] - np.median(place[members], axis=0)).T)
+        moving[members] |= away > _ASIDE * max(robust_deviation(away), 1e-8)
     # the piece beside a moving one hides a remainder of the way below the noise, and would do so at every corner
     return ~corner | ~binary_dilation(moving)

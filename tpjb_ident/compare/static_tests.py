@@ -10,20 +10,17 @@ import numpy as np
 
 from model.bearing import Bearing
 from rigdata.campaign import Campaign
-from rigdata.problem import Problem, RigDataError, Severity
+from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.clearance.locus import Locus, measure_locus
 from tpjb_ident.clearance.measure import ClearancePolygon, coldest_first, measure_run
-from tpjb_ident.clearance.polygon import SIDES
-from tpjb_ident.clearance.probe_errors import MIN_PADS, beside_the_usual, probe_errors
 from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.refusals import usable_runs
+from tpjb_ident.pivot.sweep_witness import SIDES
 from tpjb_ident.pivot.tables import Formula
 
-#: Angle of a probe off its axis [deg] from which it is told, and from which nothing is to be trusted: `check`'s limits.
-_TURNED = (3.0, 20.0)
 #: Measured stiffness over the formula's beyond which a scale is wrong: pivots are softer, a third to a tenth in places.
 _STIFFNESS = (0.03, 3.0)
 #: Measured over drawn clearance beyond which the probes' scale is wrong, or the bearing file is another bearing's.
@@ -90,12 +87,12 @@ def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Prob
         except RigDataError as error:
             problems += [Problem("warning", p.file, p.place, p.what, p.cure, run.id) for p in error.problems]
             continue
-        channels = f"channels {' and '.join(channel.name for channel in run.of('displacement'))}"
         for condition in polygon.status:
-            if condition == "probe-gains-differ" and tells_gains:
-                cure = "Check the sensitivities of both probes"
+            if condition == "cells-differ" or (condition in {"probe-gains-differ", "probe-turned"} and tells_gains):
+                quantity = "force" if condition == "cells-differ" else "displacement"
+                channels = f"channels {' and '.join(channel.name for channel in run.of(quantity))}"
+                cure = "Check sensitivities, axes and how they are mounted"
                 problems.append(Problem("warning", run.file, channels, condition.detail, cure, run.id))
-        problems += turned_probes(run, polygon) if tells_gains else []
         negative = polygon.negative_preloads([pad.pad_clearance for pad in bearing.pads])
         if negative:
             cure = "Check pad_clearance, and how these pads are seated: unloaded, they flutter"
@@ -113,19 +110,3 @@ def wrong_scale(run: Run, polygon: ClearancePolygon, bearing: Bearing) -> list[P
     fault = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
     cure = "Check the sensitivities of the probes, and whether it is this bearing's file"
     return [Problem("error", run.file, channels, fault, cure, run.id)]
-
-
-def turned_probes(run: Run, polygon: ClearancePolygon) -> list[Problem]:
-    """Probes that do not stand where they are said to, by the sides of the polygon that a sweep shows."""
-    probes = run.of("displacement")
-    if len(probes) != 2 or len(polygon.angles) < MIN_PADS:
-        return []
-    errors = beside_the_usual(probe_errors(polygon, [probe.axis or 0.0 for probe in probes]))
-    problems = []
-    for probe, turn in zip(probes, np.degrees(errors.imag), strict=True):
-        if abs(turn) > _TURNED[0]:
-            text = f"stands {turn:+.1f} deg off its stated axis by {SIDES}: pivot curves and clearances are off with it"
-            severity: Severity = "error" if abs(turn) > _TURNED[1] else "warning"
-            cure = "Check its axis and how it is mounted"
-            problems.append(Problem(severity, run.file, f"channel {probe.name}", text, cure, run.id))
-    return problems

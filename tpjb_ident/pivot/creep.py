@@ -26,28 +26,34 @@ from tpjb_ident.pivot.dry_record import DryRecord, pooled_noise, smooth_columns
 _PLAUSIBLE, _OF_ONE = 0.03, 0.2
 _TIMES = (0.3, 1.0, 3.0, 10.0)  # time constants over the usual length of a hold
 # standard errors from which it is creep, by the noise, which takes creep for drift, and by how the runs differ; of one
-# pad by the noise of the others
-_LEAST, _ALIKE, _ALONE = 3.0, 5.0, 4.0
+# pad by the noise of the others, where another pad creeps, and where most do
+_LEAST, _ALIKE, _ALONE, _BESIDE, _AMONG = 3.0, 5.0, 4.0, 3.3, 1.0
 _ROUNDS = 4
 
 
 def without_creep(
     records: Sequence[DryRecord], noise: NoiseModel
 ) -> tuple[list[DryRecord], NoiseModel, dict[int, Conditions]]:
-    """Records less the creep that all holds show alike, else those of a pad; their noise, and conditions by pad.
+    """Records less the creep that the holds of a pad show, else those of all alike; their noise, conditions by pad.
 
     Without creep they are given back as they are.
     """
-    pads = {record.pad: [other for other in records if other.pad == record.pad] for record in records}
-    less, noise, shared = _less_alike(records, noise, _PLAUSIBLE, _LEAST)
-    if shared:
-        return less, noise, dict.fromkeys(pads, shared)
-    found, less = {}, []
-    for pad, members in pads.items():
-        others = [record for record in records if record.pad != pad]  # whose noise no creep of this pad is part of
-        crept, _, found[pad] = _less_alike(members, pooled_noise(others) if others else noise, _OF_ONE, _ALONE)
-        less += crept
-    return less, pooled_noise(less) if any(found.values()) else noise, found
+    less = list(records)
+    conditions: dict[int, Conditions] = {record.pad: () for record in records}
+    for least, most in ((_ALONE, 0.0), (_BESIDE, 0.0), (_AMONG, 0.5)):
+        if sum(map(bool, conditions.values())) < most * len(conditions):
+            break
+        for pad in [pad for pad, condition in conditions.items() if not condition]:
+            own = [record for record in less if record.pad == pad]
+            if _less_alike(own, noise, _OF_ONE, 0.5 * least)[2]:  # hardly any is none
+                others = [record for record in less if record.pad != pad]  # whose noise no creep of this pad is part of
+                own, _, conditions[pad] = _less_alike(own, pooled_noise(others) if others else noise, _OF_ONE, least)
+                crept = iter(own)
+                less = [next(crept) if record.pad == pad else record for record in less]
+        if not any(conditions.values()):
+            less, noise, shared = _less_alike(records, noise, _PLAUSIBLE, _LEAST)
+            return less, noise, dict.fromkeys(conditions, shared)
+    return less, pooled_noise(less), conditions
 
 
 def _less_alike(

@@ -70,6 +70,7 @@ class DryRecord:
     creep: float = 0.0  #: share of the deflection that crept and was taken off
     free_load: float = 0.0  #: N: load up to which the shaft had not reached its pad
     load_error: float = 0.0  #: N: standard error of the zero of the load along the pad
+    elsewhere: float = 0.0  #: share of the clearance by which it begins elsewhere than a sweep has the pad
     untared: str = ""  #: what the cells read at no load, where it was taken off
 
     @property

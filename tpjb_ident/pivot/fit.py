@@ -1,33 +1,25 @@
-"""Dry tests to pivot curves: the whole way, for all pads of a campaign (paper, Sec. 5).
-
-A slip, a knock, a probe that jumped and came back: each hold is tested as a whole against the most flexible law, with
-the noise as it is correlated. Would a shift of this hold alone explain the record better, and by how many standard
-errors? The worst goes first, then the remainder is tested again without it.
-"""
+"""Dry tests to pivot curves: the whole way, for all pads of a campaign (paper, Sec. 5)."""
 
 import itertools
 import math
-import operator
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from scipy import linalg, optimize, special
+from scipy import special
 
-from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign, Run
 from rigdata.problem import Problem, RigDataError, refuse
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import refused_runs
-from tpjb_ident.pivot.blocks import slid
+from tpjb_ident.pivot.bad_steps import sound_parts
 from tpjb_ident.pivot.creep import without_creep
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop
 from tpjb_ident.pivot.dry_record import (
-    FRICTION_SE,
-    FRICTION_SHARE,
     DryRecord,
     axial_channels,
     pooled_noise,
@@ -39,7 +31,6 @@ from tpjb_ident.pivot.law_fit import (
     FRICTION,
     OFFSET,
     SCALE,
-    FitData,
     LawFit,
     fit_law,
     keep_likely,
@@ -47,166 +38,23 @@ from tpjb_ident.pivot.law_fit import (
     with_shared_shape,
 )
 from tpjb_ident.pivot.laws import LAWS
+from tpjb_ident.pivot.readings import fit_data, with_friction, with_shared_errors
 from tpjb_ident.pivot.refusals import (
     DISPLACEMENT_LIMIT,
     refused_records,
     structure_behind,
     usable_runs,
 )
+from tpjb_ident.pivot.sweep_witness import SweepWitness, as_witnessed, sweep_witness
 
-REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest load
-MODEL_ERROR = 3e-4  # of the deflection: what averaging over a curved law leaves; matters in computed records only
-UNKNOWN_ZERO = 2.0e-5  # [m], spread of the reading at zero load from run to run of one pad
-LAG = 0.002  # [s], by which displacement may lag behind load
-_TIMES = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # the usual share of friction, where the load comes back
-GROUPS_ON_RAMP = 15
 CONTACT_TOLERANCE = 0.05  # of the compliance: what incomplete contact may add where contact counts as complete
-_BAD_LIMIT = 5.0  # standard errors
-_MOST_BAD = 0.3  # share of the groups that may be dropped
 _ANGLE_WARNING = math.radians(4.0)
 _MISFIT_PROBABILITY = 1e-4
 _CLEAR_CHOICE = 0.5  # posterior share below which the law counts as undecided
 _MANY_LOST = 0.05
 _ROUNDS = 40  # of a fixed point
-#: Share of a difference that a curve must leave for the tests to tell it.
-_LEAST_SHARE = 1e-3
-#: Fall of the deviance from which tests of one pad differ: one in twenty sets of equal tests shows it.
-_CLEAR_SCATTER = 2.7
 #: Scatter of a pad's compliance from test to test that no pivot has.
 _TOO_MUCH = 0.05
-
-
-def fit_data(records: Sequence[DryRecord], noise: NoiseModel) -> FitData:
-    """Join the good blocks of one pad's runs; each run has its own drift and its own zero."""
-    parts = [record.used for record in records]
-    load = np.concatenate([part.load for part in parts])
-    deflection = np.concatenate([part.deflection for part in parts])
-    branch = np.concatenate([part.branch for part in parts])
-    compliance = np.ptp(deflection) / max(np.ptp(load), 1e-300)
-    covariances = []
-    for record, part in zip(records, parts, strict=True):
-        error = compliance * np.hypot(part.load_spread, LAG * part.rate)
-        own = np.diag(error**2 + (MODEL_ERROR * np.ptp(deflection)) ** 2)
-        one_level = (part.hold[:, None] == part.hold) & (part.hold >= 0) | np.eye(len(part), dtype=bool)
-        zero = UNKNOWN_ZERO**2 if len(records) > 1 else 0.0
-        covariances.append(part.covariance(noise) + record.quantisation**2 * one_level + own + zero)
-    friction, spread = max((record.friction for record in records), key=operator.itemgetter(1))
-    return FitData(
-        load=load,
-        deflection=deflection - deflection[np.argmin(load)],
-        branch=branch,
-        whitener=np.linalg.inv(np.linalg.cholesky(linalg.block_diag(*covariances))),
-        reference_load=REFERENCE_SHARE * np.max(load),
-        # on one branch a share of the load and a share of the deflection that creeps are one error
-        friction=(friction, max(spread, *(record.creep for record in records))),
-    )
-
-
-def with_friction(record: DryRecord, noise: NoiseModel) -> DryRecord:
-    """The record at the loads at which its pivot last slid, by the friction that explains best how it moved.
-
-    A load that overshoots, wanders or turns shows how far it must come back before the pivot follows.
-    """
-    if np.ptp(slid(record.blocks, record.course, FRICTION_SHARE).branch) == 0.0:
-        return record
-    data, likeliest, evidence, fitted, start = fit_data([record], noise), record, -math.inf, 0.0, None
-    for times in (*_TIMES, None, None):
-        share = fitted if times is None else times * FRICTION_SHARE
-        blocks, friction = slid(record.blocks, record.course, share), (share, max(share, FRICTION_SE))
-        trial = replace(data, load=blocks.load, branch=blocks.branch, friction=friction)
-        fit = fit_law(LAWS["spline"], True, trial, start)
-        start = fit.theta
-        # nothing else tells much friction from more
-        likely = fit.log_evidence - math.log1p((share / FRICTION_SHARE - 1.0) ** 2)
-        if likely > evidence:
-            likeliest, evidence = replace(record, blocks=blocks, friction=friction), likely
-            fitted = abs(fit.theta[FRICTION])
-    return likeliest
-
-
-def bad_blocks(record: DryRecord, noise: NoiseModel) -> BoolArray:
-    """Blocks (m,) that belong to bad steps."""
-    groups = _groups(record)
-    bad = ~record.good
-    for _ in range(int(_MOST_BAD * len(np.unique(groups)))):
-        data = fit_data([replace(record, good=~bad)], noise)
-        numbers = np.unique(groups[~bad])
-        fit = fit_law(LAWS["spline"], True, data)
-        shift, remainder, score = _score_of(fit, data, groups[~bad][:, None] == numbers)
-        information, whole = np.sum(shift * remainder, axis=0), np.sum(shift**2, axis=0)
-        # by how many standard errors each group is off; what the law can take up tells nothing
-        size = np.abs(score) / np.sqrt(np.maximum(information, 1e-6 * whole))
-        size[information <= 1e-6 * whole] = 0.0
-        if np.max(size) < _BAD_LIMIT:
-            break
-        worst = numbers[np.argmax(size)]
-        # a hold goes with the ramps on either side: whatever spoilt it need not have kept to its limits
-        bad |= np.abs(groups - worst) <= worst % 2
-    return bad
-
-
-def _groups(record: DryRecord) -> IntArray:
-    """Number (m,) of the stretch that each block belongs to: odd for holds, even for ramps, in order of time."""
-    hold = record.blocks.hold
-    if not record.holds:
-        return 2 * (np.arange(len(hold)) * GROUPS_ON_RAMP // len(hold))
-    return np.where(hold >= 0, 2 * hold + 1, 2 * np.maximum.accumulate(hold) + 2)
-
-
-def _score_of(fit: LawFit, data: FitData, columns: FloatArray | BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Changes (m, k) of the readings, whitened; what the law cannot take up of them; the residual along that (k,)."""
-    reading, jacobian = fit.reading_gradient(data.load, data.branch)
-    design, residual = data.whitener @ jacobian, data.whitener @ (data.deflection - reading)
-    shift = data.whitener @ columns
-    remainder = shift - design @ (fit.covariance @ (design.T @ shift))
-    return shift, remainder, residual @ remainder
-
-
-def with_shared_errors(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitData]) -> tuple[list[FitData], float]:
-    """Data of pads with what is off alike in all readings of a test or of a pad.
-
-    Compliance is another one in every test of a pad, by a scatter that all pads' tests tell together; and the load has
-    a zero that is known so well.
-    """
-    if all(len(records) < 2 and not records[0].load_error for records in pads):
-        return list(data), 0.0
-    fits = [fit_law(LAWS["spline"], True, pad) for pad in data]
-    runs = [np.repeat(np.arange(len(records)), [len(record.used) for record in records]) for records in pads]
-    # of the curve, not of the readings: these would favour the softer test
-    changes = [fit.reading_gradient(pad.load, pad.branch)[0] - fit.theta[OFFSET] for fit, pad in zip(fits, data)]
-    scatter = _scatter(fits, data, runs, changes)
-    wider = []
-    for records, pad, fit, run, change in zip(pads, data, fits, runs, changes, strict=True):
-        root, error = np.linalg.inv(pad.whitener), max(record.load_error for record in records)
-        more, less = (fit.reading_gradient(pad.load + shift, pad.branch)[0] for shift in (error, -error))
-        zero = 0.5 * (more - less)
-        covariance = root @ root.T + scatter**2 * np.outer(change, change) * (run[:, None] == run)
-        whitener = np.linalg.inv(np.linalg.cholesky(covariance + np.outer(zero, zero)))
-        wider.append(replace(pad, whitener=whitener) if scatter or error else pad)
-    return wider, scatter
-
-
-def _scatter(
-    fits: Sequence[LawFit], data: Sequence[FitData], runs: Sequence[IntArray], changes: Sequence[FloatArray]
-) -> float:
-    """Scatter of the compliance from test to test of a pad; zero where it may be chance."""
-    sizes, squares = [np.zeros(0)], [np.zeros(0)]
-    for fit, pad, run, change in zip(fits, data, runs, changes, strict=True):
-        columns = (run[:, None] == np.unique(run)) * change[:, None]
-        # what all tests have in common is the curve's
-        shift, remainder, score = _score_of(fit, pad, columns @ linalg.null_space(np.ones((1, columns.shape[1]))))
-        information, basis = np.linalg.eigh(shift.T @ remainder)
-        informative = information > _LEAST_SHARE * np.sum(shift**2)
-        sizes.append(information[informative])
-        squares.append((basis.T @ score)[informative] ** 2 / information[informative])
-    size, square = np.concatenate(sizes), np.concatenate(squares)
-
-    def deviance(logarithm: float) -> float:
-        variance = 1.0 + math.exp(2.0 * logarithm) * size
-        return np.sum(np.log(variance) + square / variance)
-
-    best = optimize.minimize_scalar(deviance, bounds=(math.log(1e-4), 0.0), method="bounded").x
-    return math.exp(best) if np.sum(square) - deviance(best) > _CLEAR_SCATTER else 0.0
 
 
 def fit_pivots(
@@ -243,7 +91,8 @@ def fit_pivots(
     [1, 2, 3, 4, 5]
     """
     angles = np.asarray(pivot_angles, dtype=float)
-    records, problems = _read(campaign, angles)
+    witness = sweep_witness(campaign, angles)
+    records, problems = _read(campaign, angles, witness)
     records, contradicted, noise = refused_records(records, angles)
     problems += contradicted
     refused = {problem.run for problem in problems}
@@ -251,18 +100,20 @@ def fit_pivots(
     many = 2 * len(refused) >= len(campaign.of_kind("dry_pivot"))
     if problems and (on_refusal == "raise" or not used or (on_refusal == "few" and many)):
         raise RigDataError(problems)
+    used = witness.held_against(used) if witness else used
     used, noise, creeps = without_creep(used, noise)
     used = [with_friction(record, noise) for record in used]
-    pads = defaultdict(list)
+    pads = defaultdict[int, list[DryRecord]](list)
     for record in sorted(used, key=lambda record: record.pad):
-        pads[record.pad].append(replace(record, good=~bad_blocks(record, noise)))
+        pads[record.pad] += sound_parts(record, noise)
     curves = _fit_pads(list(pads.values()), structure_behind(records))
-    return tuple(
-        replace(curve, status=(*curve.status, *creeps[curve.pad], *refused_runs(problems))) for curve in curves
-    )
+    common = (*(witness.conditions if witness else ()), *refused_runs(problems))
+    return tuple(replace(curve, status=(*curve.status, *creeps[curve.pad], *common)) for curve in curves)
 
 
-def _read(campaign: Campaign, angles: FloatArray) -> tuple[list[DryRecord], list[Problem]]:
+def _read(
+    campaign: Campaign, angles: FloatArray, witness: SweepWitness | None
+) -> tuple[list[DryRecord], list[Problem]]:
     """Every dry run that can be read, and why the others cannot."""
     runs = campaign.of_kind("dry_pivot")
     if not runs:
@@ -273,7 +124,7 @@ def _read(campaign: Campaign, angles: FloatArray) -> tuple[list[DryRecord], list
         if run.pad is None or not 1 <= run.pad <= len(angles):
             what = f"names pad {run.pad}, the bearing has pads 1 to {len(angles)}"
             raise refusal(run, "pad", what, "Correct the manifest")
-        return read_dry_run(run, float(angles[run.pad - 1]))
+        return read_dry_run(as_witnessed(run, witness.channels) if witness else run, float(angles[run.pad - 1]))
 
     return usable_runs(runs, read)
 
@@ -318,8 +169,11 @@ def assemble_curve(
         load_direction=first.load_direction,
         displacement_direction=first.displacement_direction,
         hysteresis=_loop(steps, law),
-        relative_calibration=relative_calibration(axial_channels(first.run).values(), first.angle),
-        runs=tuple(record.run.id for record in records),
+        relative_calibration=math.hypot(
+            relative_calibration(axial_channels(first.run).values(), first.angle),
+            max(abs(record.elsewhere) for record in records),
+        ),
+        runs=tuple(dict.fromkeys(record.run.id for record in records)),
     )
     return replace(curve, status=_status(curve, records, structure))
 
@@ -334,11 +188,24 @@ def _widened(fit: LawFit) -> LawFit:
     return replace(fit, covariance=fit.covariance * fit.chi_square / fit.freedom) if _misfits(fit) else fit
 
 
+def _zero(record: DryRecord, law: LawFit) -> float:
+    """Reading [m] of a record where its curve begins."""
+    used = record.used
+    return np.mean(used.deflection - law.reading_gradient(used.load, used.branch)[0]) + law.theta[OFFSET]
+
+
+def _slips(records: Sequence[DryRecord], law: LawFit) -> str:
+    """By how much the shaft slipped, wherever a run is in parts, in words."""
+    slips = []
+    for before, after in itertools.pairwise(records):
+        if before.run.id == after.run.id:
+            size, load = _zero(after, law) - _zero(before, law), after.used.load[0]
+            slips.append(f"by {1e6 * size:+.2g} um at {load:.0f} N of {after.run.id}")
+    return ", ".join(slips)
+
+
 def _steps(records: Sequence[DryRecord], law: LawFit, noise: NoiseModel) -> PivotSteps:
-    """Points of every run of the pad, counted from the reading at the lowest load of any run."""
-    used = [record.used for record in records]
-    lowest = min(used, key=lambda blocks: blocks.load.min())
-    zero = lowest.deflection[np.argmin(lowest.load)]
+    """Points of every run of the pad, each from where its curve begins."""
     parts = []
     for record in records:
         blocks = record.blocks
@@ -348,7 +215,7 @@ def _steps(records: Sequence[DryRecord], law: LawFit, noise: NoiseModel) -> Pivo
         share = members * blocks.duration / duration[:, None]
         branch = np.sign(share @ blocks.branch).astype(int)
         load = share @ blocks.load * (1.0 - law.theta[FRICTION] * branch)
-        deflection = share @ blocks.deflection - zero - law.theta[OFFSET]
+        deflection = share @ blocks.deflection - _zero(record, law)
         error = np.sqrt([noise.mean_variance(length) for length in duration])
         aside = share @ blocks.across - blocks.across[0]
         weight = 1.0 - (members & ~record.good).any(axis=1)
@@ -374,8 +241,13 @@ def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> 
     for fit, weight in zip(curve.fits, curve.weights, strict=True):
         shares[fit.name] += weight
     listed = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
+    slipped = _slips(records, law)
+    moved = {record.run.id: 100.0 * record.elsewhere for record in records if record.elsewhere}
+    elsewhere = ", ".join(f"{run} by {share:+.1f} % of the clearance" for run, share in moved.items())
     return holding(
         (bad > 0, "bad-steps", f"{bad} left out"),
+        (slipped, "shaft-slipped", slipped),
+        (elsewhere, "starts-elsewhere", elsewhere),
         (abs(curve.load_direction.angle) > _ANGLE_WARNING, "load-off-pad", str(curve.load_direction)),
         (structure, "structure-gives", structure),
         (aside and not structure, "moves-aside", f"the shaft goes {curve.displacement_direction}"),

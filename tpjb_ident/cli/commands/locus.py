@@ -21,7 +21,7 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     import pandas as pd
 
     from tpjb_ident.clearance.measure import pairs_frame
-    from tpjb_ident.compare.static_tests import measure_static, turned_probes, wrong_scale
+    from tpjb_ident.compare.static_tests import measure_static, wrong_scale
     from tpjb_ident.report.comparison_page import clearance_table
     from tpjb_ident.report.sections import position_panels
 
@@ -52,7 +52,7 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     problems = []
     for polygon in (static.clearance, *polygons) if static.clearance is not None else ():
         run = next(run for run in source.runs if run.id == polygon.run)
-        problems += [*turned_probes(run, polygon), *wrong_scale(run, polygon, drawing)]
+        problems += wrong_scale(run, polygon, drawing)
     wrong = c.warn_of(problems)
     c.judge({name: part.status for name, part in parts.items()} | {"left out": static.left_out}, wrong)
     if static.clearance is None and source.of_kind("clearance"):
