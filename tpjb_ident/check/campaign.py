@@ -19,7 +19,13 @@ from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.rig_fit import rig_fit
 from tpjb_ident.check.run_gain import check_agreement, check_film, check_positions, check_shaft_lines, point_runs
 from tpjb_ident.check.sensor_axes import check_cells, check_probes
-from tpjb_ident.check.set_points import check_excitation, check_rotation, check_speed, check_static_loads
+from tpjb_ident.check.set_points import (
+    check_excitation,
+    check_places,
+    check_rotation,
+    check_speed,
+    check_static_loads,
+)
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
 from tpjb_ident.conditions import SEVERITIES, Conditions
 from tpjb_ident.rounding import listed
@@ -87,6 +93,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     if static:
         check_cells(observations)
     check_positions(dynamic)
+    check_places(dynamic)
     check_magnitudes(observations)
     check_excitation(sines)
     check_dry(of_kind("dry_pivot"))

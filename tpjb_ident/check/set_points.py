@@ -26,6 +26,9 @@ _MOVED_ALONG = 3.0
 #: Ratio of the parts that go round one way and the other from which a run tells the sense: a film far stiffer in one
 #: direction passes on both, forward more. Of the runs that tell it this share must agree, and so many there must be.
 _ONE_WAY, _AGREED, _LEAST_RUNS = 1.5, 0.9, 3
+#: Usual distances to the nearest run of the same load, within which a shaft stands where a run of another load has it,
+#: and from the middle of its own runs beyond which it does not stand with them; what records resolve, at least [m].
+_THERE, _NOT_HERE, _RESOLVED = 3.0, 6.0, 5e-8
 
 
 def check_static_loads(observations: Sequence[Observation]) -> bool:
@@ -98,6 +101,29 @@ def check_speed(observation: Observation) -> None:
         observation.report.ask("turning", abs(shown), shown=shown)
     else:
         observation.report.ask("speed", abs(abs(shown / set_point) - 1.0), shown=shown, stated=set_point)
+
+
+def check_places(runs: Sequence[Observation]) -> None:
+    """Warn where the shaft stands as in the runs of another static load, and not as in others of its own.
+
+    Cells that carry no static load tell nothing of it; a film's thickness does.
+    """
+    shown = [run for run in runs if len(run.of("displacement")) > 1]
+    places = np.array([run.plane("displacement", run.spread[1]).real for run in shown]).reshape(-1, 2)
+    keys = [run.run.point.static_key for run in shown]
+    load = np.array([keys.index(key) for key in keys], dtype=int)  # by its first run
+    distance = np.linalg.norm(places[:, None] - places, axis=2)
+    np.fill_diagonal(distance, np.inf)
+    is_alike = load[:, None] == load
+    nearest, elsewhere = np.where(is_alike, distance, np.inf), np.where(is_alike, np.inf, distance)
+    if not np.isfinite(nearest.min(axis=1, initial=np.inf)).all() or not np.isfinite(elsewhere).any():
+        return
+    usual = max(float(np.median(nearest.min(axis=1))), _RESOLVED)
+    for k, run in enumerate(shown):
+        there = int(np.argmin(elsewhere[k]))
+        off = float(np.linalg.norm(places[k] - np.median(places[is_alike[k]], axis=0)))
+        if elsewhere[k, there] < _THERE * usual and off > _NOT_HERE * usual:
+            run.report.ask("other load", load=keys[there][0], off=1e6 * off)
 
 
 def check_rotation(runs: Sequence[Observation]) -> None:

@@ -33,6 +33,8 @@ _SHAFT, _PITCH = 0.1, 0.03
 _OTHERWISE, _GROSS = 0.05, 0.2
 #: A sign is beyond doubt from so many standard errors on.
 _CLEAR = 5.0
+#: Standard errors from which cells or probes come later than nobody says, and than is stated.
+_LATE, _LATE_AS_STATED = 2.0, 4.5
 #: Loss of a cell's mount, at most: bolted joints have 0.01. What goes beyond it is a delay.
 _LOSS = 0.04
 #: No housing stands on springs as stiff as this [m/N]: a steel bar of 1 m^2 and 2 m has it.
@@ -188,12 +190,12 @@ class Housing(Term):
         A spring's loss is positive, late cells lower it. Accelerometers with which nothing else is wrong may have led
         by a corner of their own.
         """
-        is_stated = any(sensor.delay_uncertainty for sensor in rig.channels)
-        if is_stated or rig.mount == "unknown" or not rig.has_acceleration:
+        if rig.mount == "unknown" or not rig.has_acceleration:
             return rig
+        is_stated = any(sensor.delay_uncertainty for sensor in rig.channels)
         fitted = solution.fitted[self.name]
         first = 3 if rig.mount == "cells" else len(fitted.value) - 1
-        late = fitted.value[first:] < -2 * fitted.deviation[first:]
+        late = fitted.value[first:] < -(_LATE_AS_STATED if is_stated else _LATE) * fitted.deviation[first:]
         if not late.any() or self.is_on_foundation(fitted):
             return rig
         lag = float(fitted.value[first:][late].min())
