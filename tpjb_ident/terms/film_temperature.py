@@ -17,8 +17,9 @@ from tpjb_ident.estimate.term import FilmTerm, Fitted, numbered
 #: Change of H per kelvin, over its entries, one standard deviation: viscosity falls by 3 %, K goes with about the 0.4th
 #: power of it, C with the 0.6th.
 _USUAL = 0.015
-#: Deviation of the runs' temperatures that a supply holds, and distance from their mean that is worth telling [K].
-_HELD, _TOLD = 1.0, 3.0
+#: Distance of a run's temperature from its point's mean that thermometers show of themselves, deviation that a supply
+#: holds, and distance that is worth telling [K].
+_SHOWN, _HELD, _TOLD = 0.5, 1.0, 3.0
 
 
 class FilmTemperature(FilmTerm):
@@ -37,7 +38,7 @@ class FilmTemperature(FilmTerm):
         variance = totals(blocks.point, warmer**2, number) / count
         self._unsteady = np.sqrt(np.maximum(variance - _HELD**2, 0.0))
         self._farthest = float(np.abs(warmer).max(initial=0.0))
-        if self._farthest > 0:
+        if self._farthest > _SHOWN:
             self.parameters = numbered("change per kelvin", "1/K", [_USUAL] * NUMBERS)
             self.parameters += numbered("at the temperature that is meant", "1/K", [_USUAL] * NUMBERS)
 
