@@ -5,7 +5,6 @@ width of its prior. All are counted from their priors' means.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
