@@ -288,3 +288,11 @@ def test_steps_put_no_more_on_a_harmonic_than_they_can(noise):
     assert (third < 1.5 * most).all()
     assert (most < 0.2).all()
     assert (_rounding(np.round(rows + 0.6 * rng.standard_normal(rows.shape))) < 1e-4).all()
+
+
+def test_faint_lines_that_stood_out_stay_where_the_drive_is_off_its_set_point():
+    """The third harmonic of the shaft 1.9 Hz beside a drive: without it every window's phasor beats."""
+    lines = known_lines((80.0,), 27.3, RATE, extra=(33.0, 81.9), duration=4.0)
+    again = known_lines((80.003,), 27.3, RATE, extra=lines.found, duration=4.0)
+    assert [line.name for line in again.nuisance] == [line.name for line in lines.nuisance]
+    assert again.place("3X") is not None
