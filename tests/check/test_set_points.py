@@ -19,7 +19,7 @@ from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.observation import excitation_line, observe
 from tpjb_ident.check.run_gain import PointRuns, check_shaft_lines, deviating_runs, dynamic_difference, gain_of_run
-from tpjb_ident.check.set_points import check_excitation, check_rotation
+from tpjb_ident.check.set_points import check_excitation, check_rotation, check_static_loads
 from tpjb_ident.phasors.run_phasors import run_phasors
 
 
@@ -54,6 +54,30 @@ def test_strength_is_that_of_the_operating_point():
 )
 def test_force_or_displacement_acts_along_the_stated_direction(force, displacement, named):
     assert findings([observation(5000.0, 1000.0, 0.0, force, displacement)]) == [named]
+
+
+@pytest.mark.parametrize(
+    ("loads", "mount", "gain", "zero", "named"),
+    [
+        ((3000.0, 6000.0), None, 0.0, 72.0, ["no static force"]),
+        ((3000.0,), "floating", 0.0, 72.0, ["no static force"]),
+        ((3000.0, 6000.0), "floating", 0.02, 0.0, ["no static force"]),
+        ((3000.0, 6000.0), "cells", 0.02, 0.0, ["load size"]),
+        ((3000.0,), "cells", 0.0, 72.0, ["load direction", "load size"]),
+    ],
+)
+def test_a_zero_of_cells_that_carry_no_load_is_no_load_that_is_off(loads, mount, gain, zero, named):
+    rng = np.random.default_rng(6)
+    runs = []
+    for load in [load for load in loads for _ in range(4)]:
+        run = observation(load, 1000.0)
+        run.run.kind = "dynamic"
+        force = np.array([zero + 0.1 * rng.standard_normal(), -gain * load])
+        run.mean = lambda quantity, force=force: force
+        runs.append(run)
+    assert check_static_loads(runs, mount) is (named != ["no static force"])
+    keys = [{key.partition(";")[0] for key in run.report.keys} for run in runs]
+    assert keys == [set(named)] * len(runs)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from tests.rigs.band_rig import BandRig, band_plans
 from tests.seeds import first_quick, seeds
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.estimate.equation import found_mount, vector
-from tpjb_ident.identification.campaign_solution import at_set_point, with_found_devices
+from tpjb_ident.identification.campaign_solution import CampaignSolution, at_set_point, with_found_devices
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.terms.mains import Pickup, fit_mains
 from tpjb_ident.terms.registry import learnt_rig
@@ -186,3 +186,16 @@ def test_mains_that_is_found_there_is_what_struck_the_probes():
     vectors = np.exp(2j * np.pi * rng.random((6, 1))) * pattern
     fit = fit_mains(D + vectors, F, Pickup(pattern, np.abs(pattern[0]), 9), 1e-3)
     np.testing.assert_allclose(fit.pickup, vectors, atol=1e-3 * np.abs(pattern).max())
+
+
+@pytest.mark.parametrize("seed", seeds(3))
+@pytest.mark.parametrize(("noise", "scatter"), [(0.06, 0.0), (0.02, 0.1)])
+def test_runs_differ_by_what_their_noise_does_not_explain(noise, scatter, seed):
+    rig, blocks, truth = made(Case(directions=24, noise=noise, scatter=scatter), seed)
+    answer = CampaignSolution((), None, (), solved(rig, blocks, truth))
+    differences = [answer.run_difference(p) for p in range(len(truth))]
+    assert np.sqrt(np.mean(answer.misfits**2)) > 0.06
+    if scatter:
+        assert 0.08 < np.mean(differences) < 0.18
+    else:
+        assert max(differences) < 0.03

@@ -10,12 +10,12 @@ from tests.rigs.acquisition import EXACT, Acquisition
 from tests.rigs.closed_form import Rig, channels_of, with_entries, write_rig
 from tests.studies.field.battery import outcome
 from tests.studies.field.conditions import bad_data, good_records, good_rigs
-from tpjb_ident.check.set_points import without_static_part
+from tpjb_ident.check.set_points import cell_zero, without_static_part
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.plain import PlainSettings, plain_frame, plain_points, write_r_matrices
 from tpjb_ident.phasors.compensation import SlowerChannel, slower_channel
 from tpjb_ident.results.frequency_model import chance_of
-from tpjb_ident.runs.static_load import StaticLoads, cell_zero
+from tpjb_ident.runs.static_load import StaticLoads
 
 QUICK = Rig(frequencies=(25.0,), seconds=2.0)
 SLOW = Acquisition(rate=1000.0, uncertainty=EXACT)

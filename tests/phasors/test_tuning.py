@@ -20,7 +20,7 @@ from tpjb_ident.phasors.frequency import (
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
-from tpjb_ident.phasors.whole_record import MAX_LINES, MIN_SHARE, REACH, fitted_whole, unexpected_lines
+from tpjb_ident.phasors.whole_record import MAX_LINES, MIN_SHARE, REACH, _rounding, fitted_whole, unexpected_lines
 
 RATE, LENGTH, WINDOWS = 1000.0, 0.4, 12
 START = LENGTH * np.arange(WINDOWS)
@@ -275,3 +275,24 @@ def test_no_more_lines_are_taken_than_can_be_fitted_the_lowest_first():
     extra, _ = lines_in(many)
     assert len(extra) == MAX_LINES == 10
     np.testing.assert_allclose(extra, [f for f, _ in many][:10], atol=0.03)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.2])
+def test_steps_put_no_more_on_a_harmonic_than_they_can(noise):
+    """Of a sine of a few steps, whose own roundings are no noise that would dither it."""
+    rng, time = np.random.default_rng(9), np.arange(8000) / 2000.0
+    rows = np.array([size * np.sin(2 * np.pi * 20.0 * time) for size in (2.0, 3.0, 4.0, 5.0, 6.0)])
+    rows = np.round(rows + noise * rng.standard_normal(rows.shape))
+    third = np.abs(rows @ np.exp(-2j * np.pi * 60.0 * time)) * 2 / len(time)
+    most = np.sqrt(_rounding(rows))
+    assert (third < 1.5 * most).all()
+    assert (most < 0.2).all()
+    assert (_rounding(np.round(rows + 0.6 * rng.standard_normal(rows.shape))) < 1e-4).all()
+
+
+def test_faint_lines_that_stood_out_stay_where_the_drive_is_off_its_set_point():
+    """The third harmonic of the shaft 1.9 Hz beside a drive: without it every window's phasor beats."""
+    lines = known_lines((80.0,), 27.3, RATE, extra=(33.0, 81.9), duration=4.0)
+    again = known_lines((80.003,), 27.3, RATE, extra=lines.found, duration=4.0)
+    assert [line.name for line in again.nuisance] == [line.name for line in lines.nuisance]
+    assert again.place("3X") is not None

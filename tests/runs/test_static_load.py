@@ -14,7 +14,7 @@ from tpjb_ident.estimate.equation import Rig, Sensor
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs.run_jobs import dry_test
-from tpjb_ident.runs.static_load import MAX_MISS, MAX_SIDEWAYS, StaticLoads, load_conditions, load_misses
+from tpjb_ident.runs.static_load import MAX_MISS, MAX_SIDEWAYS, StaticLoads, load_conditions, load_misses, static_loads
 
 
 def loaded(ratios, load=5000.0, direction=-90.0):
@@ -164,3 +164,13 @@ def test_a_dry_test_says_what_the_rig_carries(tmp_path):
 def test_a_dry_test_with_a_clipped_cell_is_refused(tmp_path):
     with pytest.raises(RigDataError, match=r"channel L1H.*clipped"):
         dry_campaign(tmp_path, fault=lambda values, *_: np.minimum(values, 0.6 * values.max() + 0.4 * values.mean()))
+
+
+def test_stingers_of_a_floating_stator_tell_neither_loads_nor_a_zero():
+    campaign = SimpleNamespace(mount="floating", channels={})
+    points = [loaded(np.full(4, 300.0 / load) + 0j, load) for load in (2000.0, 5000.0)]
+    loads = static_loads(campaign, points)
+    assert loads.conditions(0) == ("no-static-force",)
+    assert [miss.tolist() for miss in loads.misses] == [[0.0] * 4] * 2
+    stands = static_loads(SimpleNamespace(mount="cells", channels={}), points)
+    assert "cells-not-tared" in stands.conditions(0)

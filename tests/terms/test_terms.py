@@ -406,6 +406,15 @@ def test_a_floating_stator_tells_wrong_probes_from_a_shaft_that_gives(changes, s
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_a_shaft_that_gives_more_than_the_film_is_no_fault_of_accelerometers(seed):
+    rig, blocks, truth = made(Case(mount="floating", hertz=(25.0, 45.0), noise=2e-4, shaft_gives=1.2e-8), seed)
+    solution = solved(rig, blocks, truth)
+    assert not solution.conditions()
+    assert held(solution, truth)
+    assert of(solution, "housing").value[4:6] == pytest.approx(12.0, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_shaft_that_tilts_between_two_planes_of_probes_does_no_harm(seed):
     planes = {"D1": 0.03, "D2": 0.03, "D3": -0.03}
     case = Case(probes=3, **stated(**{name: {"plane": plane} for name, plane in planes.items()}))

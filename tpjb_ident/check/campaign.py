@@ -89,7 +89,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     sines = [observation for observation in dynamic if observation.run.excitation_kind == "sine"]
     for observation in observations:
         check_speed(observation)
-    static = check_static_loads(observations)
+    static = check_static_loads(observations, campaign.mount)
     if static:
         check_cells(observations)
     check_positions(dynamic)

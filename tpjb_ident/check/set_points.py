@@ -9,6 +9,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import ROTATIONS, OperatingPoint
 from tpjb_ident.check.findings import explanation, far, pointing, repairs
 from tpjb_ident.check.observation import Observation
+from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.phasors.run_data import complex_median
 
 #: Condition of phasors that names the lines beside the stated ones.
@@ -29,22 +30,33 @@ _ONE_WAY, _AGREED, _LEAST_RUNS = 1.5, 0.9, 3
 #: Usual distances to the nearest run of the same load, within which a shaft stands where a run of another load has it,
 #: and from the middle of its own runs beyond which it does not stand with them; what records resolve, at least [m].
 _THERE, _NOT_HERE, _RESOLVED = 3.0, 6.0, 5e-8
+#: Set points must differ by this share for a zero to be told from a gain.
+_MIN_RANGE = 0.15
+#: Standard deviations from which a run loses weight when the zero is looked for, and rounds of weighing.
+_BEND, _ROUNDS = 1.5, 10
+#: Standard errors beyond which an intercept is one,
+_CLEAR = 5.0
+#: and share of the smallest load that it must have.
+_NOTABLE = 0.004
+_MIN_RUNS = 4
 
 
-def check_static_loads(observations: Sequence[Observation]) -> bool:
+def check_static_loads(observations: Sequence[Observation], mount: str | None = None) -> bool:
     """Mean force of dynamic and locus runs against the stated static load, its direction, and the other runs.
 
-    Cells that show no static force in any run are of a kind that shows none: that is a note, and nothing is held
-    against them; it is False then.
+    Cells that show no static force in any run, whatever their zero, are of a kind that shows none, or in the stingers
+    of a floating stator: that is a note, and nothing is held against them; it is False then.
     """
-    shown, shares = [], []
+    shown, means, loads = [], [], []
     for observation in observations:
         point, mean = observation.run.point, observation.mean("force")
         if observation.run.kind in {"dynamic", "locus"} and point.static_load > 0 and np.isfinite(mean).all():
             shown.append(observation)
-            shares.append(mean @ [1, 1j] / point.static_load * np.exp(-1j * point.static_load_direction))
-    ratios = np.array(shares, dtype=complex)
-    if without_static_part(ratios):
+            means.append(mean @ [1, 1j])
+            loads.append(point.static_load * np.exp(1j * point.static_load_direction))
+    forces, set_points = np.array(means, dtype=complex), np.array(loads, dtype=complex)
+    ratios = forces / set_points
+    if mount == "floating" or without_static_part(ratios - cell_zero(forces, set_points)[0] / set_points):
         for observation in shown:
             observation.report.ask("no static force")
         return False
@@ -60,6 +72,23 @@ def check_static_loads(observations: Sequence[Observation]) -> bool:
             share, turn = abs(ratio / middle) - 1, math.degrees(np.angle(ratio / middle))
             observation.report.ask("load ratio", share=share, turn=turn)
     return True
+
+
+def cell_zero(means: ComplexArray, set_points: ComplexArray, uncertainty: float = 0.0) -> tuple[complex, float]:
+    """Zero of the cells from all runs, with its standard error; `means` (n,), `set_points` (n,) [N]."""
+    good = np.isfinite(means) & (np.abs(set_points) > 0)
+    y, x = means[good], set_points[good]
+    if len(y) < _MIN_RUNS or (np.abs(x - x[0]) < _MIN_RANGE * np.abs(x).max()).all():
+        return 0j, 0.0
+    size = np.abs(x)
+    design, shares = np.stack([x, np.ones_like(x)], axis=1) / size[:, None], y / size
+    values, weights, _, _ = reweighted(design, shares, lambda u: huber_weight(u, _BEND), most=_ROUNDS)
+    spread = np.sum(weights * np.abs(shares - design @ values) ** 2) / max(weights.sum() - 2.0, 1.0)
+    covariance = np.linalg.inv((design * weights[:, None]).conj().T @ design).real * spread
+    zero, error = complex(values[1]), float(np.sqrt(covariance[1, 1]))
+    is_clear = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()
+    allowed = uncertainty == 0.0 or abs(zero) < 3 * uncertainty + 3 * error
+    return (zero, error) if is_clear and allowed else (0j, 0.0)
 
 
 def without_static_part(ratios: ComplexArray) -> bool:

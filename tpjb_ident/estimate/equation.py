@@ -252,7 +252,7 @@ class State:
     h: ComplexArray  #: (P, 2, 2), N/m: at the set points
     slope: ComplexArray  #: (P, 2, 2), N/m: dH / d ln W
     slope_known: np.ndarray  #: (P,) bool
-    compliance: ComplexArray  #: (2, 2), m/N: of the cells under the housing, or of a floating one's shaft
+    compliance: ComplexArray  #: (2, 2), m/N: of the cells under the housing, or (n, 2, 2) of a floating one's shaft
     floating: ComplexArray  #: (2, 2): kappa
     factor: ComplexArray  #: (n, m): T
     shift: ComplexArray  #: (n, m + 2): s, what does not go with the motion
@@ -340,7 +340,7 @@ def film_force_rows(rig: Rig, blocks: Blocks, state: State, force: ComplexArray)
     rows[:, cells] = np.einsum("nja,na...->nj...", seen, force)
     square = (blocks.omega**2).reshape((-1,) + (1,) * (force.ndim - 1))
     sign = 1.0 if rig.mount == "cells" else -1.0
-    rows[:, m:] = sign * square * np.einsum("ij,nj...->ni...", state.compliance, force)
+    rows[:, m:] = sign * square * np.einsum("nij,nj...->ni...", np.broadcast_to(state.compliance, (n, 2, 2)), force)
     return rows
 
 

@@ -236,6 +236,10 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
     return noises, np.array(freedoms)
 
 
+#: Standard deviations by which noise alone may be beyond its mean.
+_CHANCE = 3.0
+
+
 @dataclass(frozen=True, repr=False)
 class CampaignSolution:
     """H of every point of a campaign, and what was put right on the way."""
@@ -251,6 +255,25 @@ class CampaignSolution:
     def misfits(self) -> FloatArray:
         """Force of every block that H leaves, over its force, (n,)."""
         return misfits(self.solution)
+
+    def run_difference(self, p: int) -> float:
+        """Share of the force by which runs of point `p` differ, beyond what their noise alone makes of them."""
+        counted = self.solution.blocks_of(p) & (self.solution.scatter.weights > 0)
+        spare = int(counted.sum()) - 2  # two runs fix H: what is left over is shared by all of them
+        if spare < 1:
+            return 0.0
+        noise = np.mean(self._noise_power[counted]) * (1 + _CHANCE / np.sqrt(2 * spare))
+        return float(np.sqrt(max(np.sum(self.misfits[counted] ** 2) / spare - noise, 0.0)))
+
+    @cached_property
+    def _noise_power(self) -> FloatArray:
+        """Mean square of the misfits that noise alone has, (n,)."""
+        solution, (_, F) = self.solution, at_set_point(self.solution)
+        sizes, axes = np.linalg.eigh(solution.blocks.noise)
+        roots, shift = axes * np.sqrt(np.maximum(sizes, 0.0))[:, None], np.zeros_like(solution.shift)
+        alone = [replace(solution, blocks=replace(solution.blocks, z=z), shift=shift) for z in np.moveaxis(roots, 2, 0)]
+        power = np.sum([np.abs(remainders(each)) ** 2 for each in alone], axis=(0, 2))
+        return np.asarray(power / np.sum(np.abs(F) ** 2, axis=1))
 
     @property
     def h(self) -> ComplexArray:
@@ -333,9 +356,13 @@ def at_set_point(solution: Solution) -> tuple[ComplexArray, ComplexArray]:
 
 def misfits(solution: Solution) -> FloatArray:
     """Force of every block that H leaves, over its force, (n,)."""
+    return np.linalg.norm(remainders(solution), axis=1) / np.linalg.norm(at_set_point(solution)[1], axis=1)
+
+
+def remainders(solution: Solution) -> ComplexArray:
+    """Force of every block that H leaves, (n, 2) [N]."""
     D, F = at_set_point(solution)
-    residual = F - np.einsum("nij,nj->ni", solution.h[solution.blocks.point], D)
-    return np.linalg.norm(residual, axis=1) / np.linalg.norm(F, axis=1)
+    return np.asarray(F - np.einsum("nij,nj->ni", solution.h[solution.blocks.point], D))
 
 
 #: Terms whose uncertainty scatters with the runs: of points that each have runs of their own.

@@ -76,10 +76,7 @@ def _without_shaft(run: RunPhasors) -> RunPhasors:
 
 
 def _conditions(solved: CampaignSolution, p: int) -> Conditions:
-    counted = solved.misfits[solved.solution.blocks_of(p) & (solved.solution.scatter.weights > 0)]
-    # two runs fix H: what is left over is shared by all of them
-    share = np.sqrt(np.sum(counted**2) / (len(counted) - 2)) if len(counted) > 2 else 0.0
-    conditions = [*differing_runs(float(share)), *solved.loads.conditions(p), *solved.solution.conditions()]
+    conditions = [*differing_runs(solved.run_difference(p)), *solved.loads.conditions(p), *solved.solution.conditions()]
     if p in solved.mains:
         conditions.append(solved.mains[p].condition())
     conditions += solved.means[p].shaft_conditions

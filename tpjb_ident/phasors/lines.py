@@ -73,8 +73,9 @@ class LineSet:
 
     @property
     def found(self) -> tuple[float, ...]:
-        """Frequencies of lines that nobody mentioned [Hz]."""
-        return tuple(line.frequency for line in self.nuisance if line.name == "found")
+        """Frequencies of lines that stood out, of faint ones that every window fits along too [Hz]."""
+        names = {"found", *(line.name for line in _faint_lines(self.excitation, self.speed))}
+        return tuple(line.frequency for line in self.nuisance if line.name in names)
 
     def place(self, name: str) -> int | None:
         """Place of a disturbing line among those of the windows; None where it is not fitted apart."""

@@ -30,7 +30,7 @@ from rigdata.problem import RigDataError
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.phasors.frequency import exact_frequencies
-from tpjb_ident.phasors.line_fit import LineFitter, white_noise
+from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import HIGHEST, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors, device_readers
 
@@ -41,6 +41,8 @@ _CLEAR_OF = 1.2
 #: Share of the largest difference between readings below which one is a residue of arithmetic, no converter's step;
 #: largest square of a line by rounding, over the third power of the step over the amplitude (4 / pi^4 over 2^0.5).
 _NO_STEP, _LARGEST = 1e-6, 0.029
+#: Steps from which a second difference is noise enough.
+_DITHERED = 3.0
 #: Order of the polynomial that takes slow movements of the shaft along: a window has 1.
 _DRIFT_ORDER = 3
 
@@ -116,13 +118,14 @@ def fitted_whole(
 def _rounding(rows: FloatArray) -> FloatArray:
     """Largest square that a converter's steps put on a line of readings (n_channels, n): of a Bessel function.
 
-    Noise dithers them: of one of half a step nothing is left.
+    Noise dithers them: of one of half a step nothing is left. What the steps themselves add to it dithers nothing.
     """
     moves = np.abs(np.diff(rows))
     largest = np.nanmax(moves, axis=1, keepdims=True, initial=0.0)
     step = np.where(moves > _NO_STEP * largest, moves, largest).min(axis=1) + np.finfo(float).tiny
-    noise = np.array([white_noise(row) for row in np.nan_to_num(rows)])
-    dithered = np.exp(-((2 * np.pi * noise / step) ** 2))
+    bends = np.minimum(np.abs(np.diff(rows, 2)) / step[:, None], _DITHERED)  # of steps a median tells nothing
+    noise = np.maximum(np.nanmean(bends**2, axis=1) / 6 - 1 / 12, 0.0)
+    dithered = np.exp(-((2 * np.pi) ** 2) * noise)
     return _LARGEST * dithered * step**3 / np.fmax(np.std(rows, axis=1), step)
 
 

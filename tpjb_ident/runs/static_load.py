@@ -20,10 +20,9 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
-from tpjb_ident.check.set_points import without_static_part
+from tpjb_ident.check.set_points import cell_zero, without_static_part
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.equation import Rig
-from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.runs.point_data import RunsOfPoint
 
@@ -43,14 +42,6 @@ _CONTRADICTS_TURN = 0.5
 _ONE_HALF = 1e-3
 #: Runs that are tried as its middle.
 _MIDDLES = 500
-#: Set points must differ by this share for a zero to be told from a gain.
-_MIN_RANGE = 0.15
-#: Standard deviations from which a run loses weight when the zero is looked for, and rounds of weighing.
-_BEND, _ROUNDS = 1.5, 10
-#: Standard errors beyond which an intercept is one,
-_CLEAR = 5.0
-#: and share of the smallest load that it must have.
-_NOTABLE = 0.004
 _MIN_RUNS = 4
 
 
@@ -86,7 +77,9 @@ def missed_load(misses: ComplexArray, members: Sequence[int]) -> complex:
 
 
 def static_loads(campaign: Campaign, points: Sequence[RunsOfPoint]) -> StaticLoads:
-    """Zero of the cells, and the misses of all runs of a campaign's points."""
+    """Zero of the cells, and the misses of all runs of a campaign's points; stingers of a floating stator tell none."""
+    if campaign.mount == "floating":
+        return StaticLoads([np.zeros_like(data.mean_loads) for data in points], 0j)
     uncertainty = max((c.zero_uncertainty for c in campaign.channels.values() if c.quantity == "force"), default=0.0)
     set_points = np.concatenate([np.full(len(data.mean_loads), _set_point(data)) for data in points])
     zero, error = cell_zero(np.concatenate([data.mean_loads for data in points]), set_points, uncertainty)
@@ -163,20 +156,3 @@ def load_conditions(miss: ComplexArray, common: complex) -> Conditions:
             "of the actuators' transducers), and their gains are taken as uncertain as that",
         ),
     )
-
-
-def cell_zero(means: ComplexArray, set_points: ComplexArray, uncertainty: float = 0.0) -> tuple[complex, float]:
-    """Zero of the cells from all runs, with its standard error; `means` (n,), `set_points` (n,) [N]."""
-    good = np.isfinite(means) & (np.abs(set_points) > 0)
-    y, x = means[good], set_points[good]
-    if len(y) < _MIN_RUNS or (np.abs(x - x[0]) < _MIN_RANGE * np.abs(x).max()).all():
-        return 0j, 0.0
-    size = np.abs(x)
-    design, shares = np.stack([x, np.ones_like(x)], axis=1) / size[:, None], y / size
-    values, weights, _, _ = reweighted(design, shares, lambda u: huber_weight(u, _BEND), most=_ROUNDS)
-    spread = np.sum(weights * np.abs(shares - design @ values) ** 2) / max(weights.sum() - 2.0, 1.0)
-    covariance = np.linalg.inv((design * weights[:, None]).conj().T @ design).real * spread
-    zero, error = complex(values[1]), float(np.sqrt(covariance[1, 1]))
-    is_clear = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()
-    allowed = uncertainty == 0.0 or abs(zero) < 3 * uncertainty + 3 * error
-    return (zero, error) if is_clear and allowed else (0j, 0.0)

@@ -51,7 +51,7 @@ HARMLESS = 2e-3
 
 
 class Housing(Term):
-    """Compliance [nm/N] and loss of the cells; of a floating stator kappa, its lag and the shaft's compliance."""
+    """Compliance [nm/N] and loss of the cells; of a floating stator kappa, its lag, and the shaft's."""
 
     name = "housing"
 
@@ -80,11 +80,10 @@ class Housing(Term):
             lag = Parameter("lag", "rad", _LOSS / 2 if rig.out_of_step else _SHAFT)
             differs = _PITCH if rig.out_of_step else _SHAFT
             entries = [Parameter(f"kappa_{name}", "1", differs) for name in ("xx", "xy", "yx", "yy")]
-            # what lets the shaft move by its usual share, by the film's force per motion
-            ratio = _usual_ratio(vector(rig, blocks, "displacement"), film_force(rig, blocks))
-            compliance = _SHAFT * ratio / _NANOMETRE or 1.0
+            compliance = _shaft(rig, blocks) / _NANOMETRE or 1.0
             shaft = [Parameter(f"c_{name}", "nm/N", compliance) for name in ("xx", "yy")]
-            self.parameters = (*entries, *shaft, lag)
+            losses = [Parameter(name, "1", _SHAFT) for name in ("loss", "damping")]
+            self.parameters = (*entries, *shaft, *losses, lag)
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
         """Compliance or kappa of the state."""
@@ -93,7 +92,7 @@ class Housing(Term):
         elif self.rig.mount == "unknown":
             state.floating = value[0] * np.eye(2, dtype=complex)
         else:
-            state.floating, state.compliance = _kappa(value)
+            state.floating, state.compliance = self._hung(blocks, value)
 
     @cached_property
     def _foundation(self) -> bool:
@@ -111,9 +110,16 @@ class Housing(Term):
         square = (blocks.omega**2)[:, None]
         if self.rig.mount == "cells":
             return -square * vector(self.rig, blocks, "force") @ _compliance(fitted.value)
-        kappa, compliance = _kappa(fitted.value)
+        kappa, compliance = self._hung(blocks, fitted.value)
         moved = vector(self.rig, blocks, "displacement") @ kappa.T
-        return square * (moved + film_force(self.rig, blocks) @ compliance)
+        return square * (moved + np.einsum("nij,nj->ni", compliance, film_force(self.rig, blocks)))
+
+    def _hung(self, blocks: Blocks, value: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Kappa (2, 2), and the shaft's compliance (n, 2, 2) [m/N]: steel and bolts lose alike, oil with frequency."""
+        *_, loss, damping, lag = value.tolist()
+        kappa = np.eye(2) * (1 - 1j * lag) + value[:4].reshape(2, 2)
+        losses = loss + damping * blocks.omega / self._omega
+        return kappa, np.multiply.outer(1 - 1j * losses, _NANOMETRE * np.diag(value[4:6]))
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """In the housing's own rows, which are linear in every single parameter."""
@@ -251,10 +257,14 @@ def _compliance(value: FloatArray) -> ComplexArray:
     return np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * lag), complex)
 
 
-def _kappa(value: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Kappa (2, 2) of a floating stator, and the compliance of its shaft (2, 2) [m/N]."""
-    kappa = np.eye(2) * (1 - 1j * value[6]) + value[:4].reshape(2, 2)
-    return kappa, np.asarray(_NANOMETRE * np.diag(value[4:6]), complex)
+def _shaft(rig: Rig, blocks: Blocks) -> float:
+    """What is plausible of a shaft's compliance [m/N]: its usual share of the motion, more where it moves by more.
+
+    A shaft goes where the film pushes it: no sensor that is inverted or exchanged looks like one that gives way.
+    """
+    force, d, a = film_force(rig, blocks), *(vector(rig, blocks, q) for q in ("displacement", "acceleration"))
+    work = np.nan_to_num(force.conj() * (a / (blocks.omega**2)[:, None] - d)).real.sum()
+    return max(_SHAFT * _usual_ratio(d, force), float(work / max(np.nansum(np.abs(force) ** 2), 1e-300)))
 
 
 def _usual_ratio(first: ComplexArray, second: ComplexArray) -> float:
