@@ -19,7 +19,7 @@ from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.observation import excitation_line, observe
 from tpjb_ident.check.run_gain import PointRuns, check_shaft_lines, deviating_runs, dynamic_difference, gain_of_run
-from tpjb_ident.check.set_points import check_excitation, check_rotation, check_static_loads
+from tpjb_ident.check.set_points import check_excitation, check_places, check_rotation, check_static_loads
 from tpjb_ident.phasors.run_phasors import run_phasors
 
 
@@ -80,25 +80,92 @@ def test_a_zero_of_cells_that_carry_no_load_is_no_load_that_is_off(loads, mount,
     assert keys == [set(named)] * len(runs)
 
 
+@pytest.mark.parametrize("seed", seeds(3))
+@pytest.mark.parametrize("wrong", [(), (5,), (1, 3, 5, 7)])
+def test_a_shaft_that_stands_as_under_another_load_is_named(seed, wrong):
+    """Also where half of a load's runs do; a shaft that wanders as far as loads move it tells nothing."""
+    rng = np.random.default_rng(seed)
+    runs = []
+    for k, load in enumerate(np.repeat([3000.0, 6000.0], 8)):
+        run = observation(load, 1000.0)
+        true = 6000.0 if k in wrong else load
+        place = 1e-6 * np.array([0.2, -3.0 * true / 6000.0]) + 2e-8 * rng.standard_normal(2)
+        run.spread, run.of = np.zeros((3, 2)), lambda quantity: [0, 1]
+        run.plane = lambda quantity, values, place=place: place + 0j
+        runs.append(run)
+    check_places(runs)
+    assert tuple(k for k, run in enumerate(runs) if run.report.keys) == wrong
+    for run in runs:
+        place = run.plane("displacement", None) + 2e-6 * rng.standard_normal(2)
+        run.plane, run.report = (lambda quantity, values, place=place: place), Reporter(run.run)
+    check_places(runs)
+    assert not any(run.report.keys for run in runs)
+
+
+def turning_run(load, frequency, size, twice=np.nan, motion=0.02):
+    """A run whose probes show `size` and `twice` as much as they do at the shaft's lines, some of it motion."""
+    run = observation(load, 1000.0, frequency=frequency)
+    stiffness = np.linalg.norm(run.film_force) / np.linalg.norm(run.line("displacement"))
+    force = stiffness * motion * np.array([4e-6, 1e-6])
+    run.shaft_lines = np.array([[4e-6 * size, 3e-6, force[0], 0.0], [1e-6 * twice, 1e-6, force[1], 0.0]])
+    run.run.housing_mass = 30.0
+    run.channels = [SimpleNamespace(name=name, axis=0.0) for name in ("X1A", "X1B", "L1H", "L1V")]
+    run.pick, run.spread = {"displacement": [0, 1], "force": [2, 3], "acceleration": []}.get, np.zeros((3, 4))
+    return run
+
+
 @pytest.mark.parametrize(
-    ("frequency", "load", "gain", "named"),
-    [(35.0, 5000.0, 0.5, 4), (35.0, 5000.0, 1.1, 4), (25.0, 8000.0, 0.5, 4), (25.0, 8000.0, 0.85, 0)],
+    ("frequency", "load", "gain", "motion", "named"),
+    [(35.0, 5e3, 0.5, 1.0, 4), (35.0, 5e3, 1.1, 1.0, 4), (25.0, 8e3, 0.5, 0.02, 4), (25.0, 8e3, 0.85, 1.0, 0)],
 )
-def test_a_probe_whose_range_changed_is_told_by_what_turns_with_the_shaft(frequency, load, gain, named):
-    """At one frequency of several by little, at one load of several by what no change of the film explains."""
+def test_a_probe_whose_range_changed_is_told_by_what_turns_with_the_shaft(frequency, load, gain, motion, named):
+    """At one frequency of several also by motion, at one load of several by run-out, which no other film changes."""
     rng = np.random.default_rng(4)
     runs = []
     for place in [(5000.0, f) for f in (15.0, 25.0, 35.0, 45.0)] + [(2500.0, 25.0), (8000.0, 25.0)]:
         for _ in range(4):
-            run = observation(place[0], 1000.0, frequency=place[1])
-            size = 4e-6 * (1 + 0.003 * rng.standard_normal()) * (place[0] / 5000.0) ** -0.2
-            run.shaft_lines = np.array([[size * (gain if place == (load, frequency) else 1.0), 3e-6], [np.nan, np.nan]])
-            run.channels, run.pick = [SimpleNamespace(name="X1A"), SimpleNamespace(name="X1B")], lambda quantity: [0, 1]
-            runs.append(run)
+            size = (1 + 0.003 * rng.standard_normal()) * (place[0] / 5000.0) ** (-0.2 * motion)
+            runs.append(turning_run(*place, size * (gain if place == (load, frequency) else 1.0), motion=motion))
     check_shaft_lines(runs)
     reports = [finding for run in runs for finding in run.report.findings]
     assert len(reports) == named
     assert {finding.key for finding in reports} <= {"shaft line X1A"}
+
+
+@pytest.mark.parametrize(
+    ("sizes", "motion", "off"),
+    [
+        (
+            (1.0, 0.97, 0.88),
+            0.0,
+            (0.128, 0.097, 0.128),
+        ),  # a gain that falls with the gap: any load may have the right one
+        ((1.0, 1.0, 0.95), 0.0, (0.0, 0.0, 0.051)),
+        ((1.0, 1.07), 0.0, (0.068, 0.068)),
+        ((1.0, 0.97, 0.88), 0.1, (0.0, 0.0, 0.0)),  # the film may have moved the shaft by as much
+        ((1.0, 1.01, 0.99), 0.0, (0.0, 0.0, 0.0)),
+    ],
+)
+def test_run_out_that_changes_with_the_load_makes_a_gain_uncertain(sizes, motion, off):
+    rng = np.random.default_rng(5)
+    runs = [
+        turning_run(load, frequency, np.nan, size * (1 + 0.001 * rng.standard_normal()), motion)
+        for load, size in zip((2000.0, 6000.0, 10000.0), sizes)
+        for frequency in (20.0, 35.0)
+        for _ in range(4)
+    ]
+    check_shaft_lines(runs)
+    shown = np.reshape([run.report.off.get("X1A", 0.0) for run in runs], (len(sizes), 8)).mean(axis=1)
+    np.testing.assert_allclose(shown, 0.8 * np.array(off), atol=0.003)
+    assert not any("X1B" in run.report.off for run in runs)
+
+
+def test_a_probe_that_was_put_elsewhere_is_another_one():
+    runs = [turning_run(load, 25.0, 1.0, size, 0.0) for load, size in ((2000.0, 1.0), (6000.0, 0.6)) for _ in range(4)]
+    for run in runs[4:]:
+        run.channels[0].axis = 1.0
+    check_shaft_lines(runs)
+    assert not any(run.report.off for run in runs)
 
 
 FOUR = RigPlan(dynamic=operating_points([(5000.0, 25.0)]), directions=evenly(4))

@@ -2,11 +2,13 @@
 ones are read once, block by block; drives that turn with the shaft, whose runout is told or refused."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rigdata import load_campaign
+from rigdata.calibration import ChannelResponse, parse_filter
 from rigdata.device import Device
 from rigdata.run import pulse_times
 from tests.identification.test_identify import rig
@@ -238,6 +240,63 @@ def test_orders_of_shaft_and_mains_are_no_images(line, level):
     result = phasors_of(data)
     assert "slower-channels" not in result.conditions
     assert level < 1.0 or error(result) < 0.01  # what windows take of lines four times above the drive, no filling
+
+
+def shaped(values, response):
+    """Samples through a response of frequency [Hz]."""
+    return np.fft.irfft(np.fft.rfft(values) * response(np.fft.rfftfreq(len(values), 1 / RATE)), len(values))
+
+
+def low_pass(corner, order=2):
+    return lambda f: 1 / np.sqrt(1 + (f / corner) ** (2 * order))
+
+
+FILTERS = {f"{corner:g} Hz, order {order}": low_pass(corner, order) for corner in (45.0, 150.0) for order in (2, 4)}
+#: Noise that machines make.
+COLOURS = {
+    "white": np.ones_like,
+    "1/f": lambda f: np.sqrt(100.0 / np.maximum(f, 1.0)),
+    "1/f^2": lambda f: 30.0 / np.maximum(f, 0.3),
+    "resonance": lambda f: np.abs(1 / (1 - (f / 150.0) ** 2 + 0.1j * f / 150.0)),
+}
+
+
+def with_noise(shape, seed, channels_shaped, drive=25.0):
+    rng, data = np.random.default_rng(seed), {}
+    for name in ALL:
+        plain = reading(name, TIME, SimpleNamespace(standard_normal=np.zeros), drive)
+        noise = rng.standard_normal(len(TIME))
+        data[name] = plain + NOISE[name[0]] * (shaped(noise, shape) if name[0] in channels_shaped else noise)
+    return data
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_a_filter_that_nobody_states_is_told_by_the_noise(name):
+    said = [phasors_of(with_noise(FILTERS[name], seed, "F")).conditions for seed in range(6)]
+    assert sum("filter-unstated" in conditions for conditions in said) >= 4
+    assert "the noise of FX, FY falls" in next(c.detail for cs in said for c in cs if c == "filter-unstated")
+    assert not any(
+        "filter-unstated" in phasors_of(with_noise(FILTERS[name], 7, kinds)).conditions for kinds in ("DFA",)
+    )
+
+
+def test_a_filter_that_is_stated_or_far_above_is_no_error():
+    data, stated = with_noise(low_pass(150.0), 1, "F"), channels(QUANTITIES)
+    for name in ("FX", "FY"):
+        stated[name] = replace(stated[name], response=ChannelResponse((parse_filter("butterworth 2 low 150 Hz"),)))
+    assert "filter-unstated" in phasors_of(data).conditions
+    assert not untrusted(run_phasors(run_of(HeldReader(data, RATE), stated, POINT)).conditions)
+    slow = phasors_of(with_noise(low_pass(500.0, 4), 1, "F", drive=3.0), replace(POINT, excitation=2 * np.pi * 3.0))
+    assert "filter-above-excitation" in slow.conditions
+    assert not untrusted(slow.conditions)
+
+
+@pytest.mark.parametrize("colour", COLOURS)
+def test_coloured_noise_is_no_filter(colour):
+    for seed in range(8):
+        for kinds in ("F", "D", "FA"):
+            conditions = phasors_of(with_noise(COLOURS[colour], seed, kinds)).conditions
+            assert not {"filter-unstated", "filter-above-excitation"} & {str(c) for c in conditions}
 
 
 @pytest.mark.parametrize(("begin", "end"), [(1.3, 4.0), (0.0, 2.45), (0.9, 3.3)])

@@ -29,7 +29,6 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from tpjb_ident.check.findings import explanation, far, indefiniteness, plane_of, repairs
 from tpjb_ident.check.observation import NO_NOISE, Observation
-from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.phasors.frequency import shaft_order
 
 #: Smaller over larger extent of displacements that move along one line.
@@ -182,9 +181,12 @@ _LEAST, _MOST_PART = 0.01, 0.9
 _AS_WELL = 2 * math.log(1e3)
 #: Variance of what is not known; keeps divisions by no information finite.
 _UNKNOWN, _NOTHING = 1e30, 1e-300
-#: Logarithm by which what turns with the shaft differs in one run, at one load and at others, over the median one, and
-#: runs that tell it.
-_SAME_LINE, _LIKE_LINE, _MANY_LINES, _MIN_LINES = 0.06, 0.5, 6.0, 5
+#: Logarithm by which what turns with the shaft differs in one run, and run-out between loads (they move the shaft along
+#: by little), over the median scatter of runs, and runs beyond one a load that tell it.
+_SAME_LINE, _SAME_RUNOUT, _MANY_LINES, _MIN_SPARE = 0.06, 0.02, 6.0, 4
+#: How much softer a film may be than along its excitation; deviation of a gain over its change: a 95 % interval holds
+#: the change of two probes alike.
+_SOFTER, _AS_DEVIATION = 2.0, 0.8
 #: Distance from the median of an operating point, over the runs' median one, and the least [m]: a probe that drifts by
 #: 1.5 % of a gap of 1 mm was touched, or its amplifier was.
 _STEP, _LEAST_STEP, _MIN_STEPS = 9.0, 15e-6, 4
@@ -371,49 +373,67 @@ def _stacked(vector: ComplexArray) -> FloatArray:
     return np.concatenate([vector.real, vector.imag])
 
 
+def _by_probe(runs: Sequence[Observation], alike: str) -> Iterator[tuple[str, list[tuple[Observation, int]]]]:
+    """Probes with all runs of what is `alike`, and the probe's place in each."""
+    groups: dict[tuple[object, ...], list[tuple[Observation, int]]] = defaultdict(list)
+    for run in runs:
+        for k in run.pick("displacement"):
+            if np.isfinite(run.spread[1, k]):
+                # a probe that was put elsewhere is another one
+                groups[run.channels[k].name, run.channels[k].axis, attrgetter(alike)(run)].append((run, k))
+    for (name, *_), members in groups.items():
+        yield str(name), members
+
+
 def check_positions(runs: Sequence[Observation]) -> None:
     """Mean readings of the probes (gap voltage included) of dynamic runs, run against run."""
-    middles = [run.spread[1] for run in runs]
-    for name, observation, off in _outlying(runs, middles, "run.point", _LEAST_STEP, _STEP, _MIN_STEPS):
-        observation.report.ask("step", 1.0, name, off=1e6 * off)
-
-
-def _outlying(
-    runs: Sequence[Observation], values: Sequence[FloatArray], alike: str, least: float, many: float, count: int
-) -> Iterator[tuple[str, Observation, float]]:
-    """Probe, run and distance from the median of probe and what is `alike` of values that lie `far` off.
-
-    `values` (m,) of every run, by channel; NaN where one tells nothing.
-    """
-    groups: dict[tuple[str, object], list[tuple[Observation, float]]] = defaultdict(list)
-    for observation, shown in zip(runs, values):
-        for index in observation.pick("displacement"):
-            if np.isfinite(shown[index]):
-                key = observation.channels[index].name, attrgetter(alike)(observation)
-                groups[key].append((observation, shown[index]))
-    for (name, _), members in groups.items():
-        off = np.array([shown for _, shown in members])
+    for name, members in _by_probe(runs, "run.point"):
+        off = np.array([run.spread[1, k] for run, k in members])
         off -= np.median(off)
-        for k in np.flatnonzero(far(np.abs(off), least, many, count)):
-            yield name, members[k][0], float(off[k])
+        for j in np.flatnonzero(far(np.abs(off), _LEAST_STEP, _STEP, _MIN_STEPS)):
+            members[j][0].report.ask("step", 1.0, name, off=1e6 * off[j])
 
 
 def check_shaft_lines(runs: Sequence[Observation]) -> None:
-    """What turns with the shaft, run against run: nearly the same at all loads, the same whatever the excitation.
+    """What turns with the shaft, run against run: run-out is the same at all loads, whatever the excitation.
 
-    Whole operating points are told so in which a channel has another gain: their runs have no fellow without it. At 1X
-    the shaft answers its unbalance, through another film at another load; at 2X probes show run-out, as a rule.
+    Whole operating points are told so in which a channel has another gain: their runs have no fellow without it.
     """
-    # what computed records without noise show beside their lines is rounding
-    shown = [run for run in runs if len(run.shaft_lines) and NO_NOISE not in run.report.keys]
-    limits = (
-        (0, "run.point.static_key", _SAME_LINE),
-        (0, "run.point.spin", _LIKE_LINE),
-        (1, "run.point.spin", _SAME_LINE),
-    )
-    for order, alike, least in limits:
-        sizes = [np.log(np.maximum(np.nan_to_num(run.shaft_lines[order]), _NOTHING)) for run in shown]
-        for name, observation, off in _outlying(shown, sizes, alike, least, _MANY_LINES, _MIN_LINES):
-            if f"shaft line {name}" not in observation.report.keys:
-                observation.report.ask("shaft line", math.exp(off), name, speed=("", "twice ")[order])
-                observation.report.off[name] = CHANGE_AS_DEVIATION * abs(off)
+    for order, speed in enumerate(("", "twice ")):
+        # what computed records without noise show beside their lines is rounding
+        shown = [run for run in runs if NO_NOISE not in run.report.keys and _motion(run, order) >= 0]
+        for name, members in _by_probe(shown, "run.point.spin"):
+            sizes, motion = np.transpose([(run.shaft_lines[order, k], _motion(run, order)) for run, k in members])
+            static = [run.run.point.static_key for run, _ in members]
+            for (run, _), change in zip(members, _size_changes(np.log(sizes), motion / sizes, static).tolist()):
+                if change:
+                    run.report.ask("shaft line", math.exp(change), name, speed=speed)
+                    run.report.off[name] = max(run.report.off.get(name, 0.0), _AS_DEVIATION * abs(change))
+
+
+def _motion(run: Observation, order: int) -> float:
+    """How far the film lets the shaft move at a line of it under the force there, at most [m]; NaN where untold."""
+    if not len(run.shaft_lines):
+        return math.nan
+    force, inertia = (np.linalg.norm(run.shaft_lines[order, run.pick(q)]) for q in ("force", "acceleration"))
+    compliance = np.linalg.norm(run.line("displacement")) / np.linalg.norm(run.film_force)
+    return float((force + run.run.housing_mass * inertia) * compliance)
+
+
+def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object]) -> FloatArray:
+    """By how much a line's sizes (n,), logarithms, differ from most others; zero where scatter or motion explains it.
+
+    Where no half of them agree, any may be the right one: from the farthest point. `motion` (n,): share of it that may
+    be motion, which another film answers otherwise; `static`: point of every run.
+    """
+    usual = np.array([np.median([s for s, point in zip(sizes, static) if point == key]) for key in static])
+    spare = len(sizes) - len(set(static))
+    if spare < _MIN_SPARE:
+        return np.zeros(len(sizes))
+    scatter = _MANY_LINES * np.median(np.abs(sizes - usual)) * math.sqrt(len(sizes) / spare)
+    alone, change = sizes - usual, sizes - np.median(sizes)
+    differs = np.abs(change) > max(_SAME_RUNOUT, scatter) + _SOFTER * (motion + np.median(motion))
+    if differs.mean() >= 0.5:
+        above, below = sizes - usual.min(), sizes - usual.max()
+        return np.where(above > -below, above, below)
+    return np.where(differs, change, np.where(np.abs(alone) > max(_SAME_LINE, scatter), alone, 0.0))

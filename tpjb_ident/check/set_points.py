@@ -29,7 +29,7 @@ _MOVED_ALONG = 3.0
 _ONE_WAY, _AGREED, _LEAST_RUNS = 1.5, 0.9, 3
 #: Usual distances to the nearest run of the same load, within which a shaft stands where a run of another load has it,
 #: and from the middle of its own runs beyond which it does not stand with them; what records resolve, at least [m].
-_THERE, _NOT_HERE, _RESOLVED = 3.0, 6.0, 5e-8
+_THERE, _NOT_HERE, _RESOLVED = 3.0, 10.0, 5e-8
 #: Set points must differ by this share for a zero to be told from a gain.
 _MIN_RANGE = 0.15
 #: Standard deviations from which a run loses weight when the zero is looked for, and rounds of weighing.

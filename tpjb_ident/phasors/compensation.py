@@ -6,9 +6,13 @@ lines, 4 along cubic splines. A line itself comes out smaller (and late, where v
 rates alone determine. Images give the rate away: the phases of the spectrum at f and f_s - f add up to the same angle
 at all f, which those of a record at its own rate do at no sum of two frequencies, but one: what a film that is not
 linear makes of the shaft's own motion stands at X - f and 2X - f, and is no image.
+
+A low-pass that nobody stated shows in the noise: flat up to its corner, then falling steeply, in all channels of a
+quantity alike, while another quantity's by the same device stays flat. Coloured noise has no flat part below its fall,
+or rises before it, or shows in all quantities.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -17,10 +21,10 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import refuse
 from rigdata.run import Run
-from tpjb_ident.conditions import holding, merged
+from tpjb_ident.conditions import Condition, Conditions, holding, merged
 from tpjb_ident.phasors.lines import SPEED_DRIFT
 from tpjb_ident.phasors.run_data import RunPhasors, device_readers
-from tpjb_ident.phasors.whole_record import local_maxima, vertex
+from tpjb_ident.phasors.whole_record import WholeRecord, local_maxima, vertex
 
 #: Seconds from the start that are looked at, and powers of two of samples, at least and at most.
 _LOOK, _LEAST_POWER, _MOST_POWER = 2.0, 13, 15
@@ -43,6 +47,14 @@ _ORDERS = {1: "held", 2: "interpolated", 4: "interpolated (splines)"}
 _EVEN = 3e-4
 #: Images to either side of a line that a spline's own factor is summed over.
 _IMAGES = 20
+#: Share of the rate that a filter before the converter leaves alone; octaves below it whose noise is asked, at least,
+#: at most, and bins of the lowest.
+_UNFILTERED, _LEAST_OCTAVES, _OCTAVES, _LEAST_BINS = 0.45, 5, 8, 20
+#: Noise behind a filter [dB]: fall up to the highest octave (none in 270 good campaigns beside channels that are flat;
+#: rounding ends it at 15 to 21), the steepest fall from one to the next (1/f noise: 3), change of what is flat.
+_FALL, _STEEP, _FLAT = 10.0, 7.0, 3.0
+#: Excitation over the corner, below which a filter turns it by less than a degree.
+_NEAR_CORNER = 0.01
 
 
 #: Of any run.
@@ -206,3 +218,31 @@ def compensated(result: Phasors, run: Run, slower: Mapping[str, SlowerChannel], 
         residual=tuple(bins / gain for bins, gain in zip(result.residual, gains)),
         conditions=merged(result.conditions, filled),
     )
+
+
+def unstated_filters(result: RunPhasors, records: Sequence[WholeRecord]) -> Conditions:
+    """Say which quantities seem to be behind a low-pass that the manifest does not state."""
+    for record in records:
+        channels = [result.channels[k] for k in record.places]
+        octaves, falls = _noise_falls(record)
+        if len(falls) < _LEAST_OCTAVES:
+            continue
+        steps, corner = np.diff(falls, axis=0), len(falls) - np.argmax(falls[::-1] <= _FLAT, axis=0)
+        filtered = (falls[-1] > _FALL) & (steps.max(axis=0) > _STEEP) & (falls.min(axis=0) > -_FLAT)
+        filtered &= (corner > 1) & (np.abs(steps[0]) < _FLAT)
+        plain = {c.quantity for c, is_filtered in zip(channels, filtered) if not is_filtered}
+        suspects = [k for k, c in enumerate(channels) if c.quantity not in plain and not c.response]
+        if suspects and (np.abs(falls).max(axis=0) < _FLAT).any():
+            edge, names = octaves[corner[suspects].max()], ", ".join(channels[k].name for k in suspects)
+            name = "filter-unstated" if max(result.lines.driven) > _NEAR_CORNER * edge else "filter-above-excitation"
+            return (Condition(name, f"the noise of {names} falls from about {edge:.0f} Hz on"),)
+    return ()
+
+
+def _noise_falls(record: WholeRecord) -> tuple[FloatArray, FloatArray]:
+    """Lower ends of octaves (k,) [Hz], and by how much the noise there is less than in the lowest two, (k, m) [dB]."""
+    ends = _UNFILTERED * record.rate * 2.0 ** -np.arange(_OCTAVES, -1, -1)
+    ends = ends[ends * record.duration > _LEAST_BINS]
+    parts = np.split(np.abs(record.spectrum), np.round(ends * record.duration).astype(int))[1:-1]
+    level = 20 * np.log10([np.median(np.maximum(part, np.finfo(float).tiny), axis=0) for part in parts])
+    return np.asarray(ends), np.asarray(level[:2].mean(axis=0) - level)

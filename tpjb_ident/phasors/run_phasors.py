@@ -19,7 +19,7 @@ from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, filled_channels
+from tpjb_ident.phasors.compensation import compensated, filled_channels, unstated_filters
 from tpjb_ident.phasors.frequency import DRIFT, ShaftCourse, device_rates, retuned, shaft_speed, tuned
 from tpjb_ident.phasors.line_fit import SCALE_LIMIT, LineFitter, WindowFit, usual_scale
 from tpjb_ident.phasors.lines import HIGHEST, LineSet, RecordTooShortError, known_lines, plan_windows
@@ -248,7 +248,8 @@ def run_phasors(run: Run, settings: PhasorSettings | None = None) -> RunPhasors:
     device = tuple(
         f"{slower[c.name].rate:.4g} Hz" if c.name in slower else d for c, d in zip(result.channels, result.device)
     )
-    conditions = merged(fit.conditions, result.lines.conditions)
+    unstated = () if slower else unstated_filters(result, fit.records)  # images are no noise
+    conditions = merged(fit.conditions, result.lines.conditions, unstated)
     temperature = beginning_of(run, SHORT).mean_temperature() or np.nan
     described = replace(result, conditions=conditions, device=device, temperature=temperature)
     return compensated(described, run, slower, settings.delays)
