@@ -98,6 +98,19 @@ def test_coarse_converters_repeat_readings_without_being_stuck():
     assert statistics.longest_flat >= 1500 > 10 * statistics.expected_flat()
 
 
+@pytest.mark.parametrize(("rate", "named"), [(None, ["stuck P"]), (2.0, [])])
+def test_a_slow_channel_s_last_reading_lasts_to_the_end(rate, named):
+    run = run_of()
+    reading = round(run.sample_rate / 2.0)
+    shown = np.interp(
+        np.arange(8 * reading), reading * np.arange(8), 55.0 + 0.01 * np.random.default_rng(2).normal(size=8)
+    )
+    report = Reporter(run)
+    gauge = replace(PROBES[0], name="P", quantity="pressure", sample_rate=rate)
+    check_signal(report, gauge, seen(shown), False, [gauge])
+    assert report.keys == named
+
+
 def test_the_excitation_is_seen_through_bad_samples_and_gaps_channel_by_channel():
     rng = np.random.default_rng(2)
     time = np.arange(2000) / 1000

@@ -50,7 +50,9 @@ def check_signal(
         if not noise_free and not still:
             report.ask("constant" if is_slow else "dead", 1.0, name, **words)
         return
-    if not noise_free and stands_still(statistics):
+    # a reading of a slow channel lasts for many samples
+    reading = max(report.run.sample_rate / (channel.sample_rate or np.inf), 1.0)
+    if not noise_free and stands_still(statistics, reading):
         report.ask("stuck", statistics.longest_flat / statistics.samples, name, **words)
     clipped = statistics.clipped_share()
     if clipped > 0 and (is_dynamic or not _is_held(statistics)):

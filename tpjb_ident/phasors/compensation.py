@@ -224,9 +224,13 @@ def unstated_filters(result: RunPhasors, records: Sequence[WholeRecord]) -> Cond
     """Say which quantities seem to be behind a low-pass that the manifest does not state."""
     for record in records:
         channels = [result.channels[k] for k in record.places]
-        octaves, falls = _noise_falls(record)
-        if len(falls) < _LEAST_OCTAVES:
+        octaves = _UNFILTERED * record.rate * 2.0 ** -np.arange(_OCTAVES, -1, -1)
+        octaves = octaves[octaves * record.duration > _LEAST_BINS]
+        if len(octaves) <= _LEAST_OCTAVES:
             continue
+        parts = np.split(np.abs(record.spectrum), np.round(octaves * record.duration).astype(int))[1:-1]
+        level = 20 * np.log10([np.median(np.maximum(part, np.finfo(float).tiny), axis=0) for part in parts])
+        falls = level[:2].mean(axis=0) - level
         steps, corner = np.diff(falls, axis=0), len(falls) - np.argmax(falls[::-1] <= _FLAT, axis=0)
         filtered = (falls[-1] > _FALL) & (steps.max(axis=0) > _STEEP) & (falls.min(axis=0) > -_FLAT)
         filtered &= (corner > 1) & (np.abs(steps[0]) < _FLAT)
@@ -237,12 +241,3 @@ def unstated_filters(result: RunPhasors, records: Sequence[WholeRecord]) -> Cond
             name = "filter-unstated" if max(result.lines.driven) > _NEAR_CORNER * edge else "filter-above-excitation"
             return (Condition(name, f"the noise of {names} falls from about {edge:.0f} Hz on"),)
     return ()
-
-
-def _noise_falls(record: WholeRecord) -> tuple[FloatArray, FloatArray]:
-    """Lower ends of octaves (k,) [Hz], and by how much the noise there is less than in the lowest two, (k, m) [dB]."""
-    ends = _UNFILTERED * record.rate * 2.0 ** -np.arange(_OCTAVES, -1, -1)
-    ends = ends[ends * record.duration > _LEAST_BINS]
-    parts = np.split(np.abs(record.spectrum), np.round(ends * record.duration).astype(int))[1:-1]
-    level = 20 * np.log10([np.median(np.maximum(part, np.finfo(float).tiny), axis=0) for part in parts])
-    return np.asarray(ends), np.asarray(level[:2].mean(axis=0) - level)

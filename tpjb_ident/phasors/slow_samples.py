@@ -165,9 +165,9 @@ def live_run(run: Run) -> Run:
     return run
 
 
-def stands_still(statistics: ChannelStatistics) -> bool:
-    """Whether the longest stretch of equal readings is longer than chance makes it."""
-    return statistics.longest_flat >= max(_SHORTEST, _TIMES_EXPECTED * statistics.expected_flat())
+def stands_still(statistics: ChannelStatistics, reading: float = 1.0) -> bool:
+    """Whether the longest stretch of equal readings of some samples each is longer than chance makes it."""
+    return statistics.longest_flat >= max(_SHORTEST * reading, _TIMES_EXPECTED * statistics.expected_flat())
 
 
 def _problem(run: Run, name: str, statistics: ChannelStatistics) -> Problem:
