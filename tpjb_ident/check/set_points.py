@@ -47,16 +47,15 @@ def check_static_loads(observations: Sequence[Observation], mount: str | None = 
     Cells that show no static force in any run, whatever their zero, are of a kind that shows none, or in the stingers
     of a floating stator: that is a note, and nothing is held against them; it is False then.
     """
-    shown, means, loads = [], [], []
+    shown, forces = [], []
     for observation in observations:
-        point, mean = observation.run.point, observation.mean("force")
-        if observation.run.kind in {"dynamic", "locus"} and point.static_load > 0 and np.isfinite(mean).all():
+        run, mean = observation.run, observation.mean("force")
+        if run.kind in {"dynamic", "locus"} and run.point.static_load > 0 and np.isfinite(mean).all():
             shown.append(observation)
-            means.append(mean @ [1, 1j])
-            loads.append(point.static_load * np.exp(1j * point.static_load_direction))
-    forces, set_points = np.array(means, dtype=complex), np.array(loads, dtype=complex)
-    ratios = forces / set_points
-    if mount == "floating" or without_static_part(ratios - cell_zero(forces, set_points)[0] / set_points):
+            forces.append(mean @ [1, 1j])
+    means, loads = np.array(forces, complex), np.array([set_point(run.run.point) for run in shown], complex)
+    ratios = means / loads
+    if mount == "floating" or without_static_part((means - cell_zero(means, loads)[0]) / loads):
         for observation in shown:
             observation.report.ask("no static force")
         return False
@@ -72,6 +71,11 @@ def check_static_loads(observations: Sequence[Observation], mount: str | None = 
             share, turn = abs(ratio / middle) - 1, math.degrees(np.angle(ratio / middle))
             observation.report.ask("load ratio", share=share, turn=turn)
     return True
+
+
+def set_point(point: OperatingPoint) -> complex:
+    """Static load as stated, X + i Y [N]."""
+    return complex(point.static_load * np.exp(1j * point.static_load_direction))
 
 
 def cell_zero(means: ComplexArray, set_points: ComplexArray, uncertainty: float = 0.0) -> tuple[complex, float]:

@@ -259,7 +259,7 @@ class CampaignSolution:
     def run_difference(self, p: int) -> float:
         """Share of the force by which runs of point `p` differ, beyond what their noise alone makes of them."""
         counted = self.solution.blocks_of(p) & (self.solution.scatter.weights > 0)
-        spare = int(counted.sum()) - 2  # two runs fix H: what is left over is shared by all of them
+        spare = counted.sum() - 2  # two runs fix H: what is left over is shared by all of them
         if spare < 1:
             return 0.0
         noise = np.mean(self._noise_power[counted]) * (1 + _CHANCE / np.sqrt(2 * spare))
@@ -268,12 +268,12 @@ class CampaignSolution:
     @cached_property
     def _noise_power(self) -> FloatArray:
         """Mean square of the misfits that noise alone has, (n,)."""
-        solution, (_, F) = self.solution, at_set_point(self.solution)
-        sizes, axes = np.linalg.eigh(solution.blocks.noise)
-        roots, shift = axes * np.sqrt(np.maximum(sizes, 0.0))[:, None], np.zeros_like(solution.shift)
-        alone = [replace(solution, blocks=replace(solution.blocks, z=z), shift=shift) for z in np.moveaxis(roots, 2, 0)]
-        power = np.sum([np.abs(remainders(each)) ** 2 for each in alone], axis=(0, 2))
-        return np.asarray(power / np.sum(np.abs(F) ** 2, axis=1))
+        solution, blocks, (_, F) = self.solution, self.solution.blocks, at_set_point(self.solution)
+        units = [replace(blocks, z=solution.shift + unit) for unit in np.eye(blocks.z.shape[1])]
+        by = np.stack([remainders(replace(solution, blocks=unit)) for unit in units], axis=2)
+        return np.asarray(
+            np.einsum("nij,njk,nik->n", by, blocks.noise, by.conj()).real / np.sum(np.abs(F) ** 2, axis=1)
+        )
 
     @property
     def h(self) -> ComplexArray:

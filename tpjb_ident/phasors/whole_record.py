@@ -123,9 +123,9 @@ def _rounding(rows: FloatArray) -> FloatArray:
     moves = np.abs(np.diff(rows))
     largest = np.nanmax(moves, axis=1, keepdims=True, initial=0.0)
     step = np.where(moves > _NO_STEP * largest, moves, largest).min(axis=1) + np.finfo(float).tiny
-    bends = np.minimum(np.abs(np.diff(rows, 2)) / step[:, None], _DITHERED)  # of steps a median tells nothing
-    noise = np.maximum(np.nanmean(bends**2, axis=1) / 6 - 1 / 12, 0.0)
-    dithered = np.exp(-((2 * np.pi) ** 2) * noise)
+    # of whole steps a median tells nothing
+    bends = np.nan_to_num(np.minimum(np.abs(np.diff(rows, 2)) / step[:, None], _DITHERED))
+    dithered = np.exp(-((2 * np.pi) ** 2) * np.maximum(np.mean(bends**2, axis=1) / 6 - 1 / 12, 0.0))
     return _LARGEST * dithered * step**3 / np.fmax(np.std(rows, axis=1), step)
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
-from tpjb_ident.check.set_points import cell_zero, without_static_part
+from tpjb_ident.check.set_points import cell_zero, set_point, without_static_part
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.equation import Rig
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
@@ -81,13 +81,9 @@ def static_loads(campaign: Campaign, points: Sequence[RunsOfPoint]) -> StaticLoa
     if campaign.mount == "floating":
         return StaticLoads([np.zeros_like(data.mean_loads) for data in points], 0j)
     uncertainty = max((c.zero_uncertainty for c in campaign.channels.values() if c.quantity == "force"), default=0.0)
-    set_points = np.concatenate([np.full(len(data.mean_loads), _set_point(data)) for data in points])
+    set_points = np.concatenate([np.full(len(data.mean_loads), set_point(data.point)) for data in points])
     zero, error = cell_zero(np.concatenate([data.mean_loads for data in points]), set_points, uncertainty)
     return StaticLoads(*load_misses(points, zero), zero, error)
-
-
-def _set_point(data: RunsOfPoint) -> complex:
-    return complex(data.point.static_load * np.exp(1j * data.point.static_load_direction))
 
 
 def load_misses(points: Sequence[RunsOfPoint], zero: complex = 0.0) -> tuple[list[ComplexArray], complex]:
@@ -98,8 +94,8 @@ def load_misses(points: Sequence[RunsOfPoint], zero: complex = 0.0) -> tuple[lis
     """
     ratios = []  # size and direction; NaN without a load
     for data in points:
-        set_point = _set_point(data)
-        ratios.append((data.mean_loads - zero) / set_point if set_point else data.mean_loads * np.nan)
+        load = set_point(data.point)
+        ratios.append((data.mean_loads - zero) / load if load else data.mean_loads * np.nan)
     measured = np.concatenate(ratios)
     measured = measured[np.isfinite(measured)]
     common = _common_ratio(measured) if len(measured) else complex(1.0)
