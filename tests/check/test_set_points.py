@@ -144,6 +144,7 @@ def test_a_probe_whose_range_changed_is_told_by_what_turns_with_the_shaft(freque
         ((1.0, 1.07), 0.0, (0.068, 0.068)),
         ((1.0, 0.97, 0.88), 0.1, (0.0, 0.0, 0.0)),  # the film may have moved the shaft by as much
         ((1.0, 1.01, 0.99), 0.0, (0.0, 0.0, 0.0)),
+        ((1.0, 0.01), 0.0, (0.0, 0.0)),  # the shaft turns at another speed than is said
     ],
 )
 def test_run_out_that_changes_with_the_load_makes_a_gain_uncertain(sizes, motion, off):

@@ -299,6 +299,15 @@ def test_coloured_noise_is_no_filter(colour):
             assert not {"filter-unstated", "filter-above-excitation"} & {str(c) for c in conditions}
 
 
+def test_a_housing_that_is_shaken_on_soft_cells_is_no_filter():
+    """Its springs pass on what is below their resonance, damped by the film; accelerometers show the rest."""
+    for seed in range(6):
+        cells = with_noise(low_pass(100.0), seed, "F")
+        shaken = with_noise(lambda f: 1 + (f / 50.0) ** 2 * low_pass(100.0)(f), seed, "A")
+        conditions = phasors_of(cells | {name: shaken[name] for name in ("AX", "AY")}).conditions
+        assert not {"filter-unstated", "filter-above-excitation"} & {str(c) for c in conditions}
+
+
 @pytest.mark.parametrize(("begin", "end"), [(1.3, 4.0), (0.0, 2.45), (0.9, 3.3)])
 def test_windows_without_drive_are_none(begin, end):
     """A drive that starts late, or stops: its windows alone count, and the whole record is that stretch."""

@@ -184,6 +184,8 @@ _UNKNOWN, _NOTHING = 1e30, 1e-300
 #: Logarithm by which what turns with the shaft differs in one run, and run-out between loads (they move the shaft along
 #: by little), over the median scatter of runs, and runs beyond one a load that tell it.
 _SAME_LINE, _SAME_RUNOUT, _MANY_LINES, _MIN_SPARE = 0.06, 0.02, 6.0, 4
+#: Logarithm between loads that is no gain: the shaft's speed is wrong at one, and its line stands elsewhere.
+_LOST = math.log(10.0)
 #: How much softer a film may be than along its excitation; deviation of a gain over its change: a 95 % interval holds
 #: the change of two probes alike.
 _SOFTER, _AS_DEVIATION = 2.0, 0.8
@@ -428,7 +430,7 @@ def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object
     """
     usual = np.array([np.median([s for s, point in zip(sizes, static) if point == key]) for key in static])
     spare = len(sizes) - len(set(static))
-    if spare < _MIN_SPARE:
+    if spare < _MIN_SPARE or np.ptp(usual) > _LOST:
         return np.zeros(len(sizes))
     scatter = _MANY_LINES * np.median(np.abs(sizes - usual)) * math.sqrt(len(sizes) / spare)
     alone, change = sizes - usual, sizes - np.median(sizes)

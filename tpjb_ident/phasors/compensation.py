@@ -8,8 +8,8 @@ at all f, which those of a record at its own rate do at no sum of two frequencie
 linear makes of the shaft's own motion stands at X - f and 2X - f, and is no image.
 
 A low-pass that nobody stated shows in the noise: flat up to its corner, then falling steeply, in all channels of a
-quantity alike, while another quantity's by the same device stays flat. Coloured noise has no flat part below its fall,
-or rises before it, or shows in all quantities.
+quantity alike, while all others by the same device stay flat. Coloured noise has no flat part below its fall, or rises
+before it; where a housing on soft cells is shaken, accelerometers show it as well.
 """
 
 from collections.abc import Mapping, Sequence
@@ -236,7 +236,8 @@ def unstated_filters(result: RunPhasors, records: Sequence[WholeRecord]) -> Cond
         filtered &= (corner > 1) & (np.abs(steps[0]) < _FLAT)
         plain = {c.quantity for c, is_filtered in zip(channels, filtered) if not is_filtered}
         suspects = [k for k, c in enumerate(channels) if c.quantity not in plain and not c.response]
-        if suspects and (np.abs(falls).max(axis=0) < _FLAT).any():
+        flat = np.abs(falls).max(axis=0) < _FLAT
+        if suspects and flat.any() and (flat | filtered).all():
             edge, names = octaves[corner[suspects].max()], ", ".join(channels[k].name for k in suspects)
             name = "filter-unstated" if max(result.lines.driven) > _NEAR_CORNER * edge else "filter-above-excitation"
             return (Condition(name, f"the noise of {names} falls from about {edge:.0f} Hz on"),)
