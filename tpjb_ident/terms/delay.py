@@ -8,7 +8,7 @@ tell.
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import Blocks, Rig
 from tpjb_ident.estimate.term import NO_GAIN, OUT_OF_STEP, Factor, Fitted, Parameter
 
@@ -49,12 +49,13 @@ class Delay(Factor):
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""
-        said, elsewhere = super().conditions(fitted), ~self._among
-        if self.rig.out_of_step:
-            late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)
-            conditions = (condition for shown in self.rig.contradicted.values() for condition in shown)
-            out_of_step = (condition for condition in conditions if condition == OUT_OF_STEP)
-            return (*(out_of_step if np.any(late & elsewhere) else ()), *said)
+        said = super().conditions(fitted)
         stated = np.array([parameter.deviation for parameter in self.parameters])
-        later = fitted.estimated & elsewhere & (np.abs(fitted.value) > _BEYOND * stated)
-        return (*said, *holding((later.any(), OUT_OF_STEP, "; ".join(self.words(fitted)))))
+        clear = _CLEAR * fitted.deviation if self.rig.out_of_step else _BEYOND * stated
+        late = np.abs(fitted.value) > np.maximum(clear, _NOTABLE / _MILLISECOND / self._omega)
+        if not np.any(late & ~self._among):
+            return said
+        if not self.rig.out_of_step:
+            return (*said, Condition(OUT_OF_STEP, "; ".join(self.words(fitted))))
+        conditions = (condition for shown in self.rig.contradicted.values() for condition in shown)
+        return (*(condition for condition in conditions if condition == OUT_OF_STEP), *said)

@@ -33,8 +33,8 @@ _SHAFT, _PITCH = 0.1, 0.03
 _OTHERWISE, _GROSS = 0.05, 0.2
 #: A sign is beyond doubt from so many standard errors on.
 _CLEAR = 5.0
-#: Standard errors from which cells or probes come later than nobody says, and than is stated.
-_LATE, _LATE_AS_STATED = 2.0, 4.5
+#: Standard errors, and phase [rad], from which cells or probes come late: where nobody says, and later than is stated.
+_LATE, _LATE_AS_STATED = (2.0, 0.0), (4.5, 0.02)
 #: Loss of a cell's mount, at most: bolted joints have 0.01. What goes beyond it is a delay.
 _LOSS = 0.04
 #: No housing stands on springs as stiff as this [m/N]: a steel bar of 1 m^2 and 2 m has it.
@@ -198,10 +198,10 @@ class Housing(Term):
         """
         if rig.mount == "unknown" or not rig.has_acceleration:
             return rig
-        is_stated = any(sensor.delay_uncertainty for sensor in rig.channels)
         fitted = solution.fitted[self.name]
         first = 3 if rig.mount == "cells" else len(fitted.value) - 1
-        late = fitted.value[first:] < -(_LATE_AS_STATED if is_stated else _LATE) * fitted.deviation[first:]
+        times, least = _LATE_AS_STATED if any(sensor.delay_uncertainty for sensor in rig.channels) else _LATE
+        late = fitted.value[first:] < -np.maximum(times * fitted.deviation[first:], least)
         if not late.any() or self.is_on_foundation(fitted):
             return rig
         lag = float(fitted.value[first:][late].min())
