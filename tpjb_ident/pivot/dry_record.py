@@ -5,7 +5,6 @@ is the component of both along the pad's direction; the component across tells w
 """
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -20,7 +19,6 @@ from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import good_samples, level_error, live_run, slow_samples, spare_slopes
 from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, LoadCourse, cut_blocks, find_holds, load_course
-from tpjb_ident.pivot.pickup import PickupSignature, measure_pickup
 
 #: Share of the load that friction holds back, where the load never comes back to show it.
 FRICTION_SHARE, FRICTION_SE = 0.003, 0.003
@@ -62,7 +60,6 @@ class DryRecord:
     good: BoolArray  #: (m,) blocks that belong to the curve
     lost: float  #: share of samples lost
     quantisation: float  #: [m]
-    pickup: PickupSignature | None = None
     load_direction: PadDirection = PadDirection()
     displacement_direction: PadDirection = PadDirection()
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)  #: of readings, where more than two tell a vector
@@ -89,11 +86,6 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         what = f"has {len(good)} samples, of which {100 * lost:.0f} % are missing or glitches: fewer than it takes"
         cure = "Export every sample, not one a step; state the sample_rate of a slower device; else repeat the test"
         raise refusal(run, "record", what, cure)
-    pickup, channels, measured = None, axial_channels(run), {"force": load, "displacement": place}
-    # two channels per vector: only then the vector holds each of them as it was
-    if Counter(channel.quantity for channel in channels.values()) == dict.fromkeys(measured, 2):
-        values = {name: measured[c.quantity] @ directions(c.axis or 0.0) for name, c in channels.items()}
-        pickup = measure_pickup(values, good, rate)
     order = np.argsort(time, kind="stable")  # a logger may repeat or shuffle time stamps
     time, load, place = (values[order] for values in (time, load, place))
     good = good[order]
@@ -130,7 +122,6 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         good=np.ones(len(blocks), dtype=bool),
         lost=lost,
         quantisation=level_error(place),
-        pickup=pickup,
         load_direction=load_direction(blocks),
         slopes=spare_slopes(run, axes[:1]),
         free_load=free_load,
