@@ -9,13 +9,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import special
 
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Run
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
+from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import good_samples, level_error, live_run, slow_samples, spare_slopes
 from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, LoadCourse, cut_blocks, find_holds, load_course
@@ -170,19 +170,18 @@ def with_load_zero(records: Sequence[DryRecord]) -> list[DryRecord]:
     error = np.maximum([record.load_direction.se for record in lines], _STRAIGHT) * load
     design = directions(turn + [record.angle + 0.5 * math.pi for record in lines])
     freedom = len(lines) - 2
-    if freedom < 1 or np.linalg.matrix_rank(design, 0.1) < 2:
-        return [_less_zero(record, np.zeros(2), np.diag(stated**2), "") for record in records]
-    x, y = design / error[:, None], (across * np.cos(turn) - load * np.sin(turn)) / error
-    scatter = np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2) / freedom
-    variance = max(scatter, 1.0) * (special.stdtrit(freedom, 0.975) / special.ndtri(0.975)) ** 2
-    covariance = np.linalg.inv(x.T @ x / variance + np.diag(1.0 / stated**2 if stated.all() else np.zeros(2)))
-    zero = covariance @ (x.T @ y) / variance
-    size, spread = np.hypot(*zero), math.sqrt(np.trace(covariance))
-    is_clear = size > max(_CLEAR * spread, _NOTABLE * np.max(load))
-    if not (is_clear or stated.all()):
-        return list(records)
-    text = f"the lines along which all pads' loads grow meet at {size:.0f} N (se {spread:.0f} N); it was taken off"
-    return [_less_zero(record, zero, covariance, text if is_clear else "") for record in records]
+    zero, covariance, text = np.zeros(2), np.diag(stated**2), ""
+    if freedom > 0 and np.linalg.matrix_rank(design, 0.1) == 2:
+        x, y = design / error[:, None], (across * np.cos(turn) - load * np.sin(turn)) / error
+        scatter = np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2) / freedom
+        variance = max(scatter, 1.0) * student_widening(freedom) ** 2
+        spread = np.linalg.inv(x.T @ x / variance + np.diag(1.0 / stated**2 if stated.all() else np.zeros(2)))
+        middle, se = spread @ (x.T @ y) / variance, math.sqrt(np.trace(spread))
+        if (size := np.hypot(*middle)) > max(_CLEAR * se, _NOTABLE * np.max(load)):
+            text = f"the lines along which all pads' loads grow meet at {size:.0f} N (se {se:.0f} N); it was taken off"
+        if text or stated.all():
+            zero, covariance = middle, spread
+    return [_less_zero(record, zero, covariance, text) for record in records]
 
 
 def _less_zero(record: DryRecord, zero: FloatArray, covariance: FloatArray, untared: str) -> DryRecord:
