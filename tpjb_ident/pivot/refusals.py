@@ -124,11 +124,11 @@ def structure_behind(records: Sequence[DryRecord]) -> str:
     """
     off = np.array([record.displacement_direction.angle for record in records])
     elsewhere = any(abs(record.load_direction.angle) > LOAD_LIMIT for record in records)
-    if elsewhere or not np.any(np.abs(off) > DISPLACEMENT_LIMIT) or np.any(np.abs(off) >= 0.5 * math.pi):
+    if elsewhere or not np.any(np.abs(off) > DISPLACEMENT_LIMIT):
         return ""
     phi = np.array([record.angle for record in records])
     along = np.array([np.polyfit(record.blocks.load, record.blocks.deflection, 1)[0] for record in records])
-    if len(set(np.round(phi, 6))) < _FEWEST or np.any(along <= 0.0):
+    if len(set(np.round(phi, 6))) < _FEWEST:
         return ""
     across = along * np.tan(off)
     design = np.column_stack([np.sin(2 * phi), np.cos(2 * phi)])

@@ -157,7 +157,8 @@ def _starts(record: DryRecord) -> tuple[float, float]:
 
 def as_witnessed(run: Run, channels: Channels) -> Run:
     """A run whose channels are read as a sweep shows them."""
-    return replace(run, channels={name: channels.get(name, stated) for name, stated in run.channels.items()})
+    mended = {name: channels.get(name, stated) for name, stated in run.channels.items()}
+    return replace(run, channels=mended) if channels else run
 
 
 def common_start(frame: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
