@@ -30,7 +30,6 @@ from tpjb_ident.pivot.fit import assemble_curve
 from tpjb_ident.pivot.law_fit import FRICTION, LawFit, fit_law
 from tpjb_ident.pivot.law_fit import SCALE as LN_SCALE
 from tpjb_ident.pivot.laws import LAWS
-from tpjb_ident.pivot.pickup import PickupSignature
 from tpjb_ident.pivot.readings import (
     LAG,
     MODEL_ERROR,
@@ -40,7 +39,7 @@ from tpjb_ident.pivot.readings import (
     with_friction,
     with_shared_errors,
 )
-from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, check_spares, structure_behind
+from tpjb_ident.pivot.refusals import check_directions, check_placement, check_spares, structure_behind
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 LEVELS = np.arange(500.0, 5001.0, 500.0)
@@ -63,7 +62,7 @@ def vectors(angle, size):
     return np.outer(size, [math.cos(angle), math.sin(angle)])
 
 
-def record(pad=1, levels=LEVELS, turn=(0.0, 0.0), shift=(0.0, 0.0), held=True, name=None, branch=1, pickup=None):
+def record(pad=1, levels=LEVELS, turn=(0.0, 0.0), shift=(0.0, 0.0), held=True, name=None, branch=1):
     """A staircase of exact blocks: load and displacement `turn` off the pad, displacement moved by `shift` [m]."""
     load = np.repeat(levels, PER) if held else np.linspace(levels[0], levels[-1], PER * len(levels))
     n, angle = len(load), float(ANGLES[pad - 1])
@@ -75,7 +74,7 @@ def record(pad=1, levels=LEVELS, turn=(0.0, 0.0), shift=(0.0, 0.0), held=True, n
     moved = displacement_direction(blocks, NOISE)
     good = np.ones(n, dtype=bool)
     course = LoadCourse(blocks.time, blocks.load, 0.1)
-    return DryRecord(run, pad, angle, holds, blocks, course, good, 0.0, 0.0, pickup, load_direction(blocks), moved)
+    return DryRecord(run, pad, angle, holds, blocks, course, good, 0.0, 0.0, load_direction(blocks), moved)
 
 
 def on_pad(angle, load, place, hold, branch):
@@ -183,18 +182,6 @@ def test_three_probes_that_contradict_one_another_are_refused(odd, seed, named):
         for one in records:  # in planes of their own they may move apart
             one.run.channels = probes | {"X2": SimpleNamespace(**(vars(probes["X2"]) | {"plane": 0.02}))}
         assert check_spares(records, NOISE) == []
-
-
-@pytest.mark.parametrize("order", [(0, 1, 2, 3), (0, 1, 3, 2)])
-def test_runs_whose_mains_is_that_of_exchanged_channels_are_named(order):
-    size = np.array([1.0 + 0.2j, -0.3 + 1.1j, 0.8 - 0.9j, 0.1 + 0.6j])
-    sizes = [size, size, size, size[list(order)]]
-    signatures = [PickupSignature(tuple(CHANNELS), size, np.full(4, 0.01)) for size in sizes]
-    found = check_pickup([record(pad + 1, pickup=signature) for pad, signature in enumerate(signatures)])
-    assert [p.run for p in found] == (["p-4"] if order[2] == 3 else [])
-    for problem in found:
-        assert "L1H and L1V are exchanged: then its mains pick-up is that of 3 other dry runs" in problem.what
-    assert check_pickup([]) == []
 
 
 def law(name="linear", scale=SCALE, friction=0.0, chi_square=50.0, contact=(), zero=0.0, spread=1e-6):
@@ -492,7 +479,6 @@ def test_a_run_has_its_holds_and_blocks_whatever_order_its_stamps_have_and_ends_
     assert (plain.pad, plain.angle, plain.quantisation) == (1, ANGLES[0], 0.0)
     assert plain.lost < 2e-3
     assert np.polyfit(plain.blocks.load, plain.blocks.deflection, 1)[0] == pytest.approx(SCALE, rel=1e-3)
-    assert plain.pickup.channels == tuple(CHANNELS)
     for values in (run.time, run.force, run.displacement):
         values[[1000, 1001]] = values[[1001, 1000]]
     np.testing.assert_allclose(read(run).blocks.load, plain.blocks.load, rtol=1e-9)

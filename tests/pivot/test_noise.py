@@ -1,4 +1,4 @@
-"""Noise and mains pick-up where the sums are known: single kinds of noise, exact invariants, pure tones."""
+"""Noise where the sums are known: single kinds of noise, exact invariants."""
 
 import math
 from dataclasses import replace
@@ -10,7 +10,6 @@ from tests.pivot.test_assemble import record as assembled
 from tpjb_ident.phasors.slow_noise import DRIFT_OVER_FLICKER, NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 from tpjb_ident.pivot.blocks import Blocks
 from tpjb_ident.pivot.dry_record import pooled_noise
-from tpjb_ident.pivot.pickup import PickupSignature, _mismatch, measure_pickup, mistake
 
 BLOCK = 0.1
 
@@ -219,120 +218,3 @@ def test_where_some_records_have_holds_ramps_are_not_asked():
 
 
 RATE, N = 500.0, 3000
-
-
-def tone(frequency, size=1.0, phase=0.0, n=N, rate=RATE):
-    return size * np.cos(2 * math.pi * frequency * np.arange(n) / rate + phase)
-
-
-def noisy(seed, n=N, sigma=0.1):
-    return sigma * np.random.default_rng(seed).standard_normal(n)
-
-
-EVERY = np.ones(N, dtype=bool)
-
-
-@pytest.mark.parametrize("frequency", [49.8, 50.0, 60.3])
-@pytest.mark.parametrize("slow", [0.0, 50.0])
-def test_a_tone_has_its_amplitude_and_phase_whatever_is_slow_lost_or_elsewhere(frequency, slow):
-    beside = slow * np.linspace(0, 1, N) ** 2 + tone(frequency + 0.45 * 12, 0.05 * slow)
-    values = {"A": tone(frequency) + beside + noisy(1), "B": tone(frequency, 0.5, 1.2) + beside + noisy(2)}
-    found = measure_pickup(values, EVERY, RATE)
-    np.testing.assert_allclose(np.abs(found.size), [1.0, 0.5], rtol=0.05)
-    assert np.angle(found.size[1] / found.size[0]) == pytest.approx(1.2, abs=0.1)
-    assert found.channels == ("A", "B")
-    if not slow:  # a Hann window makes of white noise sigma sqrt(6 / n) per line
-        np.testing.assert_allclose(found.noise, 0.1 * math.sqrt(6.0 / N), rtol=0.35)
-    good = (np.arange(N) < 700) | (np.arange(N) >= 1000)
-    values["A"][~good] = np.nan
-    assert np.abs(measure_pickup(values, good, RATE).size[0]) == pytest.approx(1.0, rel=0.06)
-
-
-@pytest.mark.parametrize(
-    ("n", "rate", "lost", "told"),
-    [(1500, 500.0, 0, True), (1499, 500.0, 0, False), (3000, 132.0, 0, True), (3000, 131.0, 0, False),
-     (3000, 500.0, 1500, True), (3000, 500.0, 1501, False)],
-)  # fmt: skip
-def test_three_seconds_fast_enough_and_half_of_them_sound(n, rate, lost, told):
-    good = np.ones(n, dtype=bool)
-    good[10 : 10 + lost] = False
-    assert (measure_pickup({"A": noisy(5, n)}, good, rate) is not None) is told
-
-
-NAMES = ("A", "B", "H", "V")
-SIZE = np.array([1.0 + 0.2j, -0.3 + 1.1j, 0.8 - 0.9j, 0.1 + 0.6j])
-
-
-def signature(seed, factor=1.0, size=SIZE, noise=0.02):
-    rng = np.random.default_rng(seed)
-    drawn = noise / math.sqrt(2.0) * (rng.standard_normal(4) + 1j * rng.standard_normal(4))
-    return PickupSignature(NAMES, factor * size + drawn, np.full(4, noise))
-
-
-PAIRS = [("A", "B"), ("H", "V")]
-
-
-def mistakes(runs):
-    """What is said of every run beside the others."""
-    return [mistake(run, [*runs[:k], *runs[k + 1 :]], PAIRS) for k, run in enumerate(runs)]
-
-
-def changed(run, order=(0, 1, 2, 3), turned=None):
-    """Channels of a run exchanged, or one of them reversed."""
-    sign = np.where(np.arange(4) == turned, -1.0, 1.0)
-    return PickupSignature(run.channels, run.size[list(order)] * sign, run.noise[list(order)])
-
-
-def exchanged(run):
-    return changed(run, (1, 0, 2, 3))
-
-
-@pytest.mark.parametrize("factor", [1.0, 3.0 * np.exp(0.7j), 0.2 * np.exp(-2.0j)])
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [({"order": (1, 0, 2, 3)}, "A and B are exchanged"), ({"order": (0, 1, 3, 2)}, "H and V are exchanged")]
-    + [({"turned": k}, f"{name} is reversed") for k, name in enumerate(NAMES)],
-)
-def test_the_mistake_is_named_whatever_the_mains_own_phase(factor, change, said):
-    runs = [signature(k, factor if k == 2 else 1.0) for k in range(5)]
-    assert mistakes(runs) == [None] * 5
-    runs[2] = changed(runs[2], **change)
-    assert mistakes(runs) == [None, None, (said, 4), None, None]
-
-
-def test_a_mistake_needs_two_others_and_most_of_them():
-    odd = exchanged(signature(9))
-    assert mistakes([odd, signature(1)]) == [None, None]
-    assert mistakes([odd, signature(1), signature(2)])[0][1] == 2
-    strange = PickupSignature(NAMES, SIZE[[2, 0, 3, 1]], np.full(4, 0.02))
-    # two of five others agree: not enough; three of five are
-    assert mistakes([odd, signature(1), signature(2), strange, strange, strange])[0] is None
-    assert mistakes([odd, signature(1), signature(2), signature(3), strange, strange])[0][1] == 3
-    other_names = PickupSignature(("A", "B", "H", "W"), SIZE, np.full(4, 0.02))
-    assert mistake(odd, [signature(1), other_names, other_names], PAIRS) is None
-
-
-def test_phases_of_chance_are_no_signature_and_runs_without_pickup_say_nothing():
-    rng = np.random.default_rng(0)
-    for seed in range(40):
-        chance = [SIZE * np.exp(2j * np.pi * rng.uniform(size=4)) for _ in range(5)]
-        assert mistakes([signature(5 * seed + k, size=size) for k, size in enumerate(chance)]) == [None] * 5
-    quiet = [signature(k, factor=0.0) for k in range(5)]
-    quiet[2] = exchanged(quiet[2])
-    assert mistakes(quiet) == [None] * 5
-
-
-def test_by_chance_alone_signatures_differ_by_chi_square():
-    """Three complex parameters are left of four channels: six degrees of freedom, whatever the factor between runs."""
-    noise = np.array([0.01, 0.03, 0.02, 0.05])
-    drawn = []
-    for seed in range(300):
-        rng = np.random.default_rng(seed)
-        both = []
-        for factor in (1.0, 2.5 * np.exp(1.0j)):
-            error = noise / math.sqrt(2.0) * (rng.standard_normal(4) + 1j * rng.standard_normal(4))
-            both.append(PickupSignature(NAMES, factor * SIZE + error, noise))
-        drawn.append(_mismatch(*both))
-        assert _mismatch(*both[::-1]) == pytest.approx(drawn[-1], rel=0.05)
-    assert np.mean(drawn) == pytest.approx(6.0, abs=5 * math.sqrt(12.0 / 300))
-    assert np.mean(np.array(drawn) > 16.81) < 0.03

@@ -77,15 +77,13 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
         weights = equal if np.linalg.matrix_rank(design * equal[:, None], 1e-3) == 3 else weights
     gain = _gain(design, weights)
     solution = gain @ distances
-    # of four pads any one may be the one that stands off: what each is off by, and where the centre is then
-    suspects, shifts = np.zeros(len(angles)), np.zeros((len(angles), 3))
-    for pad in range(4) if len(angles) == 4 else ():
-        others = np.delete(np.arange(4), pad)
-        shifts[pad] = np.linalg.solve(design[others], distances[others]) - solution
-        suspects[pad] = distances[pad] - design[pad] @ (solution + shifts[pad])
+    suspects = np.zeros(len(angles))
+    if len(angles) == 4:  # any one may be what stands off: each explains all that no centre does
+        inexplicable = np.linalg.svd(design)[0][:, 3]
+        suspects = (inexplicable @ distances) / inexplicable
     # of pads at right angles two of the four lie along each axis
-    unknown = 0.5 * _AS_DEVIATION**2 * shifts[:, :2].T @ shifts[:, :2]
-    return Centre(solution[:2], solution[2], gain, unknown, suspects)
+    shifts = _AS_DEVIATION * gain[:2] * suspects
+    return Centre(solution[:2], solution[2], gain, 0.5 * shifts @ shifts.T, suspects)
 
 
 def _gain(design: FloatArray, weights: FloatArray) -> FloatArray:

@@ -5,22 +5,20 @@ is the component of both along the pad's direction; the component across tells w
 """
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import special
 
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Run
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
+from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import good_samples, level_error, live_run, slow_samples, spare_slopes
 from tpjb_ident.pivot.blocks import BLOCK, Blocks, Hold, LoadCourse, cut_blocks, find_holds, load_course
-from tpjb_ident.pivot.pickup import PickupSignature, measure_pickup
 
 #: Share of the load that friction holds back, where the load never comes back to show it.
 FRICTION_SHARE, FRICTION_SE = 0.003, 0.003
@@ -62,7 +60,6 @@ class DryRecord:
     good: BoolArray  #: (m,) blocks that belong to the curve
     lost: float  #: share of samples lost
     quantisation: float  #: [m]
-    pickup: PickupSignature | None = None
     load_direction: PadDirection = PadDirection()
     displacement_direction: PadDirection = PadDirection()
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)  #: of readings, where more than two tell a vector
@@ -89,11 +86,6 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         what = f"has {len(good)} samples, of which {100 * lost:.0f} % are missing or glitches: fewer than it takes"
         cure = "Export every sample, not one a step; state the sample_rate of a slower device; else repeat the test"
         raise refusal(run, "record", what, cure)
-    pickup, channels, measured = None, axial_channels(run), {"force": load, "displacement": place}
-    # two channels per vector: only then the vector holds each of them as it was
-    if Counter(channel.quantity for channel in channels.values()) == dict.fromkeys(measured, 2):
-        values = {name: measured[c.quantity] @ directions(c.axis or 0.0) for name, c in channels.items()}
-        pickup = measure_pickup(values, good, rate)
     order = np.argsort(time, kind="stable")  # a logger may repeat or shuffle time stamps
     time, load, place = (values[order] for values in (time, load, place))
     good = good[order]
@@ -130,7 +122,6 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         good=np.ones(len(blocks), dtype=bool),
         lost=lost,
         quantisation=level_error(place),
-        pickup=pickup,
         load_direction=load_direction(blocks),
         slopes=spare_slopes(run, axes[:1]),
         free_load=free_load,
@@ -179,19 +170,18 @@ def with_load_zero(records: Sequence[DryRecord]) -> list[DryRecord]:
     error = np.maximum([record.load_direction.se for record in lines], _STRAIGHT) * load
     design = directions(turn + [record.angle + 0.5 * math.pi for record in lines])
     freedom = len(lines) - 2
-    if freedom < 1 or np.linalg.matrix_rank(design, 0.1) < 2:
-        return [_less_zero(record, np.zeros(2), np.diag(stated**2), "") for record in records]
-    x, y = design / error[:, None], (across * np.cos(turn) - load * np.sin(turn)) / error
-    scatter = np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2) / freedom
-    variance = max(scatter, 1.0) * (special.stdtrit(freedom, 0.975) / special.ndtri(0.975)) ** 2
-    covariance = np.linalg.inv(x.T @ x / variance + np.diag(1.0 / stated**2 if stated.all() else np.zeros(2)))
-    zero = covariance @ (x.T @ y) / variance
-    size, spread = np.hypot(*zero), math.sqrt(np.trace(covariance))
-    is_clear = size > max(_CLEAR * spread, _NOTABLE * np.max(load))
-    if not (is_clear or stated.all()):
-        return list(records)
-    text = f"the lines along which all pads' loads grow meet at {size:.0f} N (se {spread:.0f} N); it was taken off"
-    return [_less_zero(record, zero, covariance, text if is_clear else "") for record in records]
+    zero, covariance, text = np.zeros(2), np.diag(stated**2), ""
+    if freedom > 0 and np.linalg.matrix_rank(design, 0.1) == 2:
+        x, y = design / error[:, None], (across * np.cos(turn) - load * np.sin(turn)) / error
+        scatter = np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2) / freedom
+        variance = max(scatter, 1.0) * student_widening(freedom) ** 2
+        spread = np.linalg.inv(x.T @ x / variance + np.diag(1.0 / stated**2 if stated.all() else np.zeros(2)))
+        middle, se = spread @ (x.T @ y) / variance, math.sqrt(np.trace(spread))
+        if (size := np.hypot(*middle)) > max(_CLEAR * se, _NOTABLE * np.max(load)):
+            text = f"the lines along which all pads' loads grow meet at {size:.0f} N (se {se:.0f} N); it was taken off"
+        if text or stated.all():
+            zero, covariance = middle, spread
+    return [_less_zero(record, zero, covariance, text) for record in records]
 
 
 def _less_zero(record: DryRecord, zero: FloatArray, covariance: FloatArray, untared: str) -> DryRecord:

@@ -100,20 +100,17 @@ def fit_pivots(
     many = 2 * len(refused) >= len(campaign.of_kind("dry_pivot"))
     if problems and (on_refusal == "raise" or not used or (on_refusal == "few" and many)):
         raise RigDataError(problems)
-    used = witness.held_against(used) if witness else used
-    used, noise, creeps = without_creep(used, noise)
+    used, noise, creeps = without_creep(witness.held_against(used), noise)
     used = [with_friction(record, noise) for record in used]
     pads = defaultdict[int, list[DryRecord]](list)
     for record in sorted(used, key=lambda record: record.pad):
         pads[record.pad] += sound_parts(record, noise)
     curves = _fit_pads(list(pads.values()), structure_behind(records))
-    common = (*(witness.conditions if witness else ()), *refused_runs(problems))
+    common = (*witness.conditions, *refused_runs(problems))
     return tuple(replace(curve, status=(*curve.status, *creeps[curve.pad], *common)) for curve in curves)
 
 
-def _read(
-    campaign: Campaign, angles: FloatArray, witness: SweepWitness | None
-) -> tuple[list[DryRecord], list[Problem]]:
+def _read(campaign: Campaign, angles: FloatArray, witness: SweepWitness) -> tuple[list[DryRecord], list[Problem]]:
     """Every dry run that can be read, and why the others cannot."""
     runs = campaign.of_kind("dry_pivot")
     if not runs:
@@ -124,7 +121,7 @@ def _read(
         if run.pad is None or not 1 <= run.pad <= len(angles):
             what = f"names pad {run.pad}, the bearing has pads 1 to {len(angles)}"
             raise refusal(run, "pad", what, "Correct the manifest")
-        return read_dry_run(as_witnessed(run, witness.channels) if witness else run, float(angles[run.pad - 1]))
+        return read_dry_run(as_witnessed(run, witness.channels), float(angles[run.pad - 1]))
 
     return usable_runs(runs, read)
 

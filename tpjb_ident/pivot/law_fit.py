@@ -3,7 +3,8 @@
 What is measured is x = x0 + delta(W) - a exp(-F / F0): the reading at zero load x0 is unknown (the probes' gap
 voltage), W = F (1 -+ mu) is the load that reaches the pivot when friction holds back the share mu (minus
 loading, plus unloading), and the last term is the way that the shaft has still to go until it is fully in
-contact. Damped Gauss-Newton in whitened residuals finds the posterior mode, Laplace's method the evidence.
+contact. Least squares of whitened residuals, the prior's among them, find the posterior mode, Laplace's method the
+evidence.
 
 The pads of a bearing are of one make, so a law that four pads favour is likely on the fifth. The prior share of
 each law on a pad is therefore the mean of the other pads' posterior shares (an empirical-Bayes mixture, iterated),
@@ -16,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import special
+from scipy import optimize, special
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.pivot.laws import Law, Shape
@@ -25,8 +26,7 @@ OFFSET, FRICTION, SCALE = 0, 1, 2  # places of the parameters that every law has
 CONTACT_GAP = 3.0e-6  # [m], plausible size of the missing contact (prior standard deviation)
 CONTACT_LOAD_SPREAD = 0.6  # of ln F0 about a tenth of the largest load
 _ITERATIONS = 60  # a law far from its prior, such as an exponent of 0.4, takes 40
-_LONGEST_STEP = 1.0  # in any shape parameter or logarithm
-_CONVERGED = 3e-3  # change of the misfit (chi-square) that no longer matters
+_CONVERGED = 1e-5  # relative change of the misfit (chi-square) that no longer matters
 _PSEUDO_PADS = 0.5
 _CONTACT_VOTE = 0.3  # what a pad with incomplete contact says of the law counts: it saw the upper loads only
 _CONTACT_LOSS_PRIOR = 0.3  # share of pads with incomplete contact at low load: two of five in the paper
@@ -130,16 +130,6 @@ def _shape(law: Law) -> slice:
     return slice(SCALE + 1, SCALE + 1 + len(law.parameters))
 
 
-@dataclass(frozen=True)
-class _Prior:
-    """Gaussian prior and bounds of all p parameters: `root` takes off the mean to independent unit normals."""
-
-    mean: FloatArray  #: (p,)
-    root: FloatArray  #: (p, p); zero for what is flat, else upper triangular
-    low: FloatArray  #: (p,)
-    high: FloatArray  #: (p,)
-
-
 def fit_law(law: Law, contact: bool, data: FitData, start: FloatArray | None = None) -> LawFit:
     """Fit one law by its posterior mode; `start` (p,) as `LawFit.theta`."""
     largest, flat = np.max(data.load), (0.0, np.inf, -np.inf, np.inf)
@@ -150,78 +140,50 @@ def fit_law(law: Law, contact: bool, data: FitData, start: FloatArray | None = N
         ends = np.log(0.01 * largest), np.log(largest)
         rows += [(0.0, CONTACT_GAP, 0.0, np.inf), (np.log(0.1 * largest), CONTACT_LOAD_SPREAD, *ends)]
     mean, spread, low, high = np.array(rows).T
-    root = np.diag(1.0 / spread)
+    root = np.diag(1.0 / spread)  # takes the prior to independent unit normals
     root[_shape(law), _shape(law)] = np.linalg.cholesky(law.prior_precision).T
-    prior = _Prior(mean, root, low, high)
-    theta = _start(prior, contact, data) if start is None else np.clip(start, prior.low, prior.high)
-    unit = np.ones(len(theta))
+    unit = np.ones(len(mean))
     unit[OFFSET] = np.ptp(data.deflection)  # metres and pure numbers in one matrix: scale the metres
     if contact:
         unit[-2] = CONTACT_GAP
-    freedom = len(data.load) - len(theta)
-    initial = LawFit(law, data.reference_load, contact, theta, np.zeros_like(prior.root), 0.0, 0.0, freedom)
-    theta, residual, jacobian = _minimise(initial, data, prior, unit)
-    hessian = jacobian.T @ jacobian
-    diagonal = np.diag(prior.root)  # the part of the prior that is not flat
+    begin = np.clip(_start(mean, contact, data) if start is None else start, low, high)
+    freedom = len(data.load) - len(mean)
+    initial = LawFit(law, data.reference_load, contact, begin, np.zeros_like(root), 0.0, 0.0, freedom)
+
+    def misfit(scaled: FloatArray) -> FloatArray:
+        value, _ = replace(initial, theta=scaled * unit).reading_gradient(data.load, data.branch)
+        return np.r_[data.whitener @ (value - data.deflection), root @ (scaled * unit - mean)]
+
+    def slopes(scaled: FloatArray) -> FloatArray:
+        _, gradient = replace(initial, theta=scaled * unit).reading_gradient(data.load, data.branch)
+        return np.vstack([data.whitener @ gradient, root]) * unit
+
+    best = optimize.least_squares(
+        misfit, begin / unit, slopes, (low / unit, high / unit), "dogbox", _CONVERGED, max_nfev=_ITERATIONS
+    )
+    hessian = best.jac.T @ best.jac
+    diagonal = np.diag(root)  # the part of the prior that is not flat
     log_prior = 2.0 * np.sum(np.log(diagonal[diagonal > 0.0]))
     # the offset's unit enters every law alike; the others' units cancel against the prior's determinant
     log_hessian = np.linalg.slogdet(hessian)[1] - 2.0 * np.sum(np.log(unit[1:]))
     return replace(
         initial,
-        theta=theta,
+        theta=best.x * unit,
         covariance=np.linalg.inv(hessian) * np.outer(unit, unit),
-        log_evidence=0.5 * (log_prior - log_hessian - residual @ residual),
-        chi_square=np.sum(residual[: len(data.load)] ** 2),
+        log_evidence=0.5 * (log_prior - log_hessian) - best.cost,
+        chi_square=np.sum(best.fun[: len(data.load)] ** 2),
     )
 
 
-def _start(prior: _Prior, contact: bool, data: FitData) -> FloatArray:
+def _start(mean: FloatArray, contact: bool, data: FitData) -> FloatArray:
     """Prior shape; a straight line through the upper loads, where contact is complete, for scale and zero."""
-    theta = prior.mean.copy()
+    theta = mean.copy()
     upper = data.load >= 0.3 * np.max(data.load)
     slope, theta[OFFSET] = np.polyfit(data.load[upper], data.deflection[upper], 1)
     theta[SCALE] = np.log(max(slope, 1e-3 * np.ptp(data.deflection) / np.ptp(data.load)))
     if contact:
         theta[-2] = 0.3 * CONTACT_GAP
     return theta
-
-
-def _minimise(
-    initial: LawFit, data: FitData, prior: _Prior, unit: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Levenberg-Marquardt to the posterior mode: theta (p,), residuals of data and prior (m + p,), their slopes.
-
-    The slopes (m + p, p) are those of the model, in units of `unit` (p,).
-    """
-    theta = initial.theta
-
-    def evaluate(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        value, jacobian = replace(initial, theta=theta).reading_gradient(data.load, data.branch)
-        misfit = np.r_[data.whitener @ (data.deflection - value), prior.root @ (prior.mean - theta)]
-        return misfit, np.vstack([data.whitener @ (jacobian * unit), prior.root * unit])
-
-    residual, jacobian = evaluate(theta)
-    damping = 1e-3
-    for _ in range(_ITERATIONS):
-        hessian, gradient = jacobian.T @ jacobian, jacobian.T @ residual
-        # a parameter that stands at its bound and wants to go on takes no part in the step
-        free = ~((theta <= prior.low) & (gradient < 0.0) | (theta >= prior.high) & (gradient > 0.0))
-        damped = (hessian + damping * np.diag(np.diag(hessian)))[free][:, free]
-        step = np.zeros(len(theta))
-        step[free] = np.linalg.solve(damped, gradient[free])
-        # shapes and logarithms: a contact gap near zero leaves its decay load free to run away
-        step *= min(1.0, _LONGEST_STEP / max(np.max(np.abs(step[SCALE:])), 1e-300))
-        trial = np.clip(theta + step * unit, prior.low, prior.high)
-        trial_residual, trial_jacobian = evaluate(trial)
-        gain = residual @ residual - trial_residual @ trial_residual
-        if gain >= 0.0:
-            theta, residual, jacobian = trial, trial_residual, trial_jacobian
-            damping = max(damping * 0.2, 1e-9)
-        else:
-            damping *= 8.0
-        if 0.0 <= gain < _CONVERGED or damping > 1e9:
-            break
-    return theta, residual, jacobian
 
 
 def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> FloatArray:

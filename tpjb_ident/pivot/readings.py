@@ -89,15 +89,10 @@ def with_shared_errors(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitDa
     Compliance is another one in every test of a pad, by a scatter that all pads' tests tell together; creep that was
     taken off may end with the next step; and the load has a zero that is known so well.
     """
-    tests = [[record.run.id for record in records] for records in pads]  # a slip makes two parts of one
-    if all(
-        len(set(names)) < 2 and not (records[0].load_error or records[0].creep)
-        for names, records in zip(tests, pads, strict=True)
-    ):
-        return list(data), 0.0
     fits = [fit_law(LAWS["spline"], True, pad) for pad in data]
     runs = []
-    for names, records in zip(tests, pads, strict=True):
+    for records in pads:
+        names = [record.run.id for record in records]  # a slip makes two parts of one
         runs.append(np.repeat([names.index(name) for name in names], [len(record.used) for record in records]))
     # of the curve, not of the readings: these would favour the softer test
     changes = [fit.reading_gradient(pad.load, pad.branch)[0] - fit.theta[OFFSET] for fit, pad in zip(fits, data)]
@@ -110,7 +105,7 @@ def with_shared_errors(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitDa
         stiffness = scatter**2 * (run[:, None] == run) + creep**2
         covariance = root @ root.T + stiffness * np.outer(change, change) + np.outer(zero, zero)
         whitener = np.linalg.inv(np.linalg.cholesky(covariance))
-        wider.append(replace(pad, whitener=whitener) if scatter or error or creep else pad)
+        wider.append(replace(pad, whitener=whitener))
     return wider, scatter
 
 

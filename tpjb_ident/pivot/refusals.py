@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import FloatArray
 from rigdata.campaign import Run
 from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.vector import wrapped
@@ -19,11 +19,12 @@ from tpjb_ident.pivot.dry_record import (
     LOAD_LIMIT,
     DryRecord,
     displacement_direction,
+    pad_axes,
     pooled_noise,
     probes_of,
     with_load_zero,
 )
-from tpjb_ident.pivot.pickup import mistake
+from tpjb_ident.pivot.sweep_witness import common_start
 
 T = TypeVar("T")
 DISPLACEMENT_LIMIT = math.radians(30.0)  # off the pad
@@ -67,7 +68,7 @@ def refused_records(
     records, noise = with_load_zero(records), pooled_noise(records)
     moved = [displacement_direction(record.blocks, noise, record.quantisation) for record in records]
     records = [replace(record, displacement_direction=way) for record, way in zip(records, moved, strict=True)]
-    problems = check_directions(records, pad_angles) + check_pickup(records)
+    problems = check_directions(records, pad_angles)
     return records, problems + check_placement(records) + check_spares(records, noise), noise
 
 
@@ -123,11 +124,11 @@ def structure_behind(records: Sequence[DryRecord]) -> str:
     """
     off = np.array([record.displacement_direction.angle for record in records])
     elsewhere = any(abs(record.load_direction.angle) > LOAD_LIMIT for record in records)
-    if elsewhere or not np.any(np.abs(off) > DISPLACEMENT_LIMIT) or np.any(np.abs(off) >= 0.5 * math.pi):
+    if elsewhere or not np.any(np.abs(off) > DISPLACEMENT_LIMIT):
         return ""
     phi = np.array([record.angle for record in records])
     along = np.array([np.polyfit(record.blocks.load, record.blocks.deflection, 1)[0] for record in records])
-    if len(set(np.round(phi, 6))) < _FEWEST or np.any(along <= 0.0):
+    if len(set(np.round(phi, 6))) < _FEWEST:
         return ""
     across = along * np.tan(off)
     design = np.column_stack([np.sin(2 * phi), np.cos(2 * phi)])
@@ -163,42 +164,30 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
 
 def _misplaced(records: Sequence[DryRecord]) -> list[Problem]:
     """Runs of one zero, of three pads or more, whose shaft does not start where the others place their pad."""
-    outward = np.exp(1j * np.array([record.angle for record in records]))
     starts = []
     for record in records:
         lowest = np.argmin(record.blocks.load)
-        starts.append(complex(record.blocks.deflection[lowest], record.blocks.across[lowest]))
-    centre, distance = _centre(np.array(starts) * outward, outward)
+        starts += [record.blocks.deflection[lowest], record.blocks.across[lowest]]
+    axes = np.vstack([pad_axes(record.angle) for record in records])
+    outward = np.tile([1.0, 0.0], len(records))
+    (_, _, distance), off = common_start(np.column_stack([axes, outward]), np.array(starts))
+    toward, beside = (off + distance * outward).reshape(-1, 2).T
+    distance = abs(distance)
     if distance <= np.median([np.ptp(record.blocks.deflection) for record in records]):
         return []
-    places = np.array(starts) - centre * outward.conj()  # along the pad, and i times beside it
-    limit = max(_ASIDE * distance, _ASIDE_SPREAD * robust_deviation(places.imag))
+    limit = max(_ASIDE * distance, _ASIDE_SPREAD * robust_deviation(beside))
     problems = []
-    for record, place in zip(records, places, strict=True):
-        near = abs(place.real - distance) <= _ALONG * distance
-        if abs(place.imag) > limit or not near:
+    for record, ahead, aside in zip(records, toward, beside, strict=True):
+        near = abs(ahead - distance) <= _ALONG * distance
+        if abs(aside) > limit or not near:
             what = (
-                f"run {record.run.id}: the shaft stands {1e6 * place.real:.0f} um toward pad {record.pad} and "
-                f"{1e6 * place.imag:+.0f} um beside it, while the other dry runs of this campaign say "
+                f"run {record.run.id}: the shaft stands {1e6 * ahead:.0f} um toward pad {record.pad} and "
+                f"{1e6 * aside:+.0f} um beside it, while the other dry runs of this campaign say "
                 f"{1e6 * distance:.0f} um toward it: channels exchanged or wrong pad"
             )
-            is_certain = not near or abs(place.imag) >= _FAR_ASIDE * distance
+            is_certain = not near or abs(aside) >= _FAR_ASIDE * distance
             problems.append(_problem(record, "displacement channels", what, is_certain))
     return problems
-
-
-def _centre(starts: ComplexArray, outward: ComplexArray) -> tuple[complex, float]:
-    """Centre and distance that most starts (m,) agree on: start = centre + distance * outward, robustly."""
-    design = np.column_stack([np.ones_like(outward), np.full_like(outward, 1j), outward])
-    weights = np.ones(len(starts))
-    for _ in range(50):
-        root = np.sqrt(weights)
-        x, y = design * root[:, None], starts * root
-        solution = np.linalg.lstsq(np.vstack([x.real, x.imag]), np.r_[y.real, y.imag], rcond=None)[0]
-        miss = np.abs(starts - design @ solution)
-        # least absolute distance: one run in a wrong place does not move the centre
-        weights = 1.0 / np.maximum(miss, 0.02 * max(np.median(miss), 1e-9))
-    return complex(*solution[:2]), abs(solution[2])
 
 
 def check_spares(records: Sequence[DryRecord], noise: NoiseModel) -> list[Problem]:
@@ -223,21 +212,3 @@ def _slope_error(record: DryRecord, noise: NoiseModel) -> float:
     # a component of more than two probes has less noise than each
     probes = len(probes_of(record.run))
     return math.sqrt(variance * max(probes / 2.0, 1.0)) / max(moved @ moved, 1e-300)
-
-
-def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:
-    """Runs whose mains pick-up is that of exchanged or reversed channels, while most other runs agree."""
-    problems = []
-    for record in records:
-        others = [other.pickup for other in records if other is not record and other.pickup is not None]
-        if record.pickup is None or not others:
-            continue
-        names = sorted(record.pickup.channels, key=lambda name: str(record.run.channels[name].quantity))
-        named = mistake(record.pickup, others, [names[:2], names[2:]])
-        if named is not None:
-            what = (
-                f"run {record.run.id}: {named[0]}: then its mains pick-up is that of {named[1]} other dry "
-                "runs, and as it stands it is not: wrong channel"
-            )
-            problems.append(_problem(record, "channels", what))
-    return problems

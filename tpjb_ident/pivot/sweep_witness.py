@@ -6,15 +6,14 @@ otherwise than stated to each other. Which of two is wrong it does not show: hal
 error of both.
 
 *Probes.* Between two pads the shaft lies in the corner of both, and from corner to corner it goes along the pad in
-between: across that pad's direction, wherever the pad stands. With t_k the way along pad k as read, and B the map from
-readings to places, n_k . B t_k = 0 for every pad: linear equations for B but for its size, whose rows along the probes'
-axes are gains and true axes. A gain that both share leaves all directions as they are.
+between: across that pad's direction, wherever the pad stands. The readings of two probes are to each other as what both
+must show of that way: linear equations for a gain and the turns of both. A gain that both share leaves all as it is.
 
 *Runs.* A pad's dry test begins where the shaft touches that pad in the sweep: probes that read otherwise in one run
 begin it elsewhere.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,9 +25,10 @@ from rigdata.problem import RigDataError
 from rigdata.run import Run
 from rigdata.vector import directions, wrapped
 from tpjb_ident.conditions import Condition, Conditions
+from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.slow_samples import live_run, slow_samples
-from tpjb_ident.pivot.dry_record import DryRecord, probes_of
+from tpjb_ident.pivot.dry_record import DryRecord, axial_channels, probes_of
 
 SIDES = "the sides of the clearance polygon"  # what tells of probes, in words
 #: Standard errors from which sensors are off, and gains or axes of cells (a push may be oval by less) and of probes.
@@ -45,6 +45,7 @@ _EXCHANGED = 0.6  # [rad] from which it is no axis any more but another channel 
 _PLAUSIBLE = 0.3  # of a sensor's error, one standard deviation
 _TOUCHED = 0.99  # share of a sweep in which the shaft has not been farther out
 _STAYS = 0.1  # of a run's weight: that the zero did not move
+_LEAST_LENGTH = 1e-9  # [m]: a shorter one is none
 _ELSEWHERE, _LEAST_MOVE, _SPREADS = 0.015, 1e-6, 5.0  # of the clearance, [m], robust deviations of the other runs
 
 
@@ -100,23 +101,22 @@ def probe_errors(load: FloatArray, place: FloatArray, angles: FloatArray, axes: 
         return np.zeros(2, complex)
     corners = np.array([np.median(place[at], axis=0) for at in held])
     way = corners - np.roll(corners, 1, axis=0)
-    (tx, ty), (nx, ny) = (way / np.linalg.norm(way, axis=1, keepdims=True)).T, directions(pads).T
-    # B = 1 + [[p, q], [r, -p]]
-    design, target = np.column_stack([nx * tx - ny * ty, nx * ty, ny * tx]), -(nx * tx + ny * ty)
+    first, second = directions(axes) @ way.T / (np.linalg.norm(way, axis=1) * np.sin(axes[1] - axes[0]))
+    aside = axes[:, None] - pads - 0.5 * np.pi
+    (along, other_along), (across, other_across) = np.cos(aside), np.sin(aside)
+    # gain of the first, taken off the second, and turns of either
+    design = np.column_stack([second * along + first * other_along, -second * across, first * other_across])
+    target = first * other_along - second * along
     inverse = np.linalg.inv(design.T @ design + (_PADS / _PLAUSIBLE) ** 2 * np.eye(3))
-    best = inverse @ (design.T @ target)
+    gain, *turns = best = inverse @ (design.T @ target)
     variance = (_USUAL * _PADS**2 + np.sum((target - design @ best) ** 2)) / (_USUAL + len(pads) - 3)
-
-    def numbers(map_: FloatArray) -> FloatArray:
-        p, q, r = map_
-        rows = directions(axes) @ np.linalg.inv([[1.0 + p, q], [r, 1.0 - p]]) @ [1.0, 1j] * np.exp(-1j * axes)
-        turns = np.angle(rows)
-        return np.r_[np.log(abs(rows[0] / rows[1])), turns - np.median([*turns, 0.0])]
-
-    slopes = np.array([numbers(best + step) - numbers(best) for step in 1e-6 * np.eye(3)]) / 1e-6
-    errors = np.sqrt(variance * np.diag(slopes.T @ inverse @ slopes))
-    off = numbers(best)
-    gain, *turns = off * (np.abs(off) > np.maximum(_UNEQUAL, _ERRORS * errors)) * (np.max(np.abs(off[1:])) < _EXCHANGED)
+    errors = np.log([1.0 + gain, 1.0 - gain] + 1j * np.array(turns))
+    common = np.median([*errors.imag, 0.0])
+    off = np.array([errors[0].real - errors[1].real, *(errors.imag - common)])
+    slopes = np.diag([2.0, 1.0, 1.0])
+    slopes[1:, 1:] -= errors.imag == common
+    limit = np.maximum(_UNEQUAL, _ERRORS * np.sqrt(variance * np.diag(slopes @ inverse @ slopes.T)))
+    gain, *turns = off * (np.abs(off) > limit) * (np.max(np.abs(off[1:])) < _EXCHANGED)
     return np.array([gain, -gain]) + 1j * np.array(turns)
 
 
@@ -128,19 +128,20 @@ class SweepWitness:
     channels: Channels  #: those that are to be read otherwise than stated, by name
     conditions: Conditions
     place: FloatArray  #: (n, 2) of the shaft, as told [m]
-    probes: frozenset[str]
+    probes: Collection[str]
 
-    def held_against(self, records: Sequence[DryRecord]) -> list[DryRecord]:
+    def held_against(self, records: list[DryRecord]) -> list[DryRecord]:
         """Records with the share of the clearance by which each begins elsewhere than the sweep has its pad."""
         alike = [record for record in records if probes_of(record.run) == self.probes]
         if len(alike) < MIN_PADS:
-            return list(records)
+            return records
         outward = directions([record.angle for record in alike])
         frame = np.column_stack([outward, np.ones(len(alike))])
         reach = np.quantile(self.place @ outward.T, _TOUCHED, axis=0)
         clearance = abs(np.linalg.lstsq(frame, reach, rcond=None)[0][2])
         # by its lowest load and, where contact is not complete there, by the way that its upper loads point back
-        first, back = (_left(frame, starts - reach) for starts in np.array([_starts(record) for record in alike]).T)
+        starts = np.array([_starts(record) for record in alike]).T
+        first, back = (common_start(frame, start - reach)[1] for start in starts)
         away = np.where(np.abs(first) < np.abs(back), first, back)
         limit = max(_LEAST_MOVE, _ELSEWHERE * clearance, _SPREADS * robust_deviation(away))
         shares = {record.run.id: off / clearance for record, off in zip(alike, away) if abs(off) > limit}
@@ -156,65 +157,66 @@ def _starts(record: DryRecord) -> tuple[float, float]:
 
 def as_witnessed(run: Run, channels: Channels) -> Run:
     """A run whose channels are read as a sweep shows them."""
-    known = {name: channels.get(name, stated) for name, stated in run.channels.items()}
-    return replace(run, channels=known) if channels else run
+    mended = {name: channels.get(name, stated) for name, stated in run.channels.items()}
+    return replace(run, channels=mended) if channels else run
 
 
-def _left(frame: FloatArray, lengths: FloatArray) -> FloatArray:
-    """What a moved zero and another load leave of lengths (n,) by least absolute values: most runs are as the sweep.
+def common_start(frame: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Zero and distance (3,) that most lengths (m,) along a frame (m, 3) share, and what they leave of each.
 
-    Of four runs any one may be elsewhere: then the zero has moved least.
+    By least absolute values: most runs are alike. Of four any one may be elsewhere: then the zero is least.
     """
     design, target = np.vstack([frame, _STAYS * np.eye(3)[:2]]), np.r_[lengths, 0.0, 0.0]
-    left, weights = target, np.ones(len(target))
-    for _ in range(50):
-        root = np.sqrt(weights)
-        left = target - design @ np.linalg.lstsq(design * root[:, None], target * root, rcond=None)[0]
-        weights = 1.0 / np.maximum(np.abs(left), 1e-9)
-    return left[:-2]
+    values, *_ = reweighted(design, target, lambda u: huber_weight(u, 1.0), _LEAST_LENGTH)
+    return values, lengths - frame @ values
 
 
-def sweep_witness(campaign: Campaign, angles: FloatArray) -> SweepWitness | None:
-    """What the first sweep of a shaft at rest tells; None without any that can be read."""
+def sweep_witness(campaign: Campaign, angles: FloatArray) -> SweepWitness:
+    """What the first sweep of a shaft at rest tells; nothing without any that can be read."""
     for run in campaign.of_kind("clearance"):
         if run.point.shaft_speed == 0.0:
             try:
                 return witness_of(live_run(run), angles)
             except RigDataError:  # said where sweeps are measured
                 continue
-    return None
+    return SweepWitness({}, {}, (), np.zeros((0, 2)), ())
 
 
 def witness_of(run: Run, angles: FloatArray) -> SweepWitness:
     """What a live sweep past pads at `angles` (n,) [rad] tells."""
-    _, load, place, good, _ = slow_samples(run)
-    circle = push_circle(load[good]) if good.sum() > len(angles) else None
+    load, place = _good_vectors(run)
+    circle = push_circle(load) if len(load) > len(angles) else None
     errors: dict[str, complex] = {}
     channels, conditions = {}, []
     for quantity, (evidence, of_gain, of_axis) in _EVIDENCE.items():
-        pair = [channel for channel in run.of(quantity) if channel.axis is not None]
+        pair = [channel for channel in axial_channels(run).values() if channel.quantity == quantity]
         if circle is None or len(pair) != 2:
             continue
-        axes, uncertainty = np.array([(c.axis or 0.0, c.uncertainty or 0.0) for c in pair]).T
-        cells = quantity == "force"
-        off = (
-            cell_errors(circle, axes, uncertainty)
-            if cells
-            else probe_errors(load[good] - circle.zero, place[good], angles, axes)
-        )
-        for channel, error in zip(pair, off):
-            errors[channel.name] = complex(error)
-            doubt = np.linalg.norm([channel.uncertainty or 0.0, 0.5 * error.real, error.imag * cells])
-            gain, axis = channel.gain * float(np.exp(-0.5 * error.real)), (channel.axis or 0.0) + float(error.imag)
+        axes, uncertainty = np.array([(channel.axis or 0.0, channel.uncertainty or 0.0) for channel in pair]).T
+        if quantity == "force":
+            off = cell_errors(circle, axes, uncertainty)
+            doubt = np.linalg.norm([uncertainty, 0.5 * off.real, off.imag], axis=0)
+        else:
+            off = probe_errors(load - circle.zero, place, angles, axes)
+            doubt = np.linalg.norm([uncertainty, 0.5 * off.real], axis=0)
+        gains = [channel.gain for channel in pair] * np.exp(-0.5 * off.real)
+        for channel, error, *numbers in zip(pair, off, gains, axes + off.imag, doubt):
+            errors[channel.name] = error
             if off.any():
-                channels[channel.name] = replace(channel, gain=gain, axis=axis, uncertainty=float(doubt))
+                gain, axis, unsure = map(float, numbers)
+                channels[channel.name] = replace(channel, gain=gain, axis=axis, uncertainty=unsure)
             if error.imag:
                 text = f"{evidence} as if {channel.name} stood {np.degrees(error.imag):+.1f} deg off its stated axis"
                 conditions.append(Condition(of_axis, text))
-        if off[0].real:
-            share = 100.0 * np.expm1(off[0].real)
+        if share := 100.0 * np.expm1(off[0].real):
             more = f"read {abs(share):.1f} % {'more' if share > 0.0 else 'less'} than"
             text = f"{evidence} as if {pair[0].name} {more} {pair[1].name}; half of it is taken off each"
             conditions.append(Condition(of_gain, text))
-    place = slow_samples(as_witnessed(run, channels))[2] if channels else place
-    return SweepWitness(errors, channels, tuple(conditions), place[good], probes_of(run))
+    _, place = _good_vectors(as_witnessed(run, channels))
+    return SweepWitness(errors, channels, tuple(conditions), place, probes_of(run))
+
+
+def _good_vectors(run: Run) -> tuple[FloatArray, FloatArray]:
+    """Load and place (n, 2) of the good samples."""
+    _, load, place, good, _ = slow_samples(run)
+    return load[good], place[good]
