@@ -195,7 +195,7 @@ def test_records_that_are_not_what_they_claim_are_refused(tmp_path):
         spoilt, _ = campaign(tmp_path / "spoilt.h5", laws, 7, dry=struck, faults=(fault,))
         runs = {run.id: run for run in (*good.runs, *spoilt.runs)}
         source = replace(good, runs=tuple(runs.values()))
-        with pytest.raises(RigDataError, match=r"wrong pad|wrong channel|stuck, clipped or dead") as caught:
+        with pytest.raises(RigDataError, match=r"wrong (pad|channel|angle)|stuck, clipped or dead") as caught:
             fit_pivots(source, ANGLES)
         assert all(p.run and p.cure for p in caught.value.problems), fault
 

@@ -26,7 +26,7 @@ MAY_IMPORT = {
     "terms": {"rigdata", "estimate"},
     "phasors": {"rigdata"},
     "check": {"rigdata", "phasors", "estimate", "terms", "pivot", "clearance"},  # what their own reading refuses
-    "pivot": {"rigdata", "runtime", "phasors"},
+    "pivot": {"rigdata", "runtime", "phasors", "estimate"},  # its statistics
     "clearance": {"rigdata", "runtime", "phasors", "estimate", "pivot"},  # its statistics
     "estimators": {"rigdata", "estimate"},
     "runs": {"rigdata", "runtime", "phasors", "check", "estimate", "estimators"},
