@@ -45,9 +45,8 @@ def run_at(name, direction, load, turn, rng, noise):
 
 def finished(runs, left_out=()):
     """Finished runs."""
-    return FinishedRuns(
-        (*(digest(replace(run, temperatures={1: 300.0 + k * k / 100, 2: 310.0})) for k, run in enumerate(runs)), *left_out)
-    )
+    warm = (replace(run, temperatures={1: 300.0 + k * k / 100, 2: 310.0}) for k, run in enumerate(runs))
+    return FinishedRuns((*map(digest, warm), *left_out))
 
 
 @pytest.fixture(scope="module")
