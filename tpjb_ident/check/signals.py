@@ -51,7 +51,7 @@ def check_signal(
             report.ask("constant" if is_slow else "dead", 1.0, name, **words)
         return
     # a reading of a slow channel lasts for many samples
-    reading = max(report.run.sample_rate / (channel.sample_rate or np.inf), 1.0)
+    reading = max(report.run.sample_rate / channel.sample_rate, 1.0) if channel.sample_rate else 1.0
     if not noise_free and stands_still(statistics, reading):
         report.ask("stuck", statistics.longest_flat / statistics.samples, name, **words)
     clipped = statistics.clipped_share()

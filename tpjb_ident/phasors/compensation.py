@@ -228,8 +228,8 @@ def unstated_filters(result: RunPhasors, records: Sequence[WholeRecord]) -> Cond
         octaves = octaves[octaves * record.duration > _LEAST_BINS]
         if len(octaves) <= _LEAST_OCTAVES:
             continue
-        parts = np.split(np.abs(record.spectrum), np.round(octaves * record.duration).astype(int))[1:-1]
-        level = 20 * np.log10([np.median(np.maximum(part, np.finfo(float).tiny), axis=0) for part in parts])
+        parts = np.split(record.spectrum, np.round(octaves * record.duration).astype(int))[1:-1]
+        level = 20 * np.log10([np.median(np.maximum(np.abs(part), np.finfo(float).tiny), axis=0) for part in parts])
         falls = level[:2].mean(axis=0) - level
         steps, corner = np.diff(falls, axis=0), len(falls) - np.argmax(falls[::-1] <= _FLAT, axis=0)
         filtered = (falls[-1] > _FALL) & (steps.max(axis=0) > _STEEP) & (falls.min(axis=0) > -_FLAT)

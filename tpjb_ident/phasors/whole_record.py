@@ -115,6 +115,14 @@ def fitted_whole(
     return WholeRecord(lines, places, z, 1 - fit.lost[0], residual[:, 0], rate, start, _rounding(rows))
 
 
+def _bend(row: FloatArray, step: float) -> float:
+    """Mean square of the second differences of readings (n,) in steps: of whole steps a median tells nothing."""
+    bends = np.diff(row, 2)
+    bends /= step
+    np.clip(bends, -_DITHERED, _DITHERED, out=bends)
+    return float(np.nansum(bends**2) / len(bends)) if len(bends) else 0.0
+
+
 def _rounding(rows: FloatArray) -> FloatArray:
     """Largest square that a converter's steps put on a line of readings (n_channels, n): of a Bessel function.
 
@@ -123,9 +131,8 @@ def _rounding(rows: FloatArray) -> FloatArray:
     moves = np.abs(np.diff(rows))
     largest = np.nanmax(moves, axis=1, keepdims=True, initial=0.0)
     step = np.where(moves > _NO_STEP * largest, moves, largest).min(axis=1) + np.finfo(float).tiny
-    # of whole steps a median tells nothing
-    bends = np.nan_to_num(np.minimum(np.abs(np.diff(rows, 2)) / step[:, None], _DITHERED))
-    dithered = np.exp(-((2 * np.pi) ** 2) * np.maximum(np.mean(bends**2, axis=1) / 6 - 1 / 12, 0.0))
+    noise = np.array([_bend(row, size) for row, size in zip(rows, step)]) / 6 - 1 / 12
+    dithered = np.exp(-((2 * np.pi) ** 2) * np.maximum(noise, 0.0))
     return _LARGEST * dithered * step**3 / np.fmax(np.std(rows, axis=1), step)
 
 
