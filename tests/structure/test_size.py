@@ -16,7 +16,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (118.33, 14_070),
+    "measurement": (118.40, 14_078),
     "model": (75.20, 10_161),
     "rigdata": (59.14, 7_990),
     "diagnosis": (38.21, 4_698),

@@ -472,6 +472,16 @@ def test_runs_of_one_direction_that_differ_in_temperature_tell_what_it_does(seed
     assert held(solution, truth)
 
 
+def test_runs_that_show_no_change_with_the_temperature_widen_little():
+    """Whatever the thermometers say."""
+    warmer = (-8.0, 8.0, -8.0, 8.0, 8.0, -8.0, 8.0, -8.0)
+    case = Case(directions=4, sizes=(1.0, 1.0), warmer=warmer)
+    solution, truth = answered(case)
+    alone, _ = answered(replace(case, warmer=(0.0,)))
+    assert held(solution, truth)
+    assert np.median(deviations(solution) / deviations(alone)) < 2.5
+
+
 def test_films_as_warm_as_a_supply_holds_them_widen_nothing():
     case = Case(directions=4, warmer=(-0.2, 0.2, 0.2, -0.2), thinner=-0.018)
     solution, truth = answered(case)

@@ -117,8 +117,8 @@ class RunPhasors(Directed):
 
     @property
     def film_temperature(self) -> float:
-        """Mean over the pads, without their thermometers as `temperature` [K]."""
-        return float(np.mean([*self.temperatures.values()])) if self.temperatures else self.temperature
+        """Mean over the pads [K]; NaN without their thermometers."""
+        return float(np.mean([*self.temperatures.values()])) if self.temperatures else np.nan
 
     @cached_property
     def displacement(self) -> ComplexArray:

@@ -6,9 +6,11 @@ direction that differ in temperature tell the change, and H is then that at the 
 more than a supply does, nobody knows of which temperature it is meant.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from rigdata.arrays import ComplexArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.arrowhead import NUMBERS
 from tpjb_ident.estimate.equation import Blocks, Rig, State, entry_changes, entry_sizes, totals
@@ -51,6 +53,12 @@ class FilmTemperature(FilmTerm):
         kelvins = np.stack([self._warmer(blocks), self._unsteady[blocks.point]], axis=1)
         sizes = entry_sizes(state.h[blocks.point])
         return entry_changes((kelvins[:, :, None] * sizes[:, None]).reshape(len(blocks), 2 * NUMBERS))
+
+    def learnt_share(self, fitted: Mapping[str, Fitted]) -> FloatArray:
+        """What the runs tell of the change holds at the temperature that is meant, too, (q,)."""
+        change = fitted[self.name]
+        size = np.hypot(change.value, change.deviation)[:NUMBERS] / _USUAL
+        return np.concatenate([np.ones(NUMBERS), size])
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Films that were not equally warm."""
