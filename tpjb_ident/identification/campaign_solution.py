@@ -268,12 +268,11 @@ class CampaignSolution:
     @cached_property
     def _noise_power(self) -> FloatArray:
         """Mean square of the misfits that noise alone has, (n,)."""
-        solution, blocks, (_, F) = self.solution, self.solution.blocks, at_set_point(self.solution)
+        solution, blocks, (_, F) = self.solution, self.solution.blocks, remainders(self.solution)
         units = [replace(blocks, z=solution.shift + unit) for unit in np.eye(blocks.z.shape[1])]
-        by = np.stack([remainders(replace(solution, blocks=unit)) for unit in units], axis=2)
-        return np.asarray(
-            np.einsum("nij,njk,nik->n", by, blocks.noise, by.conj()).real / np.sum(np.abs(F) ** 2, axis=1)
-        )
+        by = np.stack([remainders(replace(solution, blocks=unit))[0] for unit in units], axis=2)
+        variance = np.einsum("nij,njk,nik->n", by, blocks.noise, by.conj()).real
+        return np.asarray(variance / np.linalg.norm(F, axis=1) ** 2)
 
     @property
     def h(self) -> ComplexArray:
@@ -356,13 +355,14 @@ def at_set_point(solution: Solution) -> tuple[ComplexArray, ComplexArray]:
 
 def misfits(solution: Solution) -> FloatArray:
     """Force of every block that H leaves, over its force, (n,)."""
-    return np.linalg.norm(remainders(solution), axis=1) / np.linalg.norm(at_set_point(solution)[1], axis=1)
+    residual, F = remainders(solution)
+    return np.linalg.norm(residual, axis=1) / np.linalg.norm(F, axis=1)
 
 
-def remainders(solution: Solution) -> ComplexArray:
-    """Force of every block that H leaves, (n, 2) [N]."""
+def remainders(solution: Solution) -> tuple[ComplexArray, ComplexArray]:
+    """Force of every block that H leaves, and the force at the set point, (n, 2) [N]."""
     D, F = at_set_point(solution)
-    return np.asarray(F - np.einsum("nij,nj->ni", solution.h[solution.blocks.point], D))
+    return F - np.einsum("nij,nj->ni", solution.h[solution.blocks.point], D), F
 
 
 #: Terms whose uncertainty scatters with the runs: of points that each have runs of their own.
