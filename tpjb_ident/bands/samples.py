@@ -170,14 +170,12 @@ def without_glitches(values: FloatArray) -> FloatArray:
         at = 4 + np.flatnonzero(np.abs(off[4:-8]) > limit)
         if not len(at):
             break
-        pattern = np.zeros((places[-1] + 5, len(places)))  # what a bad reading at each place does to `off`
-        for column, place in enumerate(places):
-            pattern[place : place + 5, column] = _BAD_READING
+        base = np.append(_BAD_READING, np.zeros(places[-1]))
+        pattern = np.transpose([np.roll(base, place) for place in places])  # what bad readings do to `off`
         near = off[at[:, None] + np.arange(-2, places[-1] + 3)]
         size = near @ np.linalg.pinv(pattern).T
         is_bad = np.abs(near - size @ pattern.T).max(axis=1) < limit
-        for column, place in enumerate(places):
-            values[at[is_bad] + place] -= size[is_bad, column]
+        values[at[is_bad, None] + places] -= size[is_bad]
     return values
 
 

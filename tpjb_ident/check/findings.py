@@ -205,11 +205,6 @@ def verdicts(reports: Sequence[Reporter]) -> Verdicts:
     return result
 
 
-def plane_of(channels: Sequence[Channel]) -> FloatArray:
-    """Matrix (2, m) from one reading per channel to X, Y."""
-    return inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
-
-
 def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple[str, FloatArray]]:
     """Every simple mending of two channels' readings, as a matrix on X and Y, with the fault in words."""
     if len(channels) != 2:
@@ -224,7 +219,7 @@ def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple
     for factor, size in ((0.1, "large"), (10.0, "small")) if scales else ():
         faults.append((f"{first} read ten times too {size}", np.diag([factor, 1.0])))
         faults.append((f"{second} read ten times too {size}", np.diag([1.0, factor])))
-    plane = plane_of(channels)
+    plane = inverse_directions(channels)
     for words, matrix in faults:
         yield words, plane @ matrix @ np.linalg.inv(plane)
 

@@ -27,7 +27,8 @@ from scipy.special import fdtri, stdtr
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
-from tpjb_ident.check.findings import explanation, far, indefiniteness, plane_of, repairs
+from rigdata.vector import inverse_directions
+from tpjb_ident.check.findings import explanation, far, indefiniteness, repairs
 from tpjb_ident.check.observation import NO_NOISE, Observation
 from tpjb_ident.phasors.frequency import shaft_order
 
@@ -126,7 +127,7 @@ def _readings(runs: Sequence[Observation]) -> PointRuns:
     phasors, loads, turning = map(np.array, zip(*rows))
     loads[:, : len(probes)] = np.nan
     inertia = np.array([run.inertia for run in runs])
-    planes = plane_of(probes), plane_of(cells)
+    planes = inverse_directions(probes), inverse_directions(cells)
     return PointRuns(phasors, loads, inertia, *planes, turning, tuple(runs), (*probes, *cells))
 
 

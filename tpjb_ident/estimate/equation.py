@@ -30,7 +30,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
-from rigdata.vector import Directed, directions, plane_vector
+from rigdata.vector import Directed, directions, levers, plane_vector
 from tpjb_ident.conditions import Conditions
 
 
@@ -102,13 +102,6 @@ class Rig(Directed):
     def along(self) -> FloatArray:
         """Unit vectors of the sensors' axes, (m, 2)."""
         return directions([sensor.axis or 0.0 for sensor in self.channels])
-
-    @property
-    def levers(self) -> FloatArray:
-        """Distance of the probes from the film's mid-plane, (m,) [m]; 0 of those that all stand in one plane."""
-        probes = self.pick("displacement")
-        planes = {self.channels[j].plane for j in probes}
-        return np.array([s.plane * (j in probes and len(planes) > 1) for j, s in enumerate(self.channels)])
 
     @property
     def spare(self) -> BoolArray:
@@ -216,7 +209,7 @@ def vector(rig: Rig, blocks: Blocks, quantity: str) -> ComplexArray:
     """X and Y of a quantity by least squares over its sensors, (n, 2); NaN without two directions."""
     rows = rig.pick(quantity)
     readings = np.where(blocks.present[:, rows], blocks.z[:, rows], np.nan)
-    return plane_vector(blocks.along[:, rows], readings)
+    return plane_vector(blocks.along[:, rows], readings, levers([rig.channels[j] for j in rows]))
 
 
 def film_force(rig: Rig, blocks: Blocks) -> ComplexArray:
