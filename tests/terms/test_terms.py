@@ -5,7 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.estimate.block_cases import COMPLIANCE, Case, away, deviations, drawn_turning, made, solved, terms_of
+from tests.estimate.block_cases import (
+    COMPLIANCE,
+    Case,
+    away,
+    deviations,
+    drawn_turning,
+    made,
+    numbers,
+    solved,
+    terms_of,
+)
 from tests.seeds import seeds
 from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.load_turn import LoadTurn
@@ -403,6 +413,21 @@ def test_a_floating_stator_tells_wrong_probes_from_a_shaft_that_gives(changes, s
     assert held(solution, truth)
     if not changes:
         assert of(solution, "housing").value[4:6] == pytest.approx(1e9 * gives, abs=0.2)
+
+
+@pytest.mark.parametrize("share", [0.02, 1e-17])
+def test_springs_much_stiffer_than_usual_and_accelerometers_that_read_rounding_do_no_harm(share):
+    rig, blocks, truth = made(Case(noise=2e-4))
+    cells, accelerometers = rig.pick("force"), rig.pick("acceleration")
+    z, noise = blocks.z.copy(), blocks.noise.copy()
+    z[:, cells] += rig.mass * (1 - share) * z[:, accelerometers]
+    z[:, accelerometers] *= share
+    noise[:, accelerometers] *= share
+    noise[:, :, accelerometers] *= share
+    solution = solved(rig, replace(blocks, z=z, noise=noise), truth)
+    assert held(solution, truth)
+    assert (deviations(solution) / np.abs(numbers(truth)))[:, [0, 3, 4, 7]].max() < 0.01
+    assert solution.conditions() == (() if share > 0.01 else ("accelerometers-contradict-cells",))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
