@@ -77,8 +77,8 @@ class Reporter:
     run: Run
     findings: list[Finding] = field(default_factory=list)
     cells_doubted: bool = False  #: what they show is held against nothing any more
-    #: by channel: deviations of its gain and its axis [rad]; of its gain in this run
-    doubted: dict[str, tuple[float, float]] = field(default_factory=dict)
+    #: by channel: deviations of its gain, its axis [rad], its low corner [Hz]; of its gain in this run
+    doubted: dict[str, tuple[float, ...]] = field(default_factory=dict)
     off: dict[str, float] = field(default_factory=dict)
 
     def copy(self) -> Reporter:
@@ -163,7 +163,7 @@ class Verdicts:
     shared: dict[str, list[Problem]] = field(default_factory=dict)
     doubtful: dict[str, list[Problem]] = field(default_factory=dict)
     run_gains: dict[str, list[Problem]] = field(default_factory=dict)
-    doubted: dict[str, tuple[float, float]] = field(default_factory=dict)  #: as of `Reporter`
+    doubted: dict[str, tuple[float, ...]] = field(default_factory=dict)  #: as of `Reporter`
     off: dict[tuple[str, str], float] = field(default_factory=dict)  #: the same, by run and channel
     swept: dict[tuple[str, str], float] = field(default_factory=dict)  #: m: half a probe's travel, by sweep and probe
 

@@ -40,10 +40,11 @@ class Sensor(Channel):
 
     corner_uncertainty: float = 0.0  #: Hz: of a low corner that nobody states, one deviation
 
-    def doubted(self, gain: float, turn: float = 0.0) -> Sensor:
-        """The sensor, its gain and axis [rad] known no better than this."""
-        uncertainty = max(self.uncertainty or 0.0, gain) or None
-        return replace(self, uncertainty=uncertainty, axis_uncertainty=max(self.axis_uncertainty, turn))
+    def doubted(self, gain: float, turn: float = 0.0, corner: float = 0.0) -> Sensor:
+        """The sensor, its gain, axis [rad] and low corner [Hz] known no better than this."""
+        uncertainty, corner = max(self.uncertainty or 0.0, gain) or None, max(self.corner_uncertainty, corner)
+        turn = max(self.axis_uncertainty, turn)
+        return replace(self, uncertainty=uncertainty, axis_uncertainty=turn, corner_uncertainty=corner)
 
 
 @dataclass(frozen=True)
@@ -108,9 +109,9 @@ class Rig(Directed):
         """Whether a sensor is one of more than two of its quantity, (m,): they tell what is wrong with one of them."""
         return np.array([len(self.pick(sensor.quantity)) > 2 for sensor in self.channels])
 
-    def doubting(self, doubted: Mapping[str, tuple[float, float]]) -> Rig:
-        """The rig, gains and axes [rad] of some sensors, by their names, known no better than this."""
-        return replace(self, channels=tuple(s.doubted(*doubted.get(s.name, (0.0, 0.0))) for s in self.channels))
+    def doubting(self, doubted: Mapping[str, tuple[float, ...]]) -> Rig:
+        """The rig, gains, axes [rad] and corners [Hz] of some sensors, by their names, known no better than this."""
+        return replace(self, channels=tuple(s.doubted(*doubted.get(s.name, (0.0,))) for s in self.channels))
 
     def __len__(self) -> int:
         return len(self.channels)
