@@ -293,7 +293,7 @@ def _point(solved: BandSolution, q: int, quality: Conditions, clearance: float |
     est, budget = _estimate(solved, solved.part, q, lines, f"band-{point.method}")
     inside = [solved.classic[k] for k in lines if solved.usable[k]]
     amplitude = max(s.amplitude for s in point.runs)
-    film = FilmChange(float(solved.blocks.bent[lines[0]]))
+    film = FilmChange(float(solved.blocks.bent[lines[0]]), is_shown=point.kind != "impact")
     bent = change_conditions(film, budget, est, amplitude, clearance)
     return PointResult(
         **of_runs(point),

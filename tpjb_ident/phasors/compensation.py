@@ -245,7 +245,8 @@ def unstated_filters(result: RunPhasors, records: Sequence[WholeRecord]) -> Cond
         else:
             suspect = falling & (np.array(beyond) > _INERTIA)
         suspects = [k for k in np.flatnonzero(suspect) if not channels[k].response]
-        if suspects:
+        # what probes and cells show alike is the shaft's vibration, or a filter that both have
+        if suspects and not {"displacement", "force"} <= set(quantity[suspects]):
             edge, names = octaves[corner[suspects].max()], ", ".join(channels[k].name for k in suspects)
             name = "filter-unstated" if max(result.lines.driven) > _NEAR_CORNER * edge else "filter-above-excitation"
             return (Condition(name, f"the noise of {names} falls from about {edge:.0f} Hz on"),)

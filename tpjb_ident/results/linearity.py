@@ -32,8 +32,8 @@ NOTABLE = 0.01
 #: Change of h per share of the force at 3f and at 2X - f, and per squared share at 2f.
 _WEIGHTS = {"3f": 3.0, "2X-f": CHANGE_BY_ORBIT}
 _SECOND = 4.5
-#: From here on no interval can be answered for.
-_REFUSED = 0.05
+#: From here on no interval can be answered for, as the records show it; by what films usually do.
+_REFUSED, _REFUSED_UNSHOWN = 0.05, 0.15
 #: Share of the clearance from which a motion may be too large for a linear film, if the harmonics do not tell,
 MAX_AMPLITUDE = 0.05
 #: and from which none is linear: where it looks so, the motion is not what the probes say.
@@ -85,6 +85,7 @@ class FilmChange:
 
     share: float = 0.0  #: of h, by which the amplitude of the motion may change it
     hidden: float = np.inf  #: what could stay unseen of it
+    is_shown: bool = True  #: by the records; else it is a width that films of that motion have, as after a blow
 
 
 def film_change(runs: Sequence[FilmLines | None], h: ComplexArray) -> FilmChange:
@@ -135,9 +136,14 @@ def change_conditions(
     if "amplitude" in budget:  # runs of several amplitudes may have told it
         size = np.linalg.norm(est.h) / np.sqrt(2)
         uncertain = min((1.96 * np.sqrt(np.diag(budget["amplitude"]).max()) / size), uncertain)
+    text = "by what the film makes of the motion at multiples of its frequency"
+    if not change.is_shown:
+        text = "blows in one sense, of which nothing tells how a film answers them, go so far that"
+    text += f" the coefficients may be off by {100 * uncertain:.0f} %"
+    if uncertain > (_REFUSED if change.is_shown else _REFUSED_UNSHOWN):
+        return (Condition("film-not-linear", f"{text}. Excite less"),)
     if uncertain > _REFUSED:
-        text = "by what the film makes of the motion at multiples of its frequency, the coefficients may be off by"
-        return (Condition("film-not-linear", f"{text} {100 * uncertain:.0f} %. Excite less"),)
+        return (Condition("large-amplitude", f"{text}: so wide are the intervals. Strike in both senses"),)
     if not clearance or not np.isfinite(est.h).all() or not amplitude > MAX_AMPLITUDE * clearance:
         return ()
     share = 100 * amplitude / clearance

@@ -64,7 +64,8 @@ class StaticLoads:
     def doubted(self, rig: Rig) -> Rig:
         """The rig, its cells as uncertain as all set points differ from them: either may be wrong."""
         ratio = np.log(self.common or 1 + 0j)
-        sizes = np.abs([ratio.real, ratio.imag])
+        lost = 1 - np.cos(ratio.imag)  # of a load along them, by cells that are turned
+        sizes = np.array([abs(ratio.real) + lost, abs(ratio.imag)])
         gain, turn = (CHANGE_AS_DEVIATION * sizes * (sizes > (_NOTICED, MAX_SIDEWAYS))).tolist()
         sensors = tuple(s.doubted(gain, turn) if s.quantity == "force" else s for s in rig.channels)
         return replace(rig, channels=sensors)

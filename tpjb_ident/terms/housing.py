@@ -34,7 +34,7 @@ _OTHERWISE, _GROSS = 0.05, 0.2
 #: A sign is beyond doubt from so many standard errors on.
 _CLEAR = 5.0
 #: Standard errors, and phase [rad], from which cells or probes come late: where nobody says, and later than is stated.
-_LATE, _LATE_AS_STATED = (2.0, 0.0), (4.5, 0.02)
+_LATE, _LATE_AS_STATED = (3.0, 0.0), (4.5, 0.02)
 #: Loss of a cell's mount, at most: bolted joints have 0.01. What goes beyond it is a delay.
 _LOSS = 0.04
 #: No housing stands on springs as stiff as this [m/N]: a steel bar of 1 m^2 and 2 m has it.
