@@ -50,8 +50,7 @@ class Line:
             monomials = powers * local[:, None] ** np.maximum(powers - 1, 0) / size[:, None]
         shape = monomials @ np.linalg.inv(self._places[:, None] ** powers)
         out = np.zeros((points.size, self.n_nodes))
-        columns = element[:, None] * self.degree + powers
-        np.put_along_axis(out, columns, shape, axis=1)
+        np.put_along_axis(out, element[:, None] * self.degree + powers, shape, axis=1)
         return out
 
     @cached_property

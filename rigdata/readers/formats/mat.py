@@ -174,7 +174,10 @@ def _columns(name: str, value: np.ndarray, texts: dict[str, list[str]]) -> Itera
 
 def _listed(lists: dict[str, list[str]], named: re.Pattern[str], lengths: tuple[int, ...]) -> list[str]:
     """The first list of such a name and length; empty where there is none."""
-    return next((cells for key, cells in lists.items() if named.search(key) and len(cells) in lengths), [])
+    for key, cells in lists.items():
+        if named.search(key) and len(cells) in lengths:
+            return cells
+    return []
 
 
 @dataclass
