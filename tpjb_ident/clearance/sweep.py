@@ -50,8 +50,7 @@ class ContactIntervals:
 
     def take(self, chosen: BoolArray) -> ContactIntervals:
         """The averages where `chosen` (m,) is true."""
-        columns = {f.name: getattr(self, f.name)[chosen] for f in fields(self)[:-2]}
-        return replace(self, **columns)
+        return replace(self, **{f.name: getattr(self, f.name)[chosen] for f in fields(self)[:-2]})
 
     def lag(self, angles: FloatArray) -> float:
         """Usual angle [rad] by which the load is past a corner's last pad when the shaft leaves it."""

@@ -185,10 +185,11 @@ class Command(Terminal):
     def judge(self, parts: Mapping[str, Sequence[Condition]], missing: Sequence[str] = ()) -> None:
         """Note the conditions of named parts, each once; end with exit code 3 if one forbids trust, or parts miss."""
         places = defaultdict(list)
+        serious: list[str] = []
         for name, conditions in parts.items():
             for text in sentences(conditions):
                 places[text].append(name)
-        serious = sentences(untrusted(condition for conditions in parts.values() for condition in conditions))
+            serious += sentences(untrusted(conditions))
         notes = {text: f"{', '.join(names)}: {text}" for text, names in places.items()}
         for note in notes.values():
             self.note(note)

@@ -14,7 +14,7 @@ from rigdata.operating_point import ROTATIONS, OperatingPoint
 from tpjb_ident.columns import amount, spinning
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.table_reader import read_table
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, POINT_COLUMNS, POINT_KEY
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, POINT_COLUMNS, POINT_KEY, with_endings
 
 HZ = 2.0 * math.pi
 VALUES = list(COEFFICIENT_COLUMNS)
@@ -60,7 +60,7 @@ def read_rows(path: Path) -> pd.DataFrame:
     Columns as in ``prediction.csv``, beside them ``line`` and the standard errors; NaN where nothing states a number.
     """
     table = read_table(path, _NEEDED, _COEFFICIENT)
-    ends = [name + end for name in VALUES for end in ("_lo", "_hi")]
+    ends = with_endings("_lo", "_hi")
     absent: dict[str, Any] = {name: value for name, value in _DEFAULTS.items() if name not in table}
     columns = [*POINT_KEY, *VALUES, *ERRORS, *ends, "x_m", "y_m", "converged", "quality", "status"]
     rows = table.assign(**absent).reindex(columns=columns).assign(line=table.attrs["lines"])

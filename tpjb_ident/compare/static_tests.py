@@ -50,7 +50,9 @@ def measure_static(
     excluded = [Condition("runs-refused", f"{problem.run} ({problem})") for problem in problems]
     clearance = polygons[0] if polygons else None
     locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
-    excluded += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]
+    for part in (*curves[:1], locus):
+        if part is not None:
+            excluded += [c for c in part.status if c == "runs-refused"]
     return StaticTests(curves, clearance, locus, tuple(excluded), tuple(polygons[1:]))
 
 

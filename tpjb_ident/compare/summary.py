@@ -41,10 +41,9 @@ def agreements(table: pd.DataFrame) -> pd.DataFrame:
     ``n`` and of those ``inside`` the measured interval.
     """
     deviations = table[[f"{column}_ratio" for column in DIRECT.values()]].set_axis(list(DIRECT), axis=1) - 1.0
-    inside = {
-        name: table[f"{column}_predicted"].between(table[f"{column}_lo"], table[f"{column}_hi"])
-        for name, column in DIRECT.items()
-    }
+    inside = {}
+    for name, column in DIRECT.items():
+        inside[name] = table[f"{column}_predicted"].between(table[f"{column}_lo"], table[f"{column}_hi"])
     models = deviations.groupby(table["pivots"], sort=False)
     columns = {
         "median": models.median(),

@@ -30,7 +30,7 @@ from tpjb_ident.exports.formats import COLUMNS, ENDS, ROSS_VERSIONS, ExportError
 from tpjb_ident.presentation import UNITS, us_table
 from tpjb_ident.runtime import tables
 from tpjb_ident.runtime.tables import printable, write_atomic, write_text
-from tpjb_ident.schema import KINDS, STATIC_KEY
+from tpjb_ident.schema import KINDS, STATIC_KEY, with_endings
 
 NAME = "bearing_coefficients"
 #: Beside files of a form that holds no intervals.
@@ -52,11 +52,10 @@ _TEMPLATES = jinja2.Environment(
 
 def _coefficient_table(points: pd.DataFrame) -> pd.DataFrame:
     """The table as it leaves: speed in rpm, frequency in rad/s."""
-    intervals = [name + end for name in COLUMNS.values() for end in ENDS]
     place = ["static_load_N", "static_load_direction_deg", "shaft_speed_rpm", "rotation", "frequency_rad_per_s"]
     speed, frequency = 60 * points["shaft_speed_Hz"], _HZ * points["excitation_Hz"]
     rates = points.assign(shaft_speed_rpm=speed, frequency_rad_per_s=frequency)
-    return rates[[*place, *intervals, "quality", "trusted"]]
+    return rates[[*place, *with_endings(*ENDS), "quality", "trusted"]]
 
 
 def write_csv(folder: Path, points: pd.DataFrame, source: str, name: str = NAME) -> None:

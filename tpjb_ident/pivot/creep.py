@@ -8,7 +8,6 @@ end it. Both are tried with several time constants, weighed by how well they fit
 at the largest load counts as an error of all deflections alike.
 """
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -63,7 +62,9 @@ def _less_alike(
     held = [record for record in records if record.holds]
     if not held:
         return list(records), noise, ()
-    durations = [hold.duration for hold in itertools.chain.from_iterable(record.holds for record in held)]
+    durations = []
+    for record in held:
+        durations.extend([hold.duration for hold in record.holds])
     times = np.median(durations) * np.array(_TIMES)
     less = list(records)
     condition: Conditions = ()

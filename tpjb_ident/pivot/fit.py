@@ -132,7 +132,9 @@ def _fit_pads(pads: Sequence[Sequence[DryRecord]], structure: str) -> list[Pivot
     data = [fit_data(records, noise) for records in pads]
     data, scatter = with_shared_errors(pads, data)
     variants = list(itertools.product(LAWS.values(), (False, True)))
-    fits = [[fit_law(law, contact, pad_data) for law, contact in variants] for pad_data in data]
+    fits = []
+    for pad_data in data:
+        fits.append([fit_law(law, contact, pad_data) for law, contact in variants])
     fits = with_shared_shape(fits, posterior_weights(fits), data)
     curves = []
     for records, candidates, weights in zip(pads, fits, posterior_weights(fits), strict=True):

@@ -102,7 +102,9 @@ def _bring(staging: Path, target: Path, command: str) -> None:
 def _join_records(staging: Path, target: Path, command: str) -> None:
     """Have run.json tell of the folder's other commands too, an entry each, and note what this one no longer writes."""
     new, before = files_in(staging), former_runs(target)
-    ours = {name for entry in before.values() for name in outputs_of(entry)} | {RECORD}
+    ours = {RECORD}
+    for entry in before.values():
+        ours.update(outputs_of(entry))
     foreign = [name for name in new if (target / name).exists() and name not in ours]
     if foreign:
         raise BadInputError(

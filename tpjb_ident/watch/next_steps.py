@@ -226,7 +226,9 @@ def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
     if not waiting:
         unfinished = [s for s in states if s.state in ("repeat", "being written")]
         return [] if unfinished else [Step("next", "Every run of the plan has landed.")]
-    group = [run for run in waiting if at is not None and run.kind in _TURNING and _set_up(run) == _set_up(at)]
+    group = []
+    if at is not None:
+        group = [run for run in waiting if run.kind in _TURNING and _set_up(run) == _set_up(at)]
     run = (group or waiting)[0]
     remainder = f"{len(group) - 1} more at this load" if len(group) > 1 else f"{len(waiting) - 1} more in the plan"
     change = "" if group or at is None else " (new set-up)"

@@ -27,7 +27,9 @@ def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
         refuse_special(path)
         if not path.exists():
             raise BadInputError(f"--input {path}: no such file or folder. Check the path.")
-    files = [file for name, entry in entries.items() for file in files_of(results, name, entry, given or ())]
+    files: list[dict[str, str]] = []
+    for name, entry in entries.items():
+        files += files_of(results, name, entry, given or ())
     if not files:
         raise BadInputError(f"{results}: {RECORD} names no results. Run the command again.")
     mismatches = [file for file in files if file["state"] != "same"]
@@ -82,7 +84,9 @@ def files_of(results: Path, name: str, entry: Mapping[str, Any], inputs: Sequenc
     for place in inputs or [results / place for place in texts_of(entry, "inputs_at").values()]:
         inner = campaign_place(place)
         folders += [inner if inner.is_dir() else inner.parent, *([place] if place.is_dir() else ())]
-    around = [parent for folder in folders for parent in folder.resolve().parents]
+    around: list[Path] = []
+    for folder in folders:
+        around += folder.resolve().parents
     for file, recorded_hash in texts_of(entry, "inputs_sha256").items():
         if recorded_hash != "missing":  # it was not there then either
             # its folder tells it from another file of its name
