@@ -59,7 +59,8 @@ def line_response(runs: Sequence[RunSpectra], bins: IntArray, method: str, ends:
         return LineResponse(mean[None], float(n), _outer(remaining), n - 1.0, slope[None], size, float(n))
     z = np.concatenate([run.z[0, bins] for run in runs])
     sources = [_sources(run, method) for run in runs]
-    u, by_time = (np.concatenate([part[bins] for part in parts]) for parts in zip(*sources))
+    u = np.concatenate([source[bins] for source, _ in sources])
+    by_time = np.concatenate([source[bins] for _, source in sources])
     return _regressed(z, u, by_time, nuisance(runs, bins, u, ends))
 
 

@@ -85,7 +85,9 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
     """
     n = min(run.length, round(seconds * run.sample_rate))
     readers = device_readers(run, command=True)
-    described = [channel for reader in readers for channel in reader.channels]
+    described: list[Channel] = []
+    for reader in readers:
+        described += reader.channels
     single = len(run.of("command")) == 1
     recorded = []
     begins, lost, command = [], 0.0, np.zeros((2, n))

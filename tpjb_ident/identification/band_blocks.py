@@ -127,7 +127,7 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
     film = film_products(point.runs)
     change, scatter = film.change, film.scatter
     if not film.seen:  # without a clearance nothing is stated
-        rms, peak = (max(getattr(s, name) for s in point.runs) / (clearance or np.inf) for name in ("rms", "peak"))
+        rms, peak = np.max([(s.rms, s.peak) for s in point.runs], axis=0) / (clearance or np.inf)
         stated = band_change("pair" if pair else point.kind, rms, peak, _one_sided(point.runs))
         scatter = np.fmin(scatter, (line_scatter(rms) if film.even else stated) / np.sqrt(2))
         change = np.fmin(change, stated)

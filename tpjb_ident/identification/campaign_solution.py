@@ -391,11 +391,16 @@ def shared_changes(
     They are scaled so that the mean of the rows' products is their covariance [N/m]; with the names of the sources.
     `more`: one deviation (P, 8) of further sources by name.
     """
-    shared = [(term, parameter) for term in solution.terms if not term.points for parameter in term.parameters]
-    rows = [k for k, (term, _) in enumerate(shared) if term.name not in by_run]
+    rows, names, count = [], [], 0
+    for term in solution.terms:
+        for parameter in () if term.points else term.parameters:
+            if term.name not in by_run:
+                rows.append(count)
+                names.append(f"{term.name}: {parameter.name}")
+            count += 1
     further = more or {}
-    names = (*(f"{shared[k][0].name}: {shared[k][1].name}" for k in rows), *further)
+    names += further
     if not names:
-        return np.zeros((1, 8 * len(points))), names
+        return np.zeros((1, 8 * len(points))), ()
     factors = np.concatenate([solution.factors[np.ix_(rows, points)], *(f[None] for f in further.values())])
-    return factors.reshape(len(names), -1) * np.sqrt(len(names)), names
+    return factors.reshape(len(names), -1) * np.sqrt(len(names)), tuple(names)

@@ -381,11 +381,15 @@ def dry_test(campaign: Campaign, settings: PhasorSettings, method: str) -> DryTe
             raise RigDataError(errors)
     points = gather([run_phasors(run, settings) for run in runs])
     estimates = [estimate_table(phasor_table(p.D, p.F, p.run_index), p.omega, method) for p in points]
-    good = sorted((est for est in estimates if np.isfinite(est.covariance).all()), key=lambda est: est.omega)
-    bad = [f"{est.omega / (2 * np.pi):g} Hz" for est in estimates if not np.isfinite(est.covariance).all()]
+    good, bad = [], []
+    for est in estimates:
+        if np.isfinite(est.covariance).all():
+            good.append((est.omega, est.h, est.covariance))
+        else:
+            bad.append(f"{est.omega / (2 * np.pi):g} Hz")
+    good.sort(key=lambda numbers: numbers[0])
     text = f"the baseline runs at {', '.join(bad)} give no answer: two directions are needed"
     conditions = holding((bad, "baseline-missing", text))
     if not good:
         return DryTest(conditions=conditions)
-    parts = (np.array([getattr(est, name) for est in good]) for name in ("omega", "h", "covariance"))
-    return DryTest(RigStiffness(*parts), conditions)
+    return DryTest(RigStiffness(*map(np.array, zip(*good))), conditions)
