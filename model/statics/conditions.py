@@ -38,7 +38,7 @@ def unsupported(setup: Setup, load: FloatArray) -> bool:
     """
     if not load.any() or setup.rotational_stiffness > 0.0:
         return False
-    turns = np.array([pad.pivot_angle for pad in setup.bearing.pads]) - math.atan2(load[1], load[0])
+    turns = np.array(setup.bearing.pivot_angles) - math.atan2(load[1], load[0])
     aside = np.round((turns + math.pi) % math.tau - math.pi, 9)  # a pad in the load's way stands on both its sides
     return bool((aside % math.tau).min() + (-aside % math.tau).min() > math.pi - 1e-8)
 

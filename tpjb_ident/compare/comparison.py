@@ -205,7 +205,7 @@ def compare_campaign(
     report = progress or (lambda text, done, total: None)
     chosen = settings.identify or IdentifySettings()
     if chosen.clearance is None:
-        chosen = replace(chosen, clearance=min(pad.assembled_clearance for pad in bearing.pads))
+        chosen = replace(chosen, clearance=min(bearing.clearances))
     identification = identify(campaign, chosen, _labelled(report, "identifying"))
     points = [p.point for p in identification.points]
     report("waiting for the model", 0, 1)

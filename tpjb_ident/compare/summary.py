@@ -172,8 +172,7 @@ def _extrapolation_sentence(comparison: Comparison) -> list[str]:
 def _clearance_sentence(comparison: Comparison) -> list[str]:
     if comparison.clearance is None or comparison.bearing is None:
         return []
-    drawn = np.array([pad.assembled_clearance for pad in comparison.bearing.pads])
-    gap = comparison.clearance.clearance - drawn
+    gap = comparison.clearance.clearance - np.array(comparison.bearing.clearances)
     if not np.isfinite(gap).any():
         return []
     pad = np.nanargmax(np.abs(gap))

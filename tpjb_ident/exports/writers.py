@@ -289,8 +289,8 @@ def write_ross_bearing(folder: Path, bearing: Any, version: int | None = None) -
         bearing = bearing.with_pads(bearing.pads[::-1])
     number, reason = ross_version(version)
     pads = bearing.pads
-    angles = [pad.pivot_angle for pad in pads]
-    assembled = fmean(pad.assembled_clearance for pad in pads)  # that ROSS takes: preloads give each its own
+    angles = list(bearing.pivot_angles)
+    assembled = fmean(bearing.clearances)  # that ROSS takes: preloads give each its own
     fields = {
         "name": printable(bearing.name),
         "number": number,
