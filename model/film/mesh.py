@@ -145,7 +145,9 @@ def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWor
         "unknown": np.zeros((count, n)),
         "slopes": np.zeros((count, n, 4)),
     }
-    arrays |= {name: np.zeros(shape) for name in FilmWork._fields if name not in arrays}
+    for name in FilmWork._fields:
+        if name not in arrays:
+            arrays[name] = np.zeros(shape)
     stack = FilmWork(**arrays)
     return stack, [FilmWork(*parts) for parts in zip(*stack, strict=True)]
 

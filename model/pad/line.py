@@ -64,7 +64,7 @@ class Line:
     def matrix(self, rows: int, columns: int, weight: FloatArray | float = 1.0) -> FloatArray:
         """Weighted product of basis functions or their derivatives."""
         points, factor = self.gauss
-        row_values, column_values = (self.tabulate(points, order) for order in (rows, columns))
+        row_values, column_values = self.tabulate(points, rows), self.tabulate(points, columns)
         return row_values.T @ ((factor * weight)[:, None] * column_values)
 
 

@@ -161,8 +161,12 @@ def time_columns(names: Sequence[str], channels: Channels) -> list[int]:
 def serving(names: Sequence[str], clocks: Sequence[int], channels: Channels) -> list[int | None]:
     """Place of every column's time column: of the clock that it states, else the nearest without one to its left."""
     letters = [channels.get(name, UNDESCRIBED).clock for name in names]
-    lettered = {letters[i]: i for i in clocks if letters[i]}
-    plain = [i for i in clocks if not letters[i]]
+    lettered, plain = {}, []
+    for i in clocks:
+        if letters[i]:
+            lettered[letters[i]] = i
+        else:
+            plain.append(i)
     nearest = plain[0] if plain else None
     places = []
     for i, letter in enumerate(letters):

@@ -286,7 +286,8 @@ def manifest_text(rig: VirtualRig, layout: CsvLayout | None = None) -> str:
         }
     if layout is not None and layout.time_name:
         tables[f"[channels.{layout.time_name}]"] = {"quantity": "time", "unit": "s"}
-    tables |= {f"[channels.{sensor.name}]": _channel(sensor) for sensor in rig.instruments.sensors}
+    for sensor in rig.instruments.sensors:
+        tables[f"[channels.{sensor.name}]"] = _channel(sensor)
     if rotation != ROTATIONS[0]:
         tables["[shaft]"] = {"rotation": rotation}
     suffix = "" if layout is None else ".csv"

@@ -93,10 +93,10 @@ def _sources(run: RunSpectra, method: str) -> tuple[ComplexArray, ComplexArray]:
 
 def one_phase_set(runs: Sequence[RunSpectra]) -> bool:
     """Whether too few runs of a periodic excitation have phases of their own for its distortion to show."""
-    means = [run.displacement.mean(axis=0) for run in runs]
-    waves = [mean @ np.linalg.eigh((mean.T @ mean.conj()).real)[1][:, -1] for mean in means]
     different: list[ComplexArray] = []
-    for wave in waves:
+    for run in runs:
+        mean = run.displacement.mean(axis=0)
+        wave = mean @ np.linalg.eigh((mean.T @ mean.conj()).real)[1][:, -1]
         if all(_likeness(wave, earlier) < _ALIKE for earlier in different):
             different.append(wave)
     return len(different) < _SETS

@@ -68,8 +68,12 @@ class Samples(Directed):
         groups = [self.rows[self.pick(q)] for q in ("displacement", "force")]
         if self.command is not None:
             groups = [self.command]
-        centred = [rows - rows.mean(axis=1, keepdims=True) for rows in groups]
-        return np.concatenate([rows / rows.std() for rows in centred if rows.any()])
+        scaled = []
+        for rows in groups:
+            centred = rows - rows.mean(axis=1, keepdims=True)
+            if centred.any():
+                scaled.append(centred / centred.std())
+        return np.concatenate(scaled)
 
     def mapped(self, change: Callable[[FloatArray], FloatArray], rate: float | None = None) -> Samples:
         """The record with all rows (k, n) changed alike, command too; at another rate where one is given."""

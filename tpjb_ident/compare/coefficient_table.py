@@ -69,7 +69,7 @@ def read_rows(path: Path) -> pd.DataFrame:
     assumed = rows["excitation_Hz"].isna().map({True: "excitation-not-stated", False: ""})
     rows["excitation_Hz"] = rows["excitation_Hz"].fillna(rows["shaft_speed_Hz"])
     rows["static_load_direction_deg"] = rows["static_load_direction_deg"].fillna(-90.0)
-    low, high = (rows[ends[k::2]].to_numpy(float) for k in (0, 1))
+    low, high = rows[ends[::2]].to_numpy(float), rows[ends[1::2]].to_numpy(float)
     deviations = (high - low) / (2 * HALF_INTERVAL)  # our own tables have both: the interval holds calibration too
     rows[ERRORS] = np.where(np.isnan(deviations), rows[ERRORS], deviations)
     flags = rows["quality"].where(rows["quality"] != "", rows["status"]).astype(object) + "; " + assumed
@@ -114,7 +114,8 @@ def partners(rows: pd.DataFrame, candidates: pd.DataFrame, within: tuple[float, 
     load, direction, frequency = within
     if rows.empty or candidates.empty:
         return np.full(len(rows), -1)
-    keys, candidate_keys = (frame[list(POINT_COLUMNS)].to_numpy(float) for frame in (rows, candidates))
+    keys = rows[list(POINT_COLUMNS)].to_numpy(float)
+    candidate_keys = candidates[list(POINT_COLUMNS)].to_numpy(float)
     gaps = np.abs(candidate_keys[None] - keys[:, None])
     gaps[..., 1] = np.minimum(gaps[..., 1] % 360.0, -gaps[..., 1] % 360.0)
     most = np.abs(keys) * [load, 0.0, frequency, frequency] + [0.0, direction, 0.0, 0.0]

@@ -153,7 +153,7 @@ def joined(measured: pd.DataFrame, predictions: Mapping[str, pd.DataFrame]) -> p
     columns: dict[str, Any] = {"pivots": np.repeat(list(predictions), sizes)}
     columns |= {name: measured[name] for name in (*POINT_KEY, "static_load_measured_N")}
     for name in COEFFICIENT_COLUMNS:
-        value, low, high = (measured[name + end] for end in ("", "_lo", "_hi"))
+        value, low, high = measured[name], measured[f"{name}_lo"], measured[f"{name}_hi"]
         columns |= {name: value, f"{name}_lo": low, f"{name}_hi": high, f"{name}_predicted": predicted[name]}
         columns[f"{name}_difference"] = predicted[name] - value
         columns[f"{name}_ratio"] = (predicted[name] / value).where(low * high > 0)

@@ -217,16 +217,17 @@ def grids(points: pd.DataFrame, axes: str) -> list[Grid]:
     """Sort points by load and direction into files over ``"speed"``, ``"excitation"`` or ``"both"``."""
     parts = []
     for _, rows in points.groupby(["static_load_N", "static_load_direction_deg", "mirrored"]):
-        frequency, speed = (rows[name].map(_rounded) for name in ("excitation_Hz", "shaft_speed_Hz"))
+        frequency, speed = rows["excitation_Hz"].map(_rounded), rows["shaft_speed_Hz"].map(_rounded)
         line = frequency.mask(frequency == speed, _SYNCHRONOUS)
         # all speeds were run at the same frequencies
         is_grid = frequency.nunique() * speed.nunique() == len(rows)
         rows = rows.assign(line=line).sort_values(["shaft_speed_Hz", "excitation_Hz"])
         if axes == "both" and (is_grid or (line == _SYNCHRONOUS).all()):
-            parts.append(rows)
+            parts.append(Grid(rows))
         else:
-            parts += [part for _, part in rows.groupby("line" if axes == "speed" else "shaft_speed_Hz")]
-    return [Grid(part) for part in parts]
+            for _, part in rows.groupby("line" if axes == "speed" else "shaft_speed_Hz"):
+                parts.append(Grid(part))
+    return parts
 
 
 def _rounded(frequency: float) -> float:

@@ -271,7 +271,7 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
     D, F = vector(rig, data.blocks, "displacement"), film_force(rig, data.blocks)
     usable = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1)
     used = data.blocks.part(np.flatnonzero(usable))
-    DD, FD = (line_products(used, rows[usable], D[usable]) for rows in (D, F))
+    DD, FD = line_products(used, D[usable], D[usable]), line_products(used, F[usable], D[usable])
     condition = np.sqrt(np.linalg.cond(DD))
     h = np.full(DD.shape, np.nan + 0j)
     regular = condition < ONE_LINE

@@ -123,7 +123,8 @@ def _joined(campaign: Campaign, parts: Sequence[Identification]) -> Identificati
     for part in parts:
         points += part.points
         sources.update(dict.fromkeys(part.calibration_names))
-        conditions.update({condition.sentence(): condition for condition in part.conditions})
+        for condition in part.conditions:
+            conditions[condition.sentence()] = condition
     names = tuple(sources)
     changes, stop = np.zeros((max(len(names), 1), len(points), 8)), 0
     for part in parts:
@@ -206,8 +207,12 @@ def identify_bands(
         observations.append(observe(run))
     checked = campaign_verdicts(campaign, observations)
     bad = checked.unusable
-    unusable = [ExcludedRun(run.id, run.point, RigDataError(bad[run.id])) for run in runs if run.id in bad]
-    usable = [run for run in runs if run.id not in bad]
+    usable, unusable = [], []
+    for run in runs:
+        if run.id in bad:
+            unusable.append(ExcludedRun(run.id, run.point, RigDataError(bad[run.id])))
+        else:
+            usable.append(run)
     excluded: list[ExcludedRun] = []
 
     def solve(rig: Rig) -> BandSolution:
@@ -271,10 +276,13 @@ def _result(solved: BandSolution, b: int, quality: Conditions, clearance: float 
     data, usable = solved.points[b], solved.usable_of(b)
     lines = tuple(_line(solved, data, int(k)) for k in usable)
     parts = [q for q, part in enumerate(solved.parts) if solved.band[part[0]] == b and len(usable)]
-    points = [_point(solved, q, quality, clearance) for q in parts]
-    # what runs scatter by is one for all parts: no chance between them
-    free = [np.full(8, solved.part.noise_freedom(q)) for q in parts]
-    by_noise = [replace(p, stiffness=replace(p.stiffness, dof=dof)) for p, dof in zip(points, free)]
+    points, by_noise = [], []
+    for q in parts:
+        point = _point(solved, q, quality, clearance)
+        # what runs scatter by is one for all parts: no chance between them
+        dof = np.full(8, solved.part.noise_freedom(q))
+        points.append(point)
+        by_noise.append(replace(point, stiffness=replace(point.stiffness, dof=dof)))
     fits = fits_over_frequency(by_noise, _shared(solved, parts)[0])
     models, chosen = (fits[0].fits, fits[0].supported) if fits else ({}, "raw H")
     figures = data.names, data.runs[0].period, data.resolution, tuple(points)

@@ -42,7 +42,9 @@ def without_creep(
     for least, most in ((_ALONE, 0.0), (_BESIDE, 0.0), (_AMONG, 0.5)):
         if sum(map(bool, conditions.values())) < most * len(conditions):
             break
-        for pad in [pad for pad, condition in conditions.items() if not condition]:
+        for pad, condition in list(conditions.items()):
+            if condition:
+                continue
             own = [record for record in less if record.pad == pad]
             if _less_alike(own, noise, _OF_ONE, 0.5 * least)[2]:  # hardly any is none
                 others = [record for record in less if record.pad != pad]  # whose noise no creep of this pad is part of

@@ -226,7 +226,7 @@ def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
     """Loop over the loads as applied that both branches cover: taking off the friction would close it."""
     used = steps.weight > 0
     applied = steps.load / (1.0 - law.theta[FRICTION] * steps.branch)
-    up, down = (applied[used & (steps.branch == branch)] for branch in (1, -1))
+    up, down = applied[used & (steps.branch == 1)], applied[used & (steps.branch == -1)]
     if min(len(up), len(down)) < 2:
         return None
     return measure_loop(law, float(max(up.min(), down.min())), float(min(up.max(), down.max())))

@@ -186,8 +186,12 @@ class PointData(RunsOfPoint):
     def counted(self, weights: FloatArray | float = 1.0) -> list[tuple[RunPhasors, IntArray]]:
         """Runs with the places of their whole windows, those that have any; of some weight where one is given, (n,)."""
         good = self.whole & (weights > 0)
-        places = [np.flatnonzero(good & (self.run_index == i)) for i in range(len(self.runs))]
-        return [(run, rows) for run, rows in zip(self.runs, places) if len(rows)]
+        counted = []
+        for i, run in enumerate(self.runs):
+            places = np.flatnonzero(good & (self.run_index == i))
+            if len(places):
+                counted.append((run, places))
+        return counted
 
     def says(self, condition: str) -> bool:
         """Whether one of the runs carries a condition of this name."""

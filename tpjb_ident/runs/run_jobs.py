@@ -321,7 +321,8 @@ def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -
     result = verdicts([report for report in reports if report.run.kind == "dynamic"])
     for report in reports:
         result.doubted.update(report.doubted)
-        result.off.update({(report.run.id, name): deviation for name, deviation in report.off.items()})
+        for name, deviation in report.off.items():
+            result.off[report.run.id, name] = deviation
     for observation in static:
         for i in observation.pick("displacement") if observation.run.kind == "clearance" else ():
             result.swept[observation.run.id, observation.channels[i].name] = np.ptp(observation.spread[:, i]) / 2

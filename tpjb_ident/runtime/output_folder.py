@@ -123,9 +123,10 @@ def _finish_moving(target: Path) -> None:
         return
     if (ready / RECORD).exists():
         (target / RECORD).unlink(missing_ok=True)
-    for name in [name for name in files_in(ready) if name not in (RECORD, _STALE)]:
-        (target / name).parent.mkdir(parents=True, exist_ok=True)
-        (ready / name).replace(target / name)
+    for name in files_in(ready):
+        if name not in (RECORD, _STALE):
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            (ready / name).replace(target / name)
     if (ready / RECORD).exists():
         for name in json.loads((ready / _STALE).read_text("utf-8")):
             former = (target / name).resolve()

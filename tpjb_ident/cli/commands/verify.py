@@ -35,8 +35,13 @@ def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
     mismatches = [file for file in files if file["state"] != "same"]
     count = f"{len(files) - len(mismatches)} of {len(files)}" if mismatches else "all"
     c.print(f"{results}: {count} results and inputs are the same bytes as when the commands ended.")
+    differing, missing = [], []
     for file in mismatches:
         c.print(f"{file['command']}: {file['role']} {file['file']} {STATES[file['state']]}")
+        if (file["role"], file["state"]) == ("input", "missing"):
+            missing.append(file["file"])
+        else:
+            differing.append(file["file"])
     for name, entry in entries.items():
         former = texts_of(entry, "versions")
         changed = [f"{key} {former[key]} (now {now})" for key, now in versions().items() if former.get(key, now) != now]
@@ -47,10 +52,8 @@ def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
         c.options = {"results": results}
         with c.results():
             c.json("verify.json", {"schema": "tpjb-verify/1", "folder": results.name, "files": files})
-    missing = [file["file"] for file in mismatches if (file["role"], file["state"]) == ("input", "missing")]
-    if len(missing) < len(mismatches):
-        names = [file["file"] for file in mismatches if file["file"] not in missing]
-        raise NotTrustedError(f"{results}: not as it was computed: {listed(names)}. Run the command again.")
+    if differing:
+        raise NotTrustedError(f"{results}: not as it was computed: {listed(differing)}. Run the command again.")
     if missing:
         raise BadInputError(
             f"{results}: the results are unchanged, but {len(missing)} inputs ({listed(missing, 1)}) are not where "
