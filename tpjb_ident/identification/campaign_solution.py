@@ -375,7 +375,10 @@ def covariances_of(
     """Covariances (8, 8) of a point of a solve by source, random and shared ones; what scatters `by_run` is random."""
     shared = {name: share[point] for name, share in solution.shares.items() if np.any(share[point])}
     random = {"random": solution.records[point]}
-    return random | {name: shared.pop(name) for name in by_run if name in shared}, shared
+    for name in by_run:
+        if name in shared:
+            random[name] = shared.pop(name)
+    return random, shared
 
 
 def total(covariances: Mapping[str, FloatArray]) -> FloatArray:

@@ -54,9 +54,10 @@ class PlainPoint:
 def plain_points(campaign: Campaign, settings: PlainSettings) -> list[PlainPoint]:
     """Solve every operating point of a campaign as the paper prints it."""
     runs = []
-    for run in (run for run in campaign.of_kind("dynamic") if not is_broadband(run)):
-        lines = LineSet((Line("excitation", run.point.excitation_hz),), (), (), run.point.shaft_speed_hz)
-        runs.append(extract(run, lines, window=settings.window))
+    for run in campaign.of_kind("dynamic"):
+        if not is_broadband(run):
+            lines = LineSet((Line("excitation", run.point.excitation_hz),), (), (), run.point.shaft_speed_hz)
+            runs.append(extract(run, lines, window=settings.window))
     return [_solved(data, settings) for data in gather(runs)]
 
 

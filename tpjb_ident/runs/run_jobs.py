@@ -329,8 +329,10 @@ def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -
     # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
     optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
     for run, problems in result.shared.items():
-        result.doubtful.setdefault(run, []).extend(p for p in problems if p.place in optional)
-        problems[:] = [p for p in problems if p.place not in optional]
+        for problem in tuple(problems):
+            if problem.place in optional:
+                problems.remove(problem)
+                result.doubtful.setdefault(run, []).append(problem)
     return result
 
 
