@@ -295,7 +295,7 @@ class Prediction:
     @property
     def pad_matrices(self) -> tuple[PadMatrices, ...]:
         """Full matrices of the pads that carry, Eq. (11) and (12), in the frame of `equilibrium`."""
-        return tuple(PadMatrices(*parts) for parts in zip(*pad_matrices(self.setup, self._films), strict=True))
+        return tuple(PadMatrices(*parts) for parts in zip(*pad_matrices(self.setup, self._films)))
 
     @functools.cached_property
     def mesh_error(self) -> float:

@@ -149,7 +149,7 @@ def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWor
         if name not in arrays:
             arrays[name] = np.zeros(shape)
     stack = FilmWork(**arrays)
-    return stack, [FilmWork(*parts) for parts in zip(*stack, strict=True)]
+    return stack, [FilmWork(*parts) for parts in zip(*stack)]
 
 
 def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:

@@ -98,11 +98,11 @@ def status_of(
 
 def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
     """Largest local Reynolds number rho U h / mu of all films, the idle pads' too; NaN where there is none."""
+    numbers = []
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # a lost film may be as hot as numbers go
-        numbers = [
-            float((f.work.density * f.work.thickness / f.work.viscosity).max()) * surface_speed
-            for f in films
-            if f.forces is not None
-        ]
-    numbers += [f.resting.reynolds for f in films if f.resting is not None]
+        for f in films:
+            if f.forces is not None:
+                numbers.append(float((f.work.density * f.work.thickness / f.work.viscosity).max()) * surface_speed)
+            if f.resting is not None:
+                numbers.append(f.resting.reynolds)
     return max((n for n in numbers if math.isfinite(n)), default=math.nan)
