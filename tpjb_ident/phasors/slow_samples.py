@@ -198,7 +198,10 @@ def contradictions(
             groups.setdefault((str(channels[name].quantity), channels[name].plane), []).append(name)
     contradicting = []
     for (quantity, _), names in groups.items():
-        rows = np.vstack([np.column_stack([run_slopes[name] for name in names]) for run_slopes in slopes])
+        columns = []
+        for name in names:
+            columns.append(np.concatenate([run_slopes[name] for run_slopes in slopes]))
+        rows = np.column_stack(columns)
         spread = np.repeat(np.clip(noise[quantity], _CURVED, 1.0), len(rows) // len(slopes))
         if len(names) > 2 and _chance([channels[name] for name in names], rows, spread) < _BY_CHANCE:
             listed = ", ".join(names)
