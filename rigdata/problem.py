@@ -123,8 +123,12 @@ def gathered(problems: Iterable[Problem]) -> Iterator[Problem]:
         if len(repeats) + 1 < ALIKE:
             yield from (first, *repeats)
             continue
-        places = dict.fromkeys(p.place.split(",")[0] if p.severity == "error" else p.run or p.file for p in repeats)
-        times = f"{len(repeats)} more times, such as {', '.join([*places][:3])}"
+        places = []
+        for p in repeats:
+            place = p.place.split(",")[0] if p.severity == "error" else p.run or p.file
+            if place not in places:
+                places.append(place)
+        times = f"{len(repeats)} more times, such as {', '.join(places[:3])}"
         yield replace(first, what=f"{first.what} (the like {times})")
 
 

@@ -50,7 +50,9 @@ def without_creep(
                 others = [record for record in less if record.pad != pad]  # whose noise no creep of this pad is part of
                 own, _, conditions[pad] = _less_alike(own, pooled_noise(others) if others else noise, _OF_ONE, least)
                 crept = iter(own)
-                less = [next(crept) if record.pad == pad else record for record in less]
+                for place, record in enumerate(less):
+                    if record.pad == pad:
+                        less[place] = next(crept)
         if not any(conditions.values()):
             less, noise, shared = _less_alike(records, noise, _PLAUSIBLE, _LEAST)
             return less, noise, dict.fromkeys(conditions, shared)
