@@ -255,7 +255,7 @@ class Run(RunDescription):
             fault = f"has {len(chosen)} channels, two are needed"
             remedy = f"Describe two {quantity} channels with different axes in the manifest"
             raise self._refuse(f"quantity {quantity}", fault, remedy)
-        if np.isnan(inverse_directions(tuple(c.axis or 0.0 for c in chosen))).any():
+        if np.isnan(inverse_directions(chosen)).any():
             names = ", ".join(c.name for c in chosen)
             remedy = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
             raise self._refuse(f"channels {names}", "all measure along one line", remedy)

@@ -1,7 +1,5 @@
 """Readings along two or more directions, turned into X and Y."""
 
-import functools
-import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -12,8 +10,8 @@ from rigdata.calibration import Channel
 
 #: Two directions whose sine is not above this (3 deg) count as one.
 _COLLINEAR_SINE = 0.05
-#: The same limit as the smallest singular value of two directions, sqrt(1 - cos).
-_LEAST_SINGULAR = math.sqrt(1.0 - math.sqrt(1.0 - _COLLINEAR_SINE**2))
+#: Weight of no tilt beside what channels in two planes tell: where some are missing, there is none.
+_LEAST_TILT = 1e-6
 
 
 def directions(axes: float | Sequence[float] | FloatArray) -> FloatArray:
@@ -21,16 +19,22 @@ def directions(axes: float | Sequence[float] | FloatArray) -> FloatArray:
     return np.stack([np.cos(axes), np.sin(axes)], axis=-1)
 
 
-@functools.lru_cache(maxsize=256)
-def inverse_directions(axes: tuple[float, ...]) -> FloatArray:
-    """(2, m) matrix from components along `axes` [rad] to X and Y; NaN where they span no plane."""
-    along = directions(axes)
-    if len(axes) < 2 or np.linalg.svd(along, compute_uv=False)[-1] <= _LEAST_SINGULAR:
-        return np.full((2, len(axes)), np.nan)
-    inverse = np.linalg.pinv(along)
-    inverse[np.abs(inverse) < 1e-12] = 0.0  # cos 90 deg is not quite zero
-    inverse.setflags(write=False)
-    return np.asarray(inverse)
+def levers(channels: Sequence[Any]) -> FloatArray:
+    """Distances of channels of one quantity from the film's mid-plane, (m,) [m]; zero where all stand in one plane."""
+    planes = np.array([channel.plane for channel in channels])
+    return planes if len(set(planes)) > 1 else np.zeros(len(planes))
+
+
+def inverse_directions(channels: Sequence[Any]) -> FloatArray:
+    """(2, m) matrix from readings of channels of one quantity to X and Y; NaN where they span no plane."""
+    inverse = channels_vector(channels, np.eye(len(channels))).real.T
+    return np.where(np.abs(inverse) < 1e-12, 0.0, inverse)  # cos 90 deg is not quite zero
+
+
+def channels_vector(channels: Sequence[Any], values: ComplexArray | FloatArray) -> ComplexArray:
+    """X and Y (.., 2) of values (.., m) of the channels of one quantity, by least squares; NaN where they tell none."""
+    along = directions([channel.axis or 0.0 for channel in channels])
+    return plane_vector(along, np.asarray(values, complex), levers(channels))
 
 
 def vector_rows(channels: Sequence[Channel], readings: Sequence[FloatArray]) -> FloatArray:
@@ -38,12 +42,10 @@ def vector_rows(channels: Sequence[Channel], readings: Sequence[FloatArray]) -> 
 
     Least squares where there are more than two channels, NaN where fewer than two directions have a value.
     """
-    axes = [channel.axis or 0.0 for channel in channels]
     values = np.array([channel.to_si(reading) for channel, reading in zip(channels, readings, strict=True)])
-    rows = inverse_directions(tuple(axes)) @ values
+    rows = inverse_directions(channels) @ values
     partial = np.isnan(rows[0])
-    if partial.any():
-        rows[:, partial] = plane_vector(directions(axes), values[:, partial].T).real.T
+    rows[:, partial] = channels_vector(channels, values[:, partial].T).real.T
     return rows
 
 
@@ -52,18 +54,22 @@ def wrapped(angle: FloatArray) -> FloatArray:
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-def plane_vector(along: FloatArray, values: ComplexArray) -> ComplexArray:
+def plane_vector(along: FloatArray, values: ComplexArray, planes: FloatArray) -> ComplexArray:
     """X and Y (.., 2) of components (.., m) along unit vectors (.., m, 2), by least squares over those with a value.
 
-    NaN where they span no plane.
+    At the film's mid-plane where `planes` (m,) [m] from it are not all zero: a tilt is fitted beside, as far as the
+    components tell one. NaN where they span no plane.
     """
     present = np.isfinite(values)
     axes = np.where(present[..., None], along, 0.0)
     gram = np.swapaxes(axes, -1, -2) @ axes
-    moment = np.swapaxes(axes, -1, -2) @ np.where(present, values, 0.0)[..., None]
     spanned = np.linalg.det(gram) > _COLLINEAR_SINE**2
+    if planes.any():
+        axes = np.concatenate([axes, axes * planes[:, None] / np.abs(planes).max()], axis=-1)
+        gram = np.swapaxes(axes, -1, -2) @ axes + np.diag([0.0, 0.0, _LEAST_TILT, _LEAST_TILT])
+    moment = np.swapaxes(axes, -1, -2) @ np.where(present, values, 0.0)[..., None]
     vectors = np.full((*values.shape[:-1], 2), np.nan + 0j)
-    vectors[spanned] = np.linalg.solve(gram[spanned], moment[spanned])[..., 0]
+    vectors[spanned] = np.linalg.solve(gram[spanned], moment[spanned])[..., :2, 0]
     return vectors
 
 
@@ -79,8 +85,7 @@ class Directed:
     def plane(self, quantity: str, values: ComplexArray | FloatArray) -> ComplexArray:
         """X and Y (.., 2) of a quantity from values (.., n_channels) of all channels, NaN where there is none."""
         places = self.pick(quantity)
-        along = directions([self.channels[k].axis or 0.0 for k in places])
-        return plane_vector(along, np.asarray(values[..., places], complex))
+        return channels_vector([self.channels[k] for k in places], values[..., places])
 
 
 def zero_uncertainty(channels: Iterable[Channel], quantity: str) -> FloatArray:
@@ -88,5 +93,5 @@ def zero_uncertainty(channels: Iterable[Channel], quantity: str) -> FloatArray:
     chosen = [c for c in channels if c.quantity == quantity and c.axis is not None]
     if len(chosen) < 2:
         return np.zeros(2)
-    inverse = inverse_directions(tuple(c.axis or 0.0 for c in chosen))
+    inverse = inverse_directions(chosen)
     return np.sqrt(inverse**2 @ np.array([c.zero_uncertainty for c in chosen]) ** 2)

@@ -18,7 +18,8 @@ from tpjb_ident import load_campaign
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.observation import excitation_line, observe
-from tpjb_ident.check.run_gain import PointRuns, check_shaft_lines, deviating_runs, dynamic_difference, gain_of_run
+from tpjb_ident.check.probe_readings import check_shaft_lines
+from tpjb_ident.check.run_gain import PointRuns, deviating_runs, dynamic_difference, gain_of_run
 from tpjb_ident.check.set_points import check_excitation, check_places, check_rotation, check_static_loads
 from tpjb_ident.phasors.run_phasors import run_phasors
 

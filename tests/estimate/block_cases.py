@@ -50,7 +50,7 @@ class Case:
     directions: int = 4
     sizes: tuple[float, ...] = (1.0,)
     probes: int = 2
-    accelerometers: bool = True
+    accelerometers: int = 2
     mount: str = "cells"
     noise: float = 1e-3  #: of a run's phasor, relative to the sensor's usual reading
     scatter: float = 0.0  #: of the force from run to run, relative
@@ -78,11 +78,10 @@ class Case:
 
 
 def sensors_of(case: Case) -> tuple[Sensor, ...]:
-    """Probes D1.., cells F1, F2, accelerometers A1, A2 with what the case states of them."""
+    """Probes D1.., cells F1, F2, accelerometers A1.. with what the case states of them."""
     names = [(f"D{k + 1}", "displacement") for k in range(case.probes)]
     names += [("F1", "force"), ("F2", "force")]
-    if case.accelerometers:
-        names += [("A1", "acceleration"), ("A2", "acceleration")]
+    names += [(f"A{k + 1}", "acceleration") for k in range(case.accelerometers)]
     sensors = []
     for name, quantity in names:
         usual = {"corner_uncertainty": CORNERS.get(quantity, 0.0)}
@@ -94,7 +93,7 @@ def sensors_of(case: Case) -> tuple[Sensor, ...]:
 def axes_of(case: Case) -> np.ndarray:
     """Angles of the sensors' axes (m,) [rad]."""
     degrees = [*PROBES[: case.probes], 0.0, 90.0]
-    return np.radians(degrees + ([0.0, 90.0] if case.accelerometers else []))
+    return np.radians(degrees + [0.0, 90.0, 0.0, 90.0][: case.accelerometers])
 
 
 def made(case: Case, seed: int = 0) -> tuple[Rig, Blocks, np.ndarray]:

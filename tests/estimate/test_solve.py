@@ -22,7 +22,7 @@ EXACT = Case(noise=0.0)
         replace(EXACT, probes=3),
         replace(EXACT, mount="floating"),
         replace(EXACT, mount="floating", probes=3),
-        replace(EXACT, accelerometers=False, mount="unknown"),
+        replace(EXACT, accelerometers=0, mount="unknown"),
         replace(EXACT, directions=2),
         replace(EXACT, directions=6, hertz=(20.0, 60.0), loads=(5000.0,)),
         replace(EXACT, loads=(4000.0, 7000.0), miss=(0.01, 0.0)),

@@ -38,7 +38,7 @@ def test_accelerations_over_displacements_tell_the_mount(mount, seed):
 
 @pytest.mark.parametrize(("ratio", "mount"), [(1.0, "cells"), (-0.9, "cells"), (0.01, "unknown"), (3.0, "unknown")])
 def test_without_accelerometers_the_static_load_tells_it(ratio, mount):
-    rig, blocks, _ = made(replace(CASE, accelerometers=False))
+    rig, blocks, _ = made(replace(CASE, accelerometers=0))
     assert found_mount(rig, blocks, None, complex(ratio)) == mount
     assert found_mount(rig, blocks.part(slice(0, 0)), None, complex(ratio)) == mount
 

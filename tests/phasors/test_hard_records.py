@@ -489,3 +489,26 @@ def test_what_cannot_be_told_stays_refused_and_the_message_says_which_test_would
     point = identified(tmp_path, rig)
     (told,) = [c for c in untrusted(point.quality) if c == "1X on excitation line"]
     assert cure in told.detail
+
+
+@pytest.mark.parametrize(
+    ("shape", "alone", "expected"),
+    [
+        (lambda f: low_pass(60.0)(f), False, ""),  # a mass under forces of all frequencies
+        (lambda f: low_pass(60.0, 1)(f) * low_pass(120.0, 4)(f), False, "DX, DY"),
+        (lambda f: low_pass(60.0, 1)(f) * low_pass(120.0, 4)(f), True, "DX"),
+        (lambda f: low_pass(60.0)(f) * np.sinc(f / 95.0), False, "DX, DY"),  # means of 21 readings
+    ],
+    ids=["a mass", "filters of both probes", "a filter of one", "means"],
+)
+def test_beside_other_coloured_noise_a_filter_falls_faster_than_a_mass(shape, alone, expected):
+    mild = low_pass(80.0, 1)
+    for seed in range(4):
+        probes = with_noise(shape, seed, "D")
+        data = with_noise(mild, seed, "F") | {"DX": probes["DX"]}
+        data["DY"] = with_noise(mild, seed, "D")["DY"] if alone else probes["DY"]
+        details = {str(c): c.detail for c in phasors_of(data).conditions}
+        if expected:
+            assert f"noise of {expected} falls" in details["filter-unstated"]
+        else:
+            assert not {"filter-unstated", "filter-above-excitation"} & details.keys()

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rigdata.calibration import Channel
 from rigdata.problem import RigDataError
 from rigdata.record import VectorRecord
 from tpjb_ident.conditions import sentences
@@ -49,7 +50,7 @@ REACH = 8e-5
 
 
 def channel(quantity, axis, uncertainty=None, zero_uncertainty=0.0):
-    return SimpleNamespace(quantity=quantity, axis=axis, uncertainty=uncertainty, zero_uncertainty=zero_uncertainty)
+    return Channel("", quantity, axis=axis, uncertainty=uncertainty, zero_uncertainty=zero_uncertainty)
 
 
 CHANNELS = {
@@ -163,8 +164,6 @@ def test_three_probes_that_contradict_one_another_are_refused(odd, seed, named):
     rng = np.random.default_rng(seed)
     axes = np.radians([0.0, 60.0, 120.0])
     probes = {f"X{k}": channel("displacement", axis, 0.005) for k, axis in enumerate(axes)}
-    for probe in probes.values():
-        probe.axis_uncertainty, probe.plane = 0.0, 0.0
     gain = 1.0 + 0.005 * rng.standard_normal(3)
     gain[2] *= odd.get("gain", 1.0)
     read_along = axes.copy()
@@ -180,7 +179,7 @@ def test_three_probes_that_contradict_one_another_are_refused(odd, seed, named):
     if named:
         assert "X0, X1, X2 contradict one another" in problems[0].what
         for one in records:  # in planes of their own they may move apart
-            one.run.channels = probes | {"X2": SimpleNamespace(**(vars(probes["X2"]) | {"plane": 0.02}))}
+            one.run.channels = probes | {"X2": replace(probes["X2"], plane=0.02)}
         assert check_spares(records, NOISE) == []
 
 
@@ -590,7 +589,7 @@ def untared(pads, stated, zero=ZERO):
 
 
 def replace_zero(one, stated):
-    return SimpleNamespace(**{**vars(one), "zero_uncertainty": stated if one.quantity == "force" else 0.0})
+    return replace(one, zero_uncertainty=stated if one.quantity == "force" else 0.0)
 
 
 @pytest.mark.parametrize("stated", [0.0, 200.0])

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -138,8 +139,7 @@ def test_a_dead_probe_is_left_out_where_two_others_tell_the_plane(dead, left):
     rng = np.random.default_rng(2)
     channels = {}
     for name, share in axes.items():
-        channels[name] = channel("displacement", share * math.pi)
-        channels[name].name = name
+        channels[name] = replace(channel("displacement", share * math.pi), name=name)
     values = {name: np.full(400, 1.2) if name in dead else rng.standard_normal(400) for name in channels}
     assert set(live_run(Readings(channels, values)).channels) == left
     values["X1B"] = values["X1C"] = np.full(400, 1.2)  # then nothing else tells the plane

@@ -1,6 +1,7 @@
 """Filters, delays and measured responses of channels, and vectors from channels along any axes."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from rigdata.run import speed_from_pulses
 from rigdata.units import UnitError
-from rigdata.vector import vector_rows
+from rigdata.vector import directions, vector_rows
 from tests.manifests import SET_POINT, manifest
 
 FORCE = {
@@ -100,6 +101,20 @@ def solve(axes, *samples, **calibration):
     """X and Y (n, 2) of samples, one reading per axis each."""
     channels = [Channel(f"C{i}", "displacement", axis=axis, **calibration) for i, axis in enumerate(axes)]
     return vector_rows(channels, list(np.array(samples, dtype=float).T)).T
+
+
+def test_two_planes_of_probes_tell_the_place_at_the_mid_plane_as_far_as_all_have_values():
+    axes, planes = np.radians([45, 135, 45, 135]), np.array([0.04, 0.04, -0.025, -0.025])
+    channels = [Channel(f"C{i}", "displacement", axis=a, plane=p) for i, (a, p) in enumerate(zip(axes, planes))]
+    readings = directions(axes) @ np.array([3.0, 4.0]) + planes * (directions(axes) @ np.array([20.0, -10.0]))
+    three = np.where([True, True, True, False], readings, np.nan)
+    rows = vector_rows(channels, list(np.array([readings, three, readings]).T)).T
+    np.testing.assert_allclose(rows[[0, 2]], [[3.0, 4.0]] * 2, rtol=1e-5)
+    along = rows[1] @ directions(axes[0])
+    assert along == pytest.approx(np.array([3.0, 4.0]) @ directions(axes[0]), rel=1e-5)  # both planes have this axis
+    one = [replace(channel, plane=0.04) for channel in channels]
+    plain = [replace(channel, plane=0.0) for channel in channels]
+    np.testing.assert_array_equal(*(vector_rows(chosen, list(readings[:, None])) for chosen in (one, plain)))
 
 
 @settings(max_examples=40, deadline=None)

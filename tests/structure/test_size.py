@@ -16,9 +16,9 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (118.40, 14_155),
+    "measurement": (119.0, 14_207),
     "model": (75.20, 10_172),
-    "rigdata": (59.14, 8_039),
+    "rigdata": (59.18, 8_044),
     "diagnosis": (38.21, 4_706),
     "cli": (21.70, 3_007),
     "report": (22.37, 2_892),

@@ -41,7 +41,11 @@ _TAPS, _KAISER, _REACH = 24, 9.0, 0.4
 _ALIKE = 1e-3
 #: A reading by the cubic through the two on either side of it.
 _CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6
-#: Passes in which single bad readings are looked for: some stand behind others.
+#: What is left of one bad reading of size one, and of good ones about it, after that.
+_BAD_READING = np.array([0.0, 0.0, 1.0, 0.0, 0.0]) - _CUBIC
+#: Bad readings that are looked for, as places from the first one: alone, or two so near that one hides the other;
+_BAD = ((0,), (0, 1), (0, 2), (0, 3), (0, 4))
+#: and how often: some stand behind others.
 _PASSES = 3
 
 
@@ -163,18 +167,21 @@ def _rounding(time: FloatArray) -> float:
 
 
 def without_glitches(values: FloatArray) -> FloatArray:
-    """Readings (n,) without single ones that the two on either side contradict, where these agree without it."""
+    """Readings (n,) without bad ones that the two on either side contradict, where all agree without them."""
     values = np.array(values, dtype=float)
-    neighbours = np.array([-2, -1, 1, 2])[:, None]
-    for _ in range(_PASSES):
+    limit = 0.0
+    for places in _BAD * _PASSES:
         off = values - np.convolve(values, _CUBIC, "same")
-        limit = BAD_LIMIT * robust_deviation(off[np.isfinite(off)])
-        at = 4 + np.flatnonzero(np.abs(off[4:-4]) > limit)
-        remaining = off[at + neighbours] + _CUBIC[2 + neighbours] * off[at]
-        single = at[np.abs(remaining).max(axis=0) < limit]
-        if not len(single):
+        limit = limit or BAD_LIMIT * robust_deviation(off[np.isfinite(off)])
+        at = 4 + np.flatnonzero(np.abs(off[4:-8]) > limit)
+        if not len(at):
             break
-        values[single] -= off[single]
+        base = np.append(_BAD_READING, np.zeros(places[-1]))
+        pattern = np.transpose([np.roll(base, place) for place in places])  # what bad readings do to `off`
+        near = off[at[:, None] + np.arange(-2, places[-1] + 3)]
+        size = near @ np.linalg.pinv(pattern).T
+        is_bad = np.abs(near - size @ pattern.T).max(axis=1) < limit
+        values[at[is_bad, None] + places] -= size[is_bad]
     return values
 
 

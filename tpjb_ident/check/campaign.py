@@ -16,8 +16,9 @@ from tpjb_ident.arguments import as_campaign
 from tpjb_ident.check.findings import far, is_shared, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
+from tpjb_ident.check.probe_readings import check_positions, check_shaft_lines
 from tpjb_ident.check.rig_fit import rig_fit
-from tpjb_ident.check.run_gain import check_agreement, check_film, check_positions, check_shaft_lines, point_runs
+from tpjb_ident.check.run_gain import check_agreement, check_film, point_runs
 from tpjb_ident.check.sensor_axes import check_cells, check_probes
 from tpjb_ident.check.set_points import (
     check_excitation,

@@ -77,8 +77,8 @@ class Reporter:
     run: Run
     findings: list[Finding] = field(default_factory=list)
     cells_doubted: bool = False  #: what they show is held against nothing any more
-    #: by channel: deviations of its gain and its axis [rad]; of its gain in this run
-    doubted: dict[str, tuple[float, float]] = field(default_factory=dict)
+    #: by channel: deviations of its gain, its axis [rad], its low corner [Hz]; of its gain in this run
+    doubted: dict[str, tuple[float, ...]] = field(default_factory=dict)
     off: dict[str, float] = field(default_factory=dict)
 
     def copy(self) -> Reporter:
@@ -163,7 +163,7 @@ class Verdicts:
     shared: dict[str, list[Problem]] = field(default_factory=dict)
     doubtful: dict[str, list[Problem]] = field(default_factory=dict)
     run_gains: dict[str, list[Problem]] = field(default_factory=dict)
-    doubted: dict[str, tuple[float, float]] = field(default_factory=dict)  #: as of `Reporter`
+    doubted: dict[str, tuple[float, ...]] = field(default_factory=dict)  #: as of `Reporter`
     off: dict[tuple[str, str], float] = field(default_factory=dict)  #: the same, by run and channel
     swept: dict[tuple[str, str], float] = field(default_factory=dict)  #: m: half a probe's travel, by sweep and probe
 
@@ -208,11 +208,6 @@ def verdicts(reports: Sequence[Reporter]) -> Verdicts:
     return result
 
 
-def plane_of(channels: Sequence[Channel]) -> FloatArray:
-    """Matrix (2, m) from one reading per channel to X, Y."""
-    return inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
-
-
 def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple[str, FloatArray]]:
     """Every simple mending of two channels' readings, as a matrix on X and Y, with the fault in words."""
     if len(channels) != 2:
@@ -227,7 +222,7 @@ def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple
     for factor, size in ((0.1, "large"), (10.0, "small")) if scales else ():
         faults.append((f"{first} read ten times too {size}", np.diag([factor, 1.0])))
         faults.append((f"{second} read ten times too {size}", np.diag([1.0, factor])))
-    plane = plane_of(channels)
+    plane = inverse_directions(channels)
     for words, matrix in faults:
         yield words, plane @ matrix @ np.linalg.inv(plane)
 

@@ -18,8 +18,8 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
-from rigdata.vector import Directed, directions
-from tpjb_ident.check.findings import Reporter, plane_of
+from rigdata.vector import Directed, directions, inverse_directions
+from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.signals import ALWAYS_NEEDED, check_clock, check_signal, needed
 from tpjb_ident.conditions import Conditions
 from tpjb_ident.errors import TpjbError
@@ -304,7 +304,7 @@ def _at_rest(phasors: RunPhasors) -> frozenset[str]:
     if not phasors.z.size or len(cells) < 2 or len(accelerometers) < 2:
         return frozenset()
     line = np.nan_to_num(phasors.z[:, 0])
-    force = line[:, cells] @ plane_of([phasors.channels[k] for k in cells]).T
+    force = line[:, cells] @ inverse_directions([phasors.channels[k] for k in cells]).T
     along = directions([phasors.channels[k].axis or 0.0 for k in accelerometers])
     push = np.median(np.abs(force @ along.T), axis=0)
     missed = _NO_INERTIA * np.median(np.linalg.norm(force, axis=1))

@@ -8,8 +8,8 @@ import numpy as np
 
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError
-from rigdata.vector import directions
-from tpjb_ident.check.findings import explanation, far, indefiniteness, plane_of, pointing, repairs
+from rigdata.vector import directions, inverse_directions
+from tpjb_ident.check.findings import explanation, far, indefiniteness, pointing, repairs
 from tpjb_ident.check.observation import NO_NOISE, Observation
 from tpjb_ident.clearance.sweep import sweep_samples
 from tpjb_ident.errors import BadInputError
@@ -107,8 +107,8 @@ def _check_sweep(observation: Observation) -> None:
     samples = observation.samples[np.isfinite(observation.samples[:, [*cells, *probes]]).all(axis=1)]
     if min(len(cells), len(probes)) < 2 or len(samples) < 20:
         return
-    load, readings = samples[:, cells] @ plane_of(observation.of("force")).T, samples[:, probes]
-    gain = _gain(load, readings @ plane_of(observation.of("displacement")).T)
+    load, readings = samples[:, cells] @ inverse_directions(observation.of("force")).T, samples[:, probes]
+    gain = _gain(load, readings @ inverse_directions(observation.of("displacement")).T)
     if gain is None or not _is_pushed(observation, gain):
         return
     load = load - load.mean(axis=0)

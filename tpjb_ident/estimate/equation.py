@@ -30,7 +30,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
-from rigdata.vector import Directed, directions, plane_vector
+from rigdata.vector import Directed, directions, levers, plane_vector
 from tpjb_ident.conditions import Conditions
 
 
@@ -40,10 +40,11 @@ class Sensor(Channel):
 
     corner_uncertainty: float = 0.0  #: Hz: of a low corner that nobody states, one deviation
 
-    def doubted(self, gain: float, turn: float = 0.0) -> Sensor:
-        """The sensor, its gain and axis [rad] known no better than this."""
-        uncertainty = max(self.uncertainty or 0.0, gain) or None
-        return replace(self, uncertainty=uncertainty, axis_uncertainty=max(self.axis_uncertainty, turn))
+    def doubted(self, gain: float, turn: float = 0.0, corner: float = 0.0) -> Sensor:
+        """The sensor, its gain, axis [rad] and low corner [Hz] known no better than this."""
+        uncertainty, corner = max(self.uncertainty or 0.0, gain) or None, max(self.corner_uncertainty, corner)
+        turn = max(self.axis_uncertainty, turn)
+        return replace(self, uncertainty=uncertainty, axis_uncertainty=turn, corner_uncertainty=corner)
 
 
 @dataclass(frozen=True)
@@ -104,20 +105,13 @@ class Rig(Directed):
         return directions([sensor.axis or 0.0 for sensor in self.channels])
 
     @property
-    def levers(self) -> FloatArray:
-        """Distance of the probes from the film's mid-plane, (m,) [m]; 0 of those that all stand in one plane."""
-        probes = self.pick("displacement")
-        planes = {self.channels[j].plane for j in probes}
-        return np.array([s.plane * (j in probes and len(planes) > 1) for j, s in enumerate(self.channels)])
-
-    @property
     def spare(self) -> BoolArray:
         """Whether a sensor is one of more than two of its quantity, (m,): they tell what is wrong with one of them."""
         return np.array([len(self.pick(sensor.quantity)) > 2 for sensor in self.channels])
 
-    def doubting(self, doubted: Mapping[str, tuple[float, float]]) -> Rig:
-        """The rig, gains and axes [rad] of some sensors, by their names, known no better than this."""
-        return replace(self, channels=tuple(s.doubted(*doubted.get(s.name, (0.0, 0.0))) for s in self.channels))
+    def doubting(self, doubted: Mapping[str, tuple[float, ...]]) -> Rig:
+        """The rig, gains, axes [rad] and corners [Hz] of some sensors, by their names, known no better than this."""
+        return replace(self, channels=tuple(s.doubted(*doubted.get(s.name, (0.0,))) for s in self.channels))
 
     def __len__(self) -> int:
         return len(self.channels)
@@ -216,7 +210,7 @@ def vector(rig: Rig, blocks: Blocks, quantity: str) -> ComplexArray:
     """X and Y of a quantity by least squares over its sensors, (n, 2); NaN without two directions."""
     rows = rig.pick(quantity)
     readings = np.where(blocks.present[:, rows], blocks.z[:, rows], np.nan)
-    return plane_vector(blocks.along[:, rows], readings)
+    return plane_vector(blocks.along[:, rows], readings, levers([rig.channels[j] for j in rows]))
 
 
 def film_force(rig: Rig, blocks: Blocks) -> ComplexArray:

@@ -41,10 +41,11 @@ def covariance(rig: Rig, blocks: Blocks, state: State, scatter: FloatArray, hous
     n, m = blocks.z.shape
     N = np.zeros((n, m + HOUSING_ROWS, m + HOUSING_ROWS), complex)
     N[:, :m, :m] = blocks.noise
-    diagonal = np.arange(m)
-    N[:, diagonal, diagonal] += (_LEAST * np.abs(blocks.z)) ** 2 + np.where(blocks.present, 0.0, 1.0)
     acceleration = np.linalg.norm(state.u[:, 2:], axis=1)
     scale = (blocks.omega**2) * np.linalg.norm(state.u[:, :2], axis=1)
+    size, accelerometers, diagonal = np.abs(blocks.z), rig.pick("acceleration"), np.arange(m)
+    size[:, accelerometers] = np.maximum(size[:, accelerometers], scale[:, None])  # some show rounding alone
+    N[:, diagonal, diagonal] += (_LEAST * size) ** 2 + np.where(blocks.present, 0.0, 1.0)
     size = acceleration if rig.mount != "unknown" else scale
     variance = (housing * size) ** 2 + (_LEAST * scale) ** 2 + 1e-30
     N[:, m, m], N[:, m + 1, m + 1] = variance, variance

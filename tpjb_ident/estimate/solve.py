@@ -49,7 +49,7 @@ class Table:
     ) -> None:
         self.terms, self._shared = list(terms), row is None
         ends = np.cumsum([0] + [term.width for term in terms]).tolist()
-        self.mean, deviation = np.zeros((rows, ends[-1])), np.ones((rows, ends[-1]))
+        self.mean, begin, deviation = (np.full((rows, ends[-1]), usual) for usual in (0.0, 0.0, 1.0))
         self.always, self.never = np.zeros((2, rows, ends[-1]), dtype=bool)
         self._place: dict[str, tuple[IntArray, slice]] = {}
         for term, first, last in zip(terms, ends, ends[1:]):
@@ -60,11 +60,12 @@ class Table:
             mean = [p.mean for p in term.parameters] if known is None else known.value
             spread = [p.deviation for p in term.parameters] if known is None else known.deviation
             self.mean[place] = np.reshape(mean, (-1, term.width))
+            begin[place] = np.reshape(term.start or mean, (-1, term.width)) if known is None else self.mean[place]
             deviation[place] = np.maximum(np.reshape(spread, (-1, term.width)), _LEAST)
             self.always[place] = term.always_estimated and known is None
             self.never[place] = term.never_estimated or known is not None
         self.precision = 1 / deviation**2
-        self.value = self.mean.copy()
+        self.value = begin
 
     def of(self, term: Term, values: FloatArray | BoolArray) -> FloatArray:
         """A term's part of values (rows, columns), in the order of its parameters."""

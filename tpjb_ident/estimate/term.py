@@ -76,6 +76,8 @@ class Term:
         None: the term does not apply to the campaign.
     points : tuple of int
         Points that each have as many of the parameters for their own, in this order; none where all points share them.
+    start : tuple of float
+        Where steps to the parameters begin; none: at their means.
     always_estimated : bool
         Whether its parameters are estimated however little the records tell; else only where they tell clearly more
         than the prior.
@@ -101,6 +103,7 @@ class Term:
     never_estimated = False
     parameters: tuple[Parameter, ...] = ()
     points: tuple[int, ...] = ()
+    start: tuple[float, ...] = ()
     contradiction = ""
     gross = np.inf
     sentence = ""

@@ -9,7 +9,9 @@ linear makes of the shaft's own motion stands at X - f and 2X - f, and is no ima
 
 A low-pass that nobody stated shows in the noise: flat up to its corner, then falling steeply, in all channels of a
 quantity alike, while all others by the same device stay flat. Coloured noise has no flat part below its fall, or rises
-before it; where a housing on soft cells is shaken, accelerometers show it as well.
+before it; where a housing on soft cells is shaken, accelerometers show it as well. Where others are not flat, forces
+all around move the rig: a mass answers them with 12 dB an octave less motion at the most, and what falls by more beside
+the other quantities is behind a filter, also a single channel.
 """
 
 from collections.abc import Mapping, Sequence
@@ -51,8 +53,9 @@ _IMAGES = 20
 #: at most, and bins of the lowest.
 _UNFILTERED, _LEAST_OCTAVES, _OCTAVES, _LEAST_BINS = 0.45, 5, 8, 20
 #: Noise behind a filter [dB]: fall up to the highest octave (none in 270 good campaigns beside channels that are flat;
-#: rounding ends it at 15 to 21), the steepest fall from one to the next (1/f noise: 3), change of what is flat.
-_FALL, _STEEP, _FLAT = 10.0, 7.0, 3.0
+#: rounding ends it at 15 to 21), the steepest fall from one to the next (1/f noise: 3), change of what is flat; the
+#: steepest beyond that of other quantities that a mass makes (7 in 350 good campaigns).
+_FALL, _STEEP, _FLAT, _INERTIA = 10.0, 7.0, 3.0, 12.0
 #: Excitation over the corner, below which a filter turns it by less than a degree.
 _NEAR_CORNER = 0.01
 
@@ -232,12 +235,17 @@ def unstated_filters(result: RunPhasors, records: Sequence[WholeRecord]) -> Cond
         level = 20 * np.log10([np.median(np.maximum(np.abs(part), np.finfo(float).tiny), axis=0) for part in parts])
         falls = level[:2].mean(axis=0) - level
         steps, corner = np.diff(falls, axis=0), len(falls) - np.argmax(falls[::-1] <= _FLAT, axis=0)
-        filtered = (falls[-1] > _FALL) & (steps.max(axis=0) > _STEEP) & (falls.min(axis=0) > -_FLAT)
-        filtered &= (corner > 1) & (np.abs(steps[0]) < _FLAT)
-        plain = {c.quantity for c, is_filtered in zip(channels, filtered) if not is_filtered}
-        suspects = [k for k, c in enumerate(channels) if c.quantity not in plain and not c.response]
+        steepest, quantity = steps.max(axis=0), np.array([channel.quantity for channel in channels])
+        falling = (falls[-1] > _FALL) & (falls.min(axis=0) > -_FLAT)
+        beyond = [steepest[k] - steepest[quantity != quantity[k]].max(initial=0.0) for k in range(len(channels))]
+        filtered = falling & (steepest > _STEEP) & (corner > 1) & (np.abs(steps[0]) < _FLAT)
         flat = np.abs(falls).max(axis=0) < _FLAT
-        if suspects and flat.any() and (flat | filtered).all():
+        if flat.any() and (flat | filtered).all():
+            suspect = filtered & ~np.isin(quantity, quantity[~filtered])
+        else:
+            suspect = falling & (np.array(beyond) > _INERTIA)
+        suspects = [k for k in np.flatnonzero(suspect) if not channels[k].response]
+        if suspects:
             edge, names = octaves[corner[suspects].max()], ", ".join(channels[k].name for k in suspects)
             name = "filter-unstated" if max(result.lines.driven) > _NEAR_CORNER * edge else "filter-above-excitation"
             return (Condition(name, f"the noise of {names} falls from about {edge:.0f} Hz on"),)

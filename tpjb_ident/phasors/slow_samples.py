@@ -155,8 +155,10 @@ def live_run(run: Run) -> Run:
     for quantity in ("force", "displacement"):
         alike = [name for name, c in run.channels.items() if c.quantity == quantity]
         repeated = 0.0  # largest share of readings equal to the one before, apart from the longest stretch
-        for s in (statistics[name] for name in alike if not statistics[name].constant):
-            repeated = max(repeated, (s.repeats - s.longest_flat + 1) / max(s.values - s.longest_flat, 1))
+        for name in alike:
+            s = statistics[name]
+            if not s.constant:
+                repeated = max(repeated, (s.repeats - s.longest_flat + 1) / max(s.values - s.longest_flat, 1))
         # else noise is below a converter's step, and standing still is usual
         if repeated <= _NOISE_FREE:
             problems += [_problem(run, name, statistics[name]) for name in alike if stands_still(statistics[name])]

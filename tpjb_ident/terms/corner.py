@@ -3,7 +3,7 @@
 Data sheets put it at some tenths of a hertz up to a few (charge amplifiers 0.001 to 1 Hz, inputs coupled by a capacitor
 0.5 to 3.4 Hz). Cells that show no static force have one: K times their lead goes into C. Accelerometers are asked for
 theirs where they lead what the springs make of the cells' force; over frequencies it falls, as no delay does. Cells
-never lag by a corner: where they seem to, the accelerometers lead.
+never lag by a corner: where they seem to, the accelerometers lead. Probes that show no mean in any run have one too.
 """
 
 from dataclasses import replace
@@ -30,6 +30,7 @@ class Corner(Factor):
         """Parameters and what goes with them."""
         self.sensors = np.zeros((len(rig), 0))
         asked = {"cells": ("force", not rig.static), "accelerometers": ("acceleration", rig.out_of_step)}
+        asked["probes"] = ("displacement", True)  # some are doubted
         for name, (quantity, applies) in asked.items():
             uncertain = np.array([s.corner_uncertainty * (s.quantity == quantity) for s in rig.channels])
             if uncertain.any() and applies:
@@ -46,7 +47,7 @@ class Corner(Factor):
 
     def learnt(self, rig: Rig, solution: Solution) -> Rig:
         """Accelerometers asked for theirs where the cells' is negative."""
-        if rig.out_of_step or not self.parameters or not rig.pick("acceleration"):
+        if rig.out_of_step or [p.name for p in self.parameters] != ["cells"] or not rig.pick("acceleration"):
             return rig
         fitted = solution.fitted[self.name]
         return replace(rig, out_of_step=True) if fitted.value[0] < -fitted.deviation[0] else rig

@@ -74,6 +74,13 @@ class Housing(Term):
                 Parameter("loss_x", "1", loss),
                 Parameter("loss_y", "1", loss),
             )
+            if rig.has_acceleration:
+                force, shown = (np.nan_to_num(vector(rig, blocks, q)) for q in ("force", "acceleration"))
+                pushes = -_NANOMETRE * (blocks.omega**2)[:, None] * force
+                springs, _, rank, _ = np.linalg.lstsq(pushes, shown, rcond=None)
+                if rank == 2:
+                    (xx, xy), (yx, yy) = springs.real.tolist()
+                    self.start = (xx, yy, (xy + yx) / 2, 0.0, 0.0)
         elif rig.mount == "unknown":
             self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
         elif rig.has_acceleration:

@@ -67,9 +67,9 @@ def judge_states(
     # a bad run is replaced by a later one of the same test that is better
     done = [status for status in states if status.counts]
     for number, status in enumerate(states):
-        better = [d for d in done if _test(d.run) == _test(status.run) and d.landed >= status.landed]
-        if status.state == "repeat" and better:
-            states[number] = replace(status, state="replaced")
+        for later in done if status.state == "repeat" else ():
+            if _test(later.run) == _test(status.run) and later.landed >= status.landed:
+                states[number] = replace(status, state="replaced")
     return states, common
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import butter, lfilter
 
 from tests.rigs import closed_form as cf
-from tests.rigs.acquisition import Acquisition, Campaign, Channel, Fault
+from tests.rigs.acquisition import EXACT, GAP_VOLTS, VOLTS_PER_METRE, Acquisition, Campaign, Channel, Fault
 from tests.studies.field import marched as mr
 
 Entries = dict[str, Any]
@@ -45,6 +45,8 @@ AT_320: Entries = {"rate": 320.0, "extra": ('sample_rate = "320 Hz"',)}
 TIME_2 = (Channel("Time 2", "time", 0.0, rate=250.0, extra=CLOCK_B),)
 
 
+#: Reading of a probe that gives no volts [m].
+NO_VOLTS = GAP_VOLTS / VOLTS_PER_METRE
 #: What sensors and loggers do to values v [SI], by name; r is a generator, i the number of the run.
 FAULTS: dict[str, Fault] = {
     "dead": lambda v, r, i: 1e-6 * v.std() * r.standard_normal(len(v)),
@@ -58,6 +60,9 @@ FAULTS: dict[str, Fault] = {
     "slip": lambda v, r, i: np.concatenate([v[: 4400 + 40 * i], v[4408 + 40 * i :], v[-8:]]),  # 8 samples are lost
     "every other": lambda v, r, i: v * (1.15 if i % 2 else 1.0),
     "every third": lambda v, r, i: v * (0.8 if i % 3 == 0 else 1.0),
+    "capacitor": lambda v, r, i: (
+        NO_VOLTS + lfilter(*butter(1, 1.0, "high", fs=2000.0), np.append(v, v) - v.mean())[-len(v) :]
+    ),
     "input": lambda v, r, i: lfilter(*butter(1, 1.0, "high", fs=2000.0), v - v[0]),
     "second four": lambda v, r, i: v * (1.1 if 4 <= i < 8 else 1.0),
     "first four": lambda v, r, i: v * (7.87 / 7.78 if i < 4 else 1.0),
@@ -164,6 +169,7 @@ def good_records() -> list[Condition]:
     image, slow = {"frequencies": (37.0, 61.0)}, {"rate": 250.0, "extra": CLOCK_B}
     spline = {"rate": 250.0, "fill": "spline", "fault": FAULTS["rounded"]}
     drift = {"drift": 4e-4, "extra": DRIFT}
+    exact = {"uncertainty": EXACT}
     late = {"late": 3e-4, "extra": ('delay_uncertainty = "0.3 ms"',)}
     return [
         rig("cells at 320 Hz in columns of their own", ("L1", AT_320), **image),
@@ -180,6 +186,7 @@ def good_records() -> list[Condition]:
         rig("cells late by 0.3 ms, +-0.3 ms stated", ("L1", late), limits=WIDE),
         rig("accelerometers late by 0.3 ms, +-0.3 ms stated", ("A1", late)),
         rig("probes late by 0.4 ms, stated", ("X1", {"late": 4e-4, "extra": ('delay = "0.4 ms"',)})),
+        rig("probes behind capacitors", ("X1", {"fault": FAULTS["capacitor"]}), limits=WIDE, setup=exact),
         rig("a probe drifts by 0.04 %/K, stated", ("X1A", drift), temperatures=(30.0, 60.0)),
         rig("described twice, for some runs", ("X1A", {"extra": FOR_RUNS, "fault": FAULTS["first four"]})),
         rig("shaft turns clockwise", head=("[shaft]", 'rotation = "clockwise"')),

@@ -140,8 +140,7 @@ def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
         if points:
             c.show_table(points_table(points), name)
     steps = [step.text for step in snapshot.steps]
-    problems = [str(problem) for problem in snapshot.problems]
-    lines = [*steps, *snapshot.lacks, *problems, *snapshot.measured.refusals]
+    lines = [*steps, *snapshot.lacks, *map(str, snapshot.problems), *snapshot.measured.refusals]
     for line in lines:
         if line not in printed:
             c.print(line)
