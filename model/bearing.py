@@ -246,6 +246,16 @@ class Bearing:
         """Whether all pads have one kind and size of pivot."""
         return all(pad.pivot in (None, self.pivot) for pad in self.pads)
 
+    @property
+    def pivot_angles(self) -> tuple[float, ...]:
+        """Direction of every pad's pivot [rad]."""
+        return tuple(pad.pivot_angle for pad in self.pads)
+
+    @property
+    def clearances(self) -> tuple[float, ...]:
+        """Assembled clearance Cb of every pad [m]."""
+        return tuple(pad.assembled_clearance for pad in self.pads)
+
     def pivot_radius(self, pad: Pad) -> float:
         """R_P = journal radius + Cp + pad thickness [m] (docs/theory.md).
 

@@ -83,7 +83,7 @@ def _section(data: dict[str, Any], key: str, name: str) -> dict[str, Any]:
             raise BearingError(f"{name}, {key}: must be a table, got {section!r}. Write it as [{key}].")
     inside = f"{key}." if key else ""
     tables = [child.removeprefix(inside) for child in _KEYS if child and child.startswith(inside)]
-    keys = set(_KEYS[key]) | {child.split(".")[0] for child in tables}
+    keys = {*_KEYS[key], *(child.split(".")[0] for child in tables)}
     for unknown in set(section) - keys:
         place = f"[{key}] {unknown}" if key else f"[{unknown}]" if isinstance(section[unknown], dict) else unknown
         raise BearingError(f"{name}, {place}: unknown key. {hint(unknown, sorted(keys), 'Known keys:')}")
@@ -131,22 +131,17 @@ def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
 
     count = len(angles)
     defaults = {"pivot_offset": 0.5, "elastic_thickness": pads["thickness"], "babbitt_thickness": 0.0}
-    sizes = {}
+    sizes: dict[str, Any] = {"pivot_angle": angles}
     for section, key in _PAD_SIZES:
         value = values[section].get(key, defaults.get(key, 0.0))
         sizes[key] = _per_pad(value, count, f"{name}, [{section}] {key}")
     pivots = _pivots(values["pivot"], count, name)
-    return tuple(
-        Pad(
-            pivot_angle=angles[k],
-            **{key: column[k] for key, column in sizes.items()},
-            back_convection=pads.get("back_convection", 50.0),
-            backing=Material(**values["pads.backing"]) if values["pads.backing"] else STEEL,
-            babbitt=Material(**values["pads.babbitt"]) if values["pads.babbitt"] else BABBITT,
-            pivot=pivots[k] if len(set(pivots)) > 1 else None,
-        )
-        for k in range(count)
-    )
+    if len(set(pivots)) > 1:
+        sizes["pivot"] = pivots
+    backing = Material(**values["pads.backing"]) if values["pads.backing"] else STEEL
+    babbitt = Material(**values["pads.babbitt"]) if values["pads.babbitt"] else BABBITT
+    alike = {"back_convection": pads.get("back_convection", 50.0), "backing": backing, "babbitt": babbitt}
+    return tuple(Pad(**dict(zip(sizes, size)), **alike) for size in zip(*sizes.values()))
 
 
 def _per_pad(value: Any, count: int, place: str) -> tuple[float, ...]:

@@ -238,7 +238,9 @@ def _part_options() -> dict[str, Any]:
     class PartCompiler(CompilerBase):  # type: ignore[misc]
         def define_pipelines(self) -> list[Any]:
             passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-            passes.passes = [(PartLowering if p is NativeLowering else p, text) for p, text in passes.passes]
+            for place, (step, text) in enumerate(passes.passes):
+                if step is NativeLowering:
+                    passes.passes[place] = PartLowering, text
             passes.finalize()
             return [passes]
 

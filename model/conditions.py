@@ -7,9 +7,12 @@ from typing import Any
 
 from rigdata.problem import Condition
 
-_LISTED: dict[Any, dict[str, str]] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
-#: Every condition by its name, with places for pads and a number.
-KINDS = {name: (severity, detail) for severity, kinds in _LISTED.items() for name, detail in kinds.items()}
+_LISTED = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+#: Severity and meaning of every condition by its name, with places for pads and a number.
+KINDS: dict[str, Any] = {}
+for _severity, _kinds in _LISTED.items():
+    for _kind, _meaning in _kinds.items():
+        KINDS[_kind] = _severity, _meaning
 
 
 def named(kind: str, pads: Sequence[int] = (), number: float | str = 0.0) -> Condition:
@@ -28,7 +31,11 @@ def conditions_of(table: Iterable[tuple[Any, ...]]) -> tuple[Condition, ...]:
 def pads_of(kind: str, conditions: Iterable[Condition]) -> tuple[int, ...]:
     """Pads (from 1) that conditions of a kind name."""
     start, _, end = kind.partition("{pads}")
-    return tuple(pad for c in conditions if c.startswith(start) and c.endswith(end) for pad in c.pads)
+    pads: tuple[int, ...] = ()
+    for condition in conditions:
+        if condition.startswith(start) and condition.endswith(end):
+            pads += condition.pads
+    return pads
 
 
 def has_answer(conditions: Iterable[Condition]) -> bool:

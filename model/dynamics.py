@@ -276,7 +276,7 @@ def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexA
     if any(setup.series_compliance):
         # of C and h both may be singular: (1 + h C)^-1 h needs neither inverse
         h = np.linalg.solve(_UNIT + h @ setup.structure, h).astype(np.complex128, copy=False)
-    k, c = (np.reshape(v, (2, 2)) for v in (setup.parallel_stiffness, setup.parallel_damping))
+    k, c = np.reshape([setup.parallel_stiffness, setup.parallel_damping], (2, 2, 2))
     return h + k + s * c
 
 

@@ -5,7 +5,6 @@ Cb and Cp alike; a housing that is hotter gives it to Cb; pads that are hotter t
 their larger radius to Cp. What pads grow above the oil's supply temperature, unevenly, is `model.pad.bending`.
 """
 
-import math
 from dataclasses import dataclass, replace
 
 from model.bearing import Bearing, BearingError, Pad
@@ -23,7 +22,7 @@ class Growth:
 
     def __post_init__(self) -> None:
         temperatures = [t for t in (self.reference, self.housing, self.journal) if t is not None]
-        if not all(math.isfinite(t) and -50.0 <= t <= 300.0 for t in temperatures):
+        if not all(-50.0 <= t <= 300.0 for t in temperatures):
             raise OptionError(f"temperatures of Growth must lie between -50 and 300 degC, got {temperatures}")
         if len(self.expansion) != 2 or not all(0.0 <= a < 1e-4 for a in self.expansion):
             raise OptionError(f"expansion must be two numbers from 0 to 1e-4 1/K, got {self.expansion!r}")

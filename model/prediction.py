@@ -135,8 +135,7 @@ class Prediction:
             "excitation_Hz": self._frequencies,
         }
         for values, kind, unit in ((self.k, "k", "N_per_m"), (self.c, "c", "Ns_per_m")):
-            columns = values.reshape(-1, 4).T
-            for at, column in zip(("xx", "xy", "yx", "yy"), columns, strict=True):
+            for at, column in zip(("xx", "xy", "yx", "yy"), values.reshape(-1, 4).T, strict=True):
                 table[f"{kind}{at}_{unit}"] = column
         x, y = self.position
         return pd.DataFrame(table | {"x_m": x, "y_m": y, "status": "; ".join(self.status)})
@@ -211,8 +210,7 @@ class Prediction:
     @property
     def max_temperature(self) -> float:
         """Hottest film of a pad that carries [degC], anywhere across it."""
-        films = [f for f in self._films if not f.idle]
-        return max((f.hottest for f in films), default=self.setup.inlet_temperature)
+        return max((f.hottest for f in self._films if not f.idle), default=self.setup.inlet_temperature)
 
     @property
     def min_film(self) -> float:
@@ -247,8 +245,7 @@ class Prediction:
         """S = mu N D L / W (R / Cb)^2, N in rev/s, mu of the oil that enters, Cb the mean of the pads."""
         bearing, clearance = self.setup.bearing, self._clearance
         viscosity = float(bearing.oil.viscosity(self.setup.inlet_temperature))
-        turns = self.speed / math.tau
-        size = viscosity * turns * bearing.journal_diameter * bearing.length
+        size = viscosity * self.speed / math.tau * bearing.journal_diameter * bearing.length
         return size * (bearing.journal_radius / clearance) ** 2 / self.load if self.load > 0.0 else math.inf
 
     @property
@@ -260,8 +257,7 @@ class Prediction:
     def attitude_angle(self) -> float:
         """Angle from the load's direction to that of the journal [rad], positive with rotation, within +-pi."""
         x, y = self.bearing_position
-        turn = self._sense * (math.atan2(y, x) - self.load_direction)
-        return (turn + math.pi) % math.tau - math.pi
+        return (self._sense * (math.atan2(y, x) - self.load_direction) + math.pi) % math.tau - math.pi
 
     @property
     def _sense(self) -> float:
@@ -270,8 +266,8 @@ class Prediction:
 
     @property
     def _clearance(self) -> float:
-        pads = self.setup.bearing.pads
-        return sum(p.assembled_clearance for p in pads) / len(pads) + self.setup.clearance_change
+        clearances = self.setup.bearing.clearances
+        return sum(clearances) / len(clearances) + self.setup.clearance_change
 
     @property
     def power_loss(self) -> float:
@@ -299,7 +295,7 @@ class Prediction:
     @property
     def pad_matrices(self) -> tuple[PadMatrices, ...]:
         """Full matrices of the pads that carry, Eq. (11) and (12), in the frame of `equilibrium`."""
-        return tuple(PadMatrices(*parts) for parts in zip(*pad_matrices(self.setup, self._films), strict=True))
+        return tuple(PadMatrices(*parts) for parts in zip(*pad_matrices(self.setup, self._films)))
 
     @functools.cached_property
     def mesh_error(self) -> float:

@@ -27,7 +27,7 @@ def polygon_sides(setup: Setup, push_load: float) -> tuple[FloatArray, FloatArra
     """
     towards = np.array([pad.normal for pad in setup.bearing.pads])
     normals = towards @ np.linalg.inv(setup.instruments.displacement_map(0.0).real)
-    distance = np.array([pad.assembled_clearance for pad in setup.bearing.pads])
+    distance = np.array(setup.bearing.clearances)
     distance += [law.deflection(push_load) for law in setup.pivots]
     distance += push_load * np.sum(towards @ setup.structure * towards, axis=1)
     return distance / np.hypot(*normals.T), np.arctan2(normals[:, 1], normals[:, 0])

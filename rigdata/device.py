@@ -194,7 +194,9 @@ def _own_first(grids: Iterable[Grid], channels: Channels) -> list[Grid]:
 
 def by_clock(grids: Iterable[Grid], channels: Channels) -> tuple[Device, ...]:
     """Devices of a run: grids split by clock, that of the first probe first."""
-    grid_of = {name: grid for grid in grids for name in grid.channels}
+    grid_of = {}
+    for grid in grids:
+        grid_of.update(dict.fromkeys(grid.channels, grid))
     groups = defaultdict(list)
     for name in first_probe_first(channels):
         if name in grid_of:

@@ -61,9 +61,10 @@ class Problem:
         # Names and cells come from strangers' files: control and direction marks must not steer a terminal.
         for name in ("file", "place", "what", "cure"):
             text = getattr(self, name)
-            if not text.isprintable():
-                letters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
-                object.__setattr__(self, name, "".join(letters))
+            for letter in set(text) - {"\n"}:
+                if not letter.isprintable():
+                    text = text.replace(letter, letter.encode("unicode_escape").decode())
+            object.__setattr__(self, name, text)
 
     def __str__(self) -> str:
         location = f"{self.file}, {self.place}" if self.place else self.file
@@ -122,8 +123,12 @@ def gathered(problems: Iterable[Problem]) -> Iterator[Problem]:
         if len(repeats) + 1 < ALIKE:
             yield from (first, *repeats)
             continue
-        places = dict.fromkeys(p.place.split(",")[0] if p.severity == "error" else p.run or p.file for p in repeats)
-        times = f"{len(repeats)} more times, such as {', '.join([*places][:3])}"
+        places = []
+        for p in repeats:
+            place = p.place.split(",")[0] if p.severity == "error" else p.run or p.file
+            if place not in places:
+                places.append(place)
+        times = f"{len(repeats)} more times, such as {', '.join(places[:3])}"
         yield replace(first, what=f"{first.what} (the like {times})")
 
 

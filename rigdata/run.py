@@ -85,7 +85,9 @@ class Run(RunDescription):
         separate_names = self.reader.apart()
         if not separate_names.intersection(names):
             return False
-        devices = {name: device for device in self.devices for name in device.channels}
+        devices = {}
+        for device in self.devices:
+            devices.update(dict.fromkeys(device.channels, device))
         rates = {(devices[name].rate, devices[name].length) for name in names if name in devices}
         if not separate_names.issuperset(names) or len(rates) > 1:
             listed = ", ".join(f"{name} ({devices[name].rate:.6g} Hz)" for name in names if name in devices)
@@ -324,5 +326,4 @@ def speed_from_pulses(readings: FloatArray, time: FloatArray) -> FloatArray:
     pulses = pulse_times(readings, time)
     if len(pulses) < 2:
         return np.full(len(readings), np.nan)
-    speeds = 2 * np.pi / np.diff(pulses)
-    return np.interp(time, 0.5 * (pulses[1:] + pulses[:-1]), speeds)
+    return np.interp(time, 0.5 * (pulses[1:] + pulses[:-1]), 2 * np.pi / np.diff(pulses))

@@ -69,7 +69,7 @@ def least_clearance(campaign: Campaign, warn: Callable[[str], Any]) -> float | N
     except BearingError as error:  # coefficients need no bearing
         warn(f"{error} Until then the amplitude is not held against the clearance.")
         return None
-    return min(pad.assembled_clearance for pad in bearing.pads)
+    return min(bearing.clearances)
 
 
 #: What arguments of these names may be.

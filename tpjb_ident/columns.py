@@ -40,7 +40,7 @@ _US = {
 }
 SYSTEMS = {"si": _SI, "us": _SI | _US}
 #: The system in use, which `use_units` sets.
-UNITS = dict(SYSTEMS["si"])
+UNITS = dict(_SI)
 
 
 def use_units(system: str) -> None:

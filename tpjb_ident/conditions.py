@@ -19,9 +19,9 @@ SEVERITIES = get_args(problem.Severity)
 #: What is to be said of one thing, in order.
 Conditions = tuple["Condition", ...]
 #: Lines that may stand on the excitation beside those of the list: higher harmonics, and lines found in the record.
-_LINES = [f"{n}X" for n in range(4, 11)]
-_LINES += [f"{kind} {n}" for kind in ("mains", "harmonic") for n in range(2, 11)]
-_LINES.append("found")
+_LINES = ["found", *(f"{n}X" for n in range(4, 11))]
+for _n in range(2, 11):
+    _LINES += [f"mains {_n}", f"harmonic {_n}"]
 
 
 class UnknownConditionError(LookupError):

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Unit in a column's name: the quantity whose unit people read.
-_DISPLAYED = {**{kind.suffix: kind.quantity for kind in KINDS.values()}, "N": "load", "m": "length", "Pa": "pressure"}
+_DISPLAYED = {kind.suffix: kind.quantity for kind in KINDS.values()} | {"N": "load", "m": "length", "Pa": "pressure"}
 _NAMES = re.compile(rf"(.+?)_({'|'.join(_DISPLAYED)}|deg|Hz|degC|K)((?:_[a-z0-9]+)*)")
 #: Columns of coefficients that not only scripts want.
 _FOR_PEOPLE = re.compile(
@@ -75,12 +75,13 @@ def json_data(value: Any) -> Any:
     """A result as JSON can hold it: numbers that it cannot hold become null, what it does not know a text."""
     if isinstance(value, Mapping):
         return {str(k): json_data(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, list | tuple):
         return [json_data(v) for v in value]
-    value = value.item() if hasattr(value, "dtype") else value
+    if hasattr(value, "dtype"):
+        value = value.item()
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return value if isinstance(value, (str, int, bool)) or value is None else str(value)
+    return value if isinstance(value, str | int) or value is None else str(value)
 
 
 def changed(settings: Any) -> str:

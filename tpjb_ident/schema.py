@@ -66,6 +66,14 @@ def coefficient_column(name: str) -> str:
     return KINDS[name[0]].column(name[1:])
 
 
+def with_endings(*endings: str) -> list[str]:
+    """Columns of K and C, row by row, each with every ending in turn: an interval's ends, a standard error."""
+    names: list[str] = []
+    for name in COEFFICIENT_COLUMNS:
+        names += [name + ending for ending in endings]
+    return names
+
+
 #: Quantity of the unit that a name ends in.
 _QUANTITIES = {
     "N_per_m": "stiffness", "Ns_per_m": "damping", "N": "force", "kg": "mass", "m3_per_s": "flow", "m": "length",
@@ -112,14 +120,14 @@ class Column:
         """Regular expression of the names that this column stands for."""
         name = re.escape(self.name).replace(r"\{e\}", "(xx|xy|yx|yy)").replace("padN", r"pad\d+")
         name = name.replace("_N_K", r"_\d+_K")
-        return name + ("(" + "|".join(re.escape(e) for e in self.endings) + ")?" if self.endings else "")
+        return name + (f"({'|'.join(self.endings)})?" if self.endings else "")
 
 
 def _listed() -> dict[str, tuple[Column, ...]]:
     """Columns of every table and group; a name that is that of one before it stands for all of its columns."""
     tables: dict[str, tuple[Column, ...]] = {}
     text = Path(__file__).with_name("schema.csv").read_text(encoding="utf-8")
-    for table, name, endings, kind, meaning in list(csv.reader(text.splitlines()))[1:]:
+    for table, name, endings, kind, meaning in csv.reader(text.splitlines()[1:]):
         column = Column(name, meaning, kind or "text", tuple(endings.split()))
         tables[table] = tables.get(table, ()) + tables.get(name, (column,))
     return tables

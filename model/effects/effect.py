@@ -109,8 +109,8 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
 def _read_effect(table: Any, place: str) -> Effect:
     if not isinstance(table, dict) or not isinstance(table.get("name"), str):
         raise EffectError(f'{place}: has no name. Add name = "...".')
-    parameters = {k: v for k, v in table.items() if k != "name" and not isinstance(v, dict)}
+    entries = {key: value for key, value in table.items() if not isinstance(value, dict)}
     try:
-        return Effect(table["name"], **parameters)
+        return Effect(**entries)
     except ValueError as error:
         raise EffectError(f"{place}: {error}") from error

@@ -85,4 +85,6 @@ def load_library(path: str | Path) -> tuple[EffectKind, ...]:
     kinds = tuple(k for k in _defined(module) if known_effects().get(k.name) is not k)
     if not kinds:
         raise EffectError(f"{path}: defines no effect. Make an EffectKind with a name of its own.")
-    return tuple(register(kind) for kind in kinds)
+    for kind in kinds:
+        register(kind)
+    return kinds

@@ -145,9 +145,11 @@ def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWor
         "unknown": np.zeros((count, n)),
         "slopes": np.zeros((count, n, 4)),
     }
-    arrays |= {name: np.zeros(shape) for name in FilmWork._fields if name not in arrays}
+    for name in FilmWork._fields:
+        if name not in arrays:
+            arrays[name] = np.zeros(shape)
     stack = FilmWork(**arrays)
-    return stack, [FilmWork(*parts) for parts in zip(*stack, strict=True)]
+    return stack, [FilmWork(*parts) for parts in zip(*stack)]
 
 
 def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:

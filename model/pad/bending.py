@@ -65,7 +65,7 @@ def _pad_deformation(
     # rigid pads need no solid, and need not wait for its algebra
     from model.pad.operators import pad_operators
 
-    angle, z, area = (np.frombuffer(raw, dtype=float) for raw in (angles, zs, areas))
+    angle, z, area = (np.frombuffer(raw) for raw in (angles, zs, areas))
     ahead = 0
     if angle[0] - geometry.leading > 1e-9:  # a starved film: the dry arc ahead of it carries nothing
         ahead = _DRY_STATIONS

@@ -50,8 +50,7 @@ class Line:
             monomials = powers * local[:, None] ** np.maximum(powers - 1, 0) / size[:, None]
         shape = monomials @ np.linalg.inv(self._places[:, None] ** powers)
         out = np.zeros((points.size, self.n_nodes))
-        columns = element[:, None] * self.degree + powers
-        np.put_along_axis(out, columns, shape, axis=1)
+        np.put_along_axis(out, element[:, None] * self.degree + powers, shape, axis=1)
         return out
 
     @cached_property
@@ -65,7 +64,7 @@ class Line:
     def matrix(self, rows: int, columns: int, weight: FloatArray | float = 1.0) -> FloatArray:
         """Weighted product of basis functions or their derivatives."""
         points, factor = self.gauss
-        row_values, column_values = (self.tabulate(points, order) for order in (rows, columns))
+        row_values, column_values = self.tabulate(points, rows), self.tabulate(points, columns)
         return row_values.T @ ((factor * weight)[:, None] * column_values)
 
 

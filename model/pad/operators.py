@@ -95,7 +95,7 @@ class ElasticSector:
 
     def _lame(self) -> tuple[FloatArray, FloatArray]:
         """Lame's lambda and mu at the Gauss points across the thickness [Pa]."""
-        modulus, ratio = (self.mesh.at_gauss_points(name) for name in ("youngs_modulus", "poissons_ratio"))
+        modulus, ratio = self.mesh.at_gauss_points("youngs_modulus"), self.mesh.at_gauss_points("poissons_ratio")
         shear = modulus / (2.0 * (1.0 + ratio))
         return 2.0 * shear * ratio / (1.0 - 2.0 * ratio), shear
 

@@ -38,7 +38,7 @@ def unsupported(setup: Setup, load: FloatArray) -> bool:
     """
     if not load.any() or setup.rotational_stiffness > 0.0:
         return False
-    turns = np.array([pad.pivot_angle for pad in setup.bearing.pads]) - math.atan2(load[1], load[0])
+    turns = np.array(setup.bearing.pivot_angles) - math.atan2(load[1], load[0])
     aside = np.round((turns + math.pi) % math.tau - math.pi, 9)  # a pad in the load's way stands on both its sides
     return bool((aside % math.tau).min() + (-aside % math.tau).min() > math.pi - 1e-8)
 
@@ -98,11 +98,11 @@ def status_of(
 
 def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
     """Largest local Reynolds number rho U h / mu of all films, the idle pads' too; NaN where there is none."""
+    numbers = []
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # a lost film may be as hot as numbers go
-        numbers = [
-            float((f.work.density * f.work.thickness / f.work.viscosity).max()) * surface_speed
-            for f in films
-            if f.forces is not None
-        ]
-    numbers += [f.resting.reynolds for f in films if f.resting is not None]
+        for f in films:
+            if f.forces is not None:
+                numbers.append(float((f.work.density * f.work.thickness / f.work.viscosity).max()) * surface_speed)
+            if f.resting is not None:
+                numbers.append(f.resting.reynolds)
     return max((n for n in numbers if math.isfinite(n)), default=math.nan)

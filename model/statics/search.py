@@ -329,8 +329,8 @@ def _spread(coarse: tuple[int, int], fine: tuple[int, int], full_width: bool) ->
     """From a curve's mesh to a film's, along and across, where either is graded alike; a whole film is symmetric."""
     z = np.linspace(0.0, 1.0, fine[1])
     places = np.linspace(0.0, 1.0, fine[0]), np.abs(2.0 * z - 1.0) if full_width else z
-    hats = [
-        np.array([np.interp(x, np.linspace(0.0, 1.0, count), hat) for hat in np.eye(count)])
-        for x, count in zip(places, coarse, strict=True)
-    ]
+    hats = []
+    for x, count in zip(places, coarse):
+        nodes = np.linspace(0.0, 1.0, count)
+        hats.append(np.array([np.interp(x, nodes, hat) for hat in np.eye(count)]))
     return hats[0].T, hats[1]

@@ -68,7 +68,9 @@ def _complete(entry: Table, name: str, tables: dict[str, Table], read: dict[str,
         return False
     if model not in read:  # what is wrong with it has been said there
         return False
-    entry.data.update({k: v for k, v in tables[model].data.items() if k not in entry.data and k not in _PLACE})
+    for key, value in tables[model].data.items():
+        if key not in _PLACE:
+            entry.data.setdefault(key, value)
     return True
 
 

@@ -96,8 +96,9 @@ class Field:
         return f"Write it like {self.key} = {self.example}{bound}"
 
 
-_KEYS = tables_beside(__file__, "keys.toml").values()
-_TABLES = [tuple(Field(key, **entry) for key, entry in keys.items()) for keys in _KEYS]
+_TABLES = []
+for _keys in tables_beside(__file__, "keys.toml").values():
+    _TABLES.append(tuple(Field(key, **entry) for key, entry in _keys.items()))
 #: `RUNS_OF` is of one entry of `for`, besides all keys of a channel that it changes.
 TOP, SHAFT, HOUSING, ACQUISITION, CSV, CHANNEL, (RUNS_OF,), RUN = _TABLES
 KINDS = next(tuple(field.choices) for field in RUN if field.key == "kind")

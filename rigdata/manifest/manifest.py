@@ -108,7 +108,7 @@ def _band(table: Table, text: str | None) -> tuple[float, float] | None:
     low, _, high = text.partition("..")
     with table.noted("excitation_band", 'Give e.g. "5..120 Hz", lowest first'):
         _, unit = split_quantity(high, "frequency")
-        first, last = (parse_quantity(value, "frequency") for value in (f"{low} {unit}", high))
+        first, last = parse_quantity(f"{low} {unit}", "frequency"), parse_quantity(high, "frequency")
         if 0 < first < last < 1e12:
             return first, last
         raise UnitError(f"{shown(text)} is no band")

@@ -143,7 +143,10 @@ class RunReader(RecordFile):
     def _grid(self, name: str = "") -> Grid:
         """Channels at the times of `name`, which may be their clock; without one those of the run's own device."""
         grids = self._layout().grids
-        return next((grid for grid in grids if name and name in (grid.clock, *grid.channels)), grids[0])
+        for grid in grids:
+            if name and name in (grid.clock, *grid.channels):
+                return grid
+        return grids[0]
 
     def devices(self) -> tuple[Device, ...]:
         """Channels that are sampled together."""

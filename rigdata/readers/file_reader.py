@@ -86,8 +86,10 @@ class FileReader(RunReader):
         faults = {}
         timings = {}
         times: dict[str, FloatArray] = {}
+        values, units = {}, {}
         for channel in series:
             name, time = channel.name, channel.time
+            values[name], units[name] = channel.values, channel.unit
             if time is None:
                 timings[name] = Grid(len(channel))
                 continue
@@ -110,9 +112,10 @@ class FileReader(RunReader):
         grids, untimed = self._planned(timings, self.stated_rate, "channel", remedy)
         faults |= untimed
         if not grids:
-            raise RigDataError([problem for error in faults.values() for problem in error.problems])
-        values = {channel.name: channel.values for channel in series}
-        units = {channel.name: channel.unit for channel in series}
+            problems: list[Problem] = []
+            for error in faults.values():
+                problems += error.problems
+            raise RigDataError(problems)
         return _Columns(grids, faults, values, times, units, contents.unread, contents.problems)
 
     def _refuse_other_unit(self, clocks: Mapping[str, str], rate: float) -> None:

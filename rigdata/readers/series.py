@@ -148,15 +148,25 @@ def seconds(column: Series) -> FloatArray:
 
 def time_columns(names: Sequence[str], channels: Channels) -> list[int]:
     """Places of the time columns: those described as such, else those named like one that nobody describes."""
-    described = [i for i, name in enumerate(names) if name in channels and channels[name].quantity == "time"]
-    return described or [i for i, n in enumerate(names) if n not in channels and is_time(n.rpartition(".")[2])]
+    described, likely = [], []
+    for place, name in enumerate(names):
+        if name in channels:
+            if channels[name].quantity == "time":
+                described.append(place)
+        elif is_time(name.rpartition(".")[2]):
+            likely.append(place)
+    return described or likely
 
 
 def serving(names: Sequence[str], clocks: Sequence[int], channels: Channels) -> list[int | None]:
     """Place of every column's time column: of the clock that it states, else the nearest without one to its left."""
     letters = [channels.get(name, UNDESCRIBED).clock for name in names]
-    lettered = {letters[i]: i for i in clocks if letters[i]}
-    plain = [i for i in clocks if not letters[i]]
+    lettered, plain = {}, []
+    for i in clocks:
+        if letters[i]:
+            lettered[letters[i]] = i
+        else:
+            plain.append(i)
     nearest = plain[0] if plain else None
     places = []
     for i, letter in enumerate(letters):

@@ -176,7 +176,10 @@ def pairs(channels: Guesses, quantity: str) -> list[Pair]:
     for name, guess in channels.items():
         if guess.quantity.value == quantity:
             names[guess.unit].append(name)
-    return [pair for alike in names.values() for pair in zip(alike[::2], alike[1::2])]
+    pairs_of_units: list[Pair] = []
+    for alike in names.values():
+        pairs_of_units += zip(alike[::2], alike[1::2])
+    return pairs_of_units
 
 
 def stated_frame(pair: Pair, channels: Guesses) -> Frame | None:

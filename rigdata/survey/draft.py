@@ -263,5 +263,9 @@ def _entry(line: str) -> tuple[str, str]:
 
 def _values(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Values and lines by their keys."""
-    entries = [(*_entry(line), line) for line in lines]
-    return {key: (value, line) for key, value, line in entries if key}
+    values = {}
+    for line in lines:
+        key, value = _entry(line)
+        if key:
+            values[key] = value, line
+    return values

@@ -85,8 +85,12 @@ def in_seconds(exports: Sequence[Export], described: Tables) -> tuple[list[Expor
     """
     unstated = [export for export in exports if not export.states_times]
     rate = max((export.rate for export in unstated), default=np.nan)
-    units = {name: Entry(clock_unit, "file") for export in exports for name, clock_unit in export.clocks.items()}
-    open_ = {name for export in unstated for name in export.clocks}
+    units, open_ = {}, set()
+    for export in exports:
+        for name, clock_unit in export.clocks.items():
+            units[name] = Entry(clock_unit, "file")
+            if not export.states_times:
+                open_.add(name)
     typed = {described[name].get("unit") for name in open_ if name in described}
     likely = next((unit for unit in ("s", "ms", "us") if rate / TIME_FACTORS[unit] >= _SLOWEST), "s")
     unit = next((unit for unit in TIME_FACTORS if unit in typed), likely)
@@ -98,8 +102,7 @@ def in_seconds(exports: Sequence[Export], described: Tables) -> tuple[list[Expor
 
 def _scaled(export: Export, unit: str) -> Export:
     """An export with its times from this unit to seconds."""
-    times = {id(s.time): s.time for s in export.series if s.time is not None}
-    scaled = {key: time * TIME_FACTORS[unit] for key, time in times.items()}
+    scaled = {id(s.time): s.time * TIME_FACTORS[unit] for s in export.series if s.time is not None}
     return replace(export, series=tuple(replace(s, time=scaled.get(id(s.time))) for s in export.series))
 
 

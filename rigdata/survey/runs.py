@@ -63,8 +63,11 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
     pad = re.search(rf"(?:^p|{PAD})[-_ #]?(\d{{1,2}})(?!\d)", stem, re.IGNORECASE)
     angles = _numbers_before(stem, r"deg(?:ree)?s?|°|grad")
     # a frequency that the name states counts where one of the record's lines confirms it
-    frequencies = [abs(f) for f in _numbers_before(stem, "Hz")]
-    confirmed = [f for f in frequencies if any(abs(line.frequency - f) <= NEAR * f for line in lines)]
+    measured = np.array([line.frequency for line in lines])
+    confirmed = []
+    for frequency in map(abs, _numbers_before(stem, "Hz")):
+        if np.any(np.abs(measured - frequency) <= NEAR * frequency):
+            confirmed.append(frequency)
     return RunGuess(
         export=export,
         kind=kind,

@@ -277,8 +277,9 @@ def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
         run = replace(run, speed=speed)
     if run.excitation.value is not None or run.kind.value == "locus" or not run.lines:
         return run
-    turns = run.speed.number
-    lines = [p for p in run.lines if not any(abs(p.frequency - n * turns) <= NEAR * n * turns for n in (1, 2))]
+    lines = list(run.lines)
+    for turns in (run.speed.number, 2 * run.speed.number):
+        lines = [line for line in lines if not abs(line.frequency - turns) <= NEAR * turns]
     if not lines:
         return run
     remark = " beside the shaft's" if len(lines) < len(run.lines) else ""
@@ -294,8 +295,7 @@ def _set_points(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
         points = _common(name, [entries[i].number for i in movable])
         for i in movable:
             value = points.get(entries[i].number, entries[i].value)
-            moved = {name: replace(entries[i], value=value)}
-            changed[i] = replace(changed[i], **moved)
+            changed[i] = replace(changed[i], **{name: replace(entries[i], value=value)})
     for i, run in enumerate(changed):
         if run.load.source and not run.load.text:
             changed[i] = replace(run, load=replace(run.load, text=f"{run.load.number / 1e3:.4g} kN"))

@@ -171,7 +171,7 @@ def _write_csv(folder: Path, rig: VirtualRig, records: _Records, layout: CsvLayo
 
 def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> str:
     columns, rate = _stored(record, rig, layout.time_name), record.readings.rate
-    names = [name for name, _ in columns]
+    names, values = zip(*columns)
     units, forms = [], []
     for name in names:
         unit, decimals = "s", 6 if (1e6 / rate).is_integer() else 9
@@ -182,7 +182,7 @@ def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> st
             unit, decimals = sensor.unit, max(0, ceil(-log10(step)) + 2)
         units.append(unit)
         forms.append(f"%.{decimals}f")
-    table = np.stack([values for _, values in columns], axis=1)
+    table = np.stack(values, axis=1)
     tail = layout.delimiter if layout.trailing_delimiter else ""
     head = [line.format(rate=f"{rate:g}", count=len(table)) for line in layout.preamble]
     head += [layout.delimiter.join(cells) + tail for cells in [names, units][: 1 + layout.units_line]]
@@ -286,7 +286,8 @@ def manifest_text(rig: VirtualRig, layout: CsvLayout | None = None) -> str:
         }
     if layout is not None and layout.time_name:
         tables[f"[channels.{layout.time_name}]"] = {"quantity": "time", "unit": "s"}
-    tables |= {f"[channels.{sensor.name}]": _channel(sensor) for sensor in rig.instruments.sensors}
+    for sensor in rig.instruments.sensors:
+        tables[f"[channels.{sensor.name}]"] = _channel(sensor)
     if rotation != ROTATIONS[0]:
         tables["[shaft]"] = {"rotation": rotation}
     suffix = "" if layout is None else ".csv"

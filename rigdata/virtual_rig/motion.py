@@ -224,8 +224,7 @@ def either_sign(rng: np.random.Generator, limits: tuple[float, float]) -> float:
 
 def clearance_motion(run: PlannedRun, sweep: ClearanceSweep, truth: RigTruth, noise: Noise, seed: int) -> Motion:
     """Motion in a clearance sweep."""
-    rng = stream(seed, run.record, "dry")
-    push = sweep.push * (1 + noise.dry.push_scatter * rng.standard_normal())
+    push = sweep.push * (1 + noise.dry.push_scatter * stream(seed, run.record, "dry").standard_normal())
     time = np.arange(round(sweep.seconds * run.rate)) / run.rate
     direction = 2 * np.pi * time / sweep.seconds
     position = swept_position(truth, push, direction)

@@ -67,7 +67,8 @@ def test_pads_that_stand_further_out_than_they_are_bored_have_negative_preload(w
     """Pad #3 stands 6 um further out than the others."""
     source, curves = whole
     bored = [SimpleNamespace(pivot_angle=angle, pad_clearance=83e-6, assembled_clearance=80e-6) for angle in ANGLES]
-    named = [p for p in bearing_problems(source, SimpleNamespace(pads=bored)) if p.place == "preload"]
+    bearing = SimpleNamespace(pads=bored, pivot_angles=ANGLES, clearances=(80e-6,) * len(ANGLES))
+    named = [p for p in bearing_problems(source, bearing) if p.place == "preload"]
     assert [p.severity for p in named] == ["warning", "warning"]
     assert all(re.search(r"negative preload: #3 -0\.03\d$", p.what) for p in named)
     polygon = measure_clearance(source, ANGLES, curves)

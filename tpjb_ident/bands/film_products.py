@@ -80,7 +80,8 @@ def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
     curvature, clear = _hidden(*shown)
     seen = bool(clear.max() > _CLEAR)
     if seen:
-        curvature = np.array([[_curvature(part, *axis) for axis in zip(*axes)] for part, *axes in zip(*shown)])
+        for of_run, part, *axes in zip(curvature, *shown):
+            of_run[:] = [_curvature(part, *axis) for axis in zip(*axes)]
     square, cube = curvature.sum(axis=1).mean(axis=0)
     stiffness = np.sqrt(film.force / np.mean(motion, axis=0)[driven].mean())
     cube = max(cube, (_STANDS_IN * square / stiffness) ** 2)
@@ -185,7 +186,8 @@ def _film(runs: Sequence[RunSpectra], driven: BoolArray) -> _Film:
     omega = 2 * np.pi * runs[0].frequencies[driven]
     middle = np.median(omega)
     columns = complex_matrix(power_columns(omega / middle, MODELS["K-C-M"]).transpose(0, 2, 1))
-    D, F = (np.array([getattr(run, name).mean(axis=0)[driven] for run in runs]) for name in ("displacement", "force"))
+    D = np.array([run.displacement.mean(axis=0)[driven] for run in runs])
+    F = np.array([run.force.mean(axis=0)[driven] for run in runs])
     design = np.einsum("kqij,rkj->rkiq", columns, D).reshape(-1, columns.shape[1])
     rows = np.concatenate([design.real, design.imag])
     numbers = np.linalg.lstsq(rows, np.concatenate([F.real.ravel(), F.imag.ravel()]), rcond=None)[0]

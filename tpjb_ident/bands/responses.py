@@ -59,7 +59,8 @@ def line_response(runs: Sequence[RunSpectra], bins: IntArray, method: str, ends:
         return LineResponse(mean[None], float(n), _outer(remaining), n - 1.0, slope[None], size, float(n))
     z = np.concatenate([run.z[0, bins] for run in runs])
     sources = [_sources(run, method) for run in runs]
-    u, by_time = (np.concatenate([part[bins] for part in parts]) for parts in zip(*sources))
+    u = np.concatenate([source[bins] for source, _ in sources])
+    by_time = np.concatenate([source[bins] for _, source in sources])
     return _regressed(z, u, by_time, nuisance(runs, bins, u, ends))
 
 
@@ -92,10 +93,10 @@ def _sources(run: RunSpectra, method: str) -> tuple[ComplexArray, ComplexArray]:
 
 def one_phase_set(runs: Sequence[RunSpectra]) -> bool:
     """Whether too few runs of a periodic excitation have phases of their own for its distortion to show."""
-    means = [run.displacement.mean(axis=0) for run in runs]
-    waves = [mean @ np.linalg.eigh((mean.T @ mean.conj()).real)[1][:, -1] for mean in means]
     different: list[ComplexArray] = []
-    for wave in waves:
+    for run in runs:
+        mean = run.displacement.mean(axis=0)
+        wave = mean @ np.linalg.eigh((mean.T @ mean.conj()).real)[1][:, -1]
         if all(_likeness(wave, earlier) < _ALIKE for earlier in different):
             different.append(wave)
     return len(different) < _SETS

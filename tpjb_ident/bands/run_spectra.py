@@ -135,9 +135,7 @@ def _combed(
         multiples = np.arange(1, int(max(min(_FIRST_MOVE * cycle / move, n / near.min()), 1)) + 1)
         at = near[:, :, None] * multiples
         # beyond the record nothing overlaps
-        product, power = (
-            map_coordinates(s, [finer * at], mode="constant", prefilter=False).sum(axis=2) for s in splines
-        )
+        product, power = (map_coordinates(s, [finer * at], prefilter=False).sum(axis=2) for s in splines)
         low, middle, high = (1 - product / power).T
         bend = np.maximum(low - 2 * middle + high, 1e-300)
         periods[active] += move * np.clip(0.5 * (low - high) / bend, -1.0, 1.0)

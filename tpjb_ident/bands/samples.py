@@ -72,8 +72,12 @@ class Samples(Directed):
         groups = [self.rows[self.pick(q)] for q in ("displacement", "force")]
         if self.command is not None:
             groups = [self.command]
-        centred = [rows - rows.mean(axis=1, keepdims=True) for rows in groups]
-        return np.concatenate([rows / rows.std() for rows in centred if rows.any()])
+        scaled = []
+        for rows in groups:
+            centred = rows - rows.mean(axis=1, keepdims=True)
+            if centred.any():
+                scaled.append(centred / centred.std())
+        return np.concatenate(scaled)
 
     def mapped(self, change: Callable[[FloatArray], FloatArray], rate: float | None = None) -> Samples:
         """The record with all rows (k, n) changed alike, command too; at another rate where one is given."""
@@ -89,7 +93,9 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
     """
     n = min(run.length, round(seconds * run.sample_rate))
     readers = device_readers(run, command=True)
-    described = [channel for reader in readers for channel in reader.channels]
+    described: list[Channel] = []
+    for reader in readers:
+        described += reader.channels
     single = len(run.of("command")) == 1
     recorded = []
     begins, lost, command = [], 0.0, np.zeros((2, n))

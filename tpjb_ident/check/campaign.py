@@ -67,7 +67,9 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
         if progress is not None:
             progress(count, len(campaign.runs))
     observations, conditions = judged(campaign, observations)
-    findings = [f for observation in observations for f in observation.report.findings]
+    findings = []
+    for observation in observations:
+        findings.extend(observation.report.findings)
     merged = merge(findings, campaign.path.name, campaign.runs)
     for condition in conditions:
         severity: Severity = "error" if condition.severity == "error" else "warning"
@@ -118,8 +120,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
 def _spread_doubts(observations: Sequence[Observation]) -> None:
     """Cells that are wired wrongly in many runs are so in all, also where the load does not show it."""
     judged = [observation for observation in observations if observation.run.kind in {"dynamic", "locus", "dry_pivot"}]
-    doubted = sum(observation.report.cells_doubted for observation in judged)
-    if is_shared(doubted, len(judged)):
+    if is_shared(sum(observation.report.cells_doubted for observation in judged), len(judged)):
         for observation in observations:
             observation.report.cells_doubted = True
 

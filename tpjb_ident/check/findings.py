@@ -178,7 +178,10 @@ def reach(reports: Sequence[Reporter]) -> None:
         kinds.setdefault(report.run.kind, []).append(report)
     dynamic = kinds.pop("dynamic", [])
     for alike in kinds.values():
-        for group in _alike(f for report in alike for f in report.findings if f.channels):
+        findings = []
+        for report in alike:
+            findings += [f for f in report.findings if f.channels]
+        for group in _alike(findings):
             if len(group) < len(alike) and not is_shared(len(group), len(alike)):
                 continue
             for report in dynamic:

@@ -58,10 +58,9 @@ def check_magnitudes(observations: Sequence[Observation]) -> None:
         is_sine = observation.run.kind == "dynamic" and observation.run.excitation_kind == "sine"
         check_travel(observation, is_sine)
         if is_sine:
-            length = [
-                float(np.linalg.norm(observation.line(q))) if observation.shows(q) else np.nan
-                for q in VECTOR_QUANTITIES
-            ]
+            length = []
+            for q in VECTOR_QUANTITIES:
+                length.append(float(np.linalg.norm(observation.line(q))) if observation.shows(q) else np.nan)
             film, static = np.linalg.norm(observation.film_force), np.linalg.norm(observation.mean("force"))
             measured.append(Sizes(observation.report, length[0], length[1], float(film), length[2], float(static)))
     for sizes in measured:

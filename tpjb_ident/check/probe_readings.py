@@ -94,7 +94,8 @@ def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object
     Where no half of them agree, any may be the right one: from the farthest point. `motion` (n,): share of it that may
     be motion, which another film answers otherwise; `static`: point of every run.
     """
-    usual = np.array([np.median([s for s, point in zip(sizes, static) if point == key]) for key in static])
+    codes = np.array([static.index(key) for key in static])
+    usual = np.array([np.median(sizes[codes == code]) for code in codes])
     spare = len(sizes) - len(set(static))
     if spare < _MIN_SPARE or np.ptp(usual) > _LOST:
         return np.zeros(len(sizes))

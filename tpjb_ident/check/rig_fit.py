@@ -47,7 +47,9 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
     None where the lines are too few; `static`: cells show the static load.
     """
     clear = [run for run in runs if not run.report.cells_doubted and run.shows("force")]
-    observations = tuple(run for run in clear for _ in run.lines.omega)
+    observations = []
+    for run in clear:
+        observations += [run] * len(run.lines.omega)
     if len(observations) < _MIN_BLOCKS:
         return None
     rig = campaign_rig(campaign)
@@ -93,8 +95,7 @@ def _check_accelerometers(observations: Sequence[Observation], solution: Solutio
     shown = vector(rig, blocks, "acceleration")
     noise = np.sqrt(blocks.noise_power(rows))
     judged = np.flatnonzero(np.isfinite(moved).all(axis=1) & (np.linalg.norm(shown, axis=1) > _CLEAR * noise))
-    off = _off(shown, moved)[judged]
-    for b in judged[far(off, _OFF, _MANY, _MIN_BLOCKS)]:
+    for b in judged[far(_off(shown, moved)[judged], _OFF, _MANY, _MIN_BLOCKS)]:
         _report(observations[b], shown[b], moved[b])
 
 

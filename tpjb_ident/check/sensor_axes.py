@@ -93,11 +93,11 @@ def check_probes(sweeps: Sequence[Observation], dry: Sequence[Observation]) -> N
 
 def _pad_directions(runs: Sequence[Observation]) -> list[float]:
     """Directions [rad] of all pads as dry runs state them; none where a pad lacks."""
-    stated = {
-        observation.run.pad: observation.run.point.static_load_direction
-        for observation in runs
-        if observation.run.pad and "static_load_direction" in observation.run.stated
-    }
+    stated = {}
+    for observation in runs:
+        run = observation.run
+        if run.pad and "static_load_direction" in run.stated:
+            stated[run.pad] = run.point.static_load_direction
     angles = [stated[pad] for pad in sorted(stated)]
     gaps = np.diff(np.sort(np.mod(angles, 2 * np.pi)))
     is_whole = sorted(stated) == list(range(1, len(stated) + 1)) and np.all(gaps > np.pi / max(len(stated), 1))

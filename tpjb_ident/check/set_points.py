@@ -200,10 +200,13 @@ def _turn(run: Observation, vector: ComplexArray) -> float:
 
 
 def _check_directions(runs: Sequence[Observation]) -> None:
-    # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
-    moved = [abs(_turn(run, run.line("displacement"))) <= _MOVED_ALONG for run in runs]
-    turns = [_turn(run, run.film_force) for run in runs]
-    turned = [(run, turn) for run, turn, is_moved in zip(runs, turns, moved) if abs(turn) > _ALONG and not is_moved]
+    turned = []
+    for run in runs:
+        # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
+        is_moved = abs(_turn(run, run.line("displacement"))) <= _MOVED_ALONG
+        turn = _turn(run, run.film_force)
+        if abs(turn) > _ALONG and not is_moved:
+            turned.append((run, turn))
     hint = _miswired_cells(runs) if len(turned) >= _SEVERAL else ""
     for run in runs if hint else ():
         run.report.cells_doubted = True  # the cells are wired wrongly in the other runs too

@@ -151,7 +151,8 @@ def check_locus(runs: Sequence[Observation]) -> None:
         if np.isfinite(means).all() and len(run.of("displacement")) == 2 and not run.report.cells_doubted:
             groups.setdefault((run.run.point.static_load, run.run.point.spin), []).append(run)
     for group in groups.values():
-        loads, places = (np.array([run.mean(q) for run in group]) for q in ("force", "displacement"))
+        loads = np.array([run.mean("force") for run in group])
+        places = np.array([run.mean("displacement") for run in group])
         gain = _gain(loads, places) if len(group) >= 4 else None
         if gain is None:
             continue

@@ -160,12 +160,14 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     noise = _noise(records)
     centre = np.zeros(2) if polygon is None else polygon.centre
     repeats, drift, drift_variance, scatter = _repeats(records, orders, noise, centre)
-    moved = [_moved(record, noise) for record in records]
     # with the bearing's centre from the same probes their zero falls out
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
     centre_covariance = zero if polygon is None else polygon.centre_covariance
-    points = []
-    for record, order, size in zip(records, orders, moved, strict=True):
+    points, on_its_way = [], []
+    for record, order in zip(records, orders, strict=True):
+        size = _moved(record, noise)
+        if size:
+            on_its_way.append(f"halves of {record.run.id} stand {1e6 * size:.2g} µm apart")
         position = record.position - np.nan_to_num(drift) * order - centre
         variance = noise.mean_variance(record.span) + scatter + order**2 * drift_variance
         # of a steady way the ends are as far from the mean as the halves from each other
@@ -176,9 +178,6 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     # nothing tells whether the zero moved before the sweep, after it or within: the interval holds the way
     points = [replace(p, covariance=p.covariance + np.outer(off, off)) for p in points]
     points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
-    on_its_way = [
-        f"halves of {record.run.id} stand {1e6 * size:.2g} µm apart" for record, size in zip(records, moved) if size
-    ]
     if off.any():
         on_its_way.append(f"positions go around a place {1e6 * math.hypot(*off):.2g} µm from the polygon's centre")
     status = (*_status(points, polygon, repeats, listed(on_its_way, 4)), *refused_runs(problems))
@@ -285,8 +284,10 @@ def _repeats(
     of its change away from it, give or take a half of either. What two repeats or more leave beyond that and the noise
     is scatter; with few of them it is as much larger as Student's interval is wider than the normal one.
     """
-    same = np.array([[_same_set_point(a.run.point, b.run.point) for b in records] for a in records])
-    firsts = same.argmax(axis=0)
+    numbers = []
+    for b in records:
+        numbers.append(np.argmax([_same_set_point(a.run.point, b.run.point) for a in records]))
+    firsts = np.array(numbers)
     count = len(records) - len(np.unique(firsts))
     if count == 0:
         return 0, np.full(2, np.nan), 0.0, 0.0

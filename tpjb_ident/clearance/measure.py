@@ -139,9 +139,7 @@ class ClearancePolygon(Presented):
         return clearance_and_locus(self, **options)
 
     def __str__(self) -> str:
-        pads = ", ".join(
-            f"{1e6 * c:.2f} ({1e6 * s:.2f})" for c, s in zip(self.clearance, self.clearance_se, strict=True)
-        )
+        pads = ", ".join(f"{1e6 * c:.2f} ({1e6 * s:.2f})" for c, s in zip(self.clearance, self.clearance_se))
         text = f"clearance polygon {self.run}: per pad {pads} µm (se), pushed by {self.push_load:.0f} N"
         return text + (f"; {', '.join(sentences(self.status))}" if self.status else "")
 

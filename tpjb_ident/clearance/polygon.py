@@ -141,8 +141,10 @@ def fit_sides(contact: ContactIntervals, angles: FloatArray, pads: IntArray, cur
     usable = np.isin(contact.pad, pads) & _consistent(contact, place)
     used, place = contact.take(usable), place[usable]
     # the noise of the probes as the sweep itself shows it, about smooth sides
-    columns = used.time, used.duration, used.along, _smooth_side(used, place)
-    noise = estimate_noise([NoiseSeries(*(c[used.pad == k] for c in columns)) for k in np.unique(used.pad)])
+    columns, series = (used.time, used.duration, used.along, _smooth_side(used, place)), []
+    for pad in np.unique(used.pad):
+        series.append(NoiseSeries(*(column[used.pad == pad] for column in columns)))
+    noise = estimate_noise(series)
     r, of_pad = len(pads), (used.pad[:, None] == pads).astype(float)
     full = _pivot_deflection(curves, pads, np.full(r, used.push))
     unknown = untested(curves, pads)

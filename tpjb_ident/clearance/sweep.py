@@ -50,8 +50,7 @@ class ContactIntervals:
 
     def take(self, chosen: BoolArray) -> ContactIntervals:
         """The averages where `chosen` (m,) is true."""
-        columns = {f.name: getattr(self, f.name)[chosen] for f in fields(self)[:-2]}
-        return replace(self, **columns)
+        return replace(self, **{f.name: getattr(self, f.name)[chosen] for f in fields(self)[:-2]})
 
     def lag(self, angles: FloatArray) -> float:
         """Usual angle [rad] by which the load is past a corner's last pad when the shaft leaves it."""
@@ -60,7 +59,10 @@ class ContactIntervals:
         first, last = np.nanmin(past, axis=1), np.nanmax(past, axis=1)
         outside = np.where(first > 0.0, first, np.minimum(last, 0.0))
         corner = self.touched @ (1 << np.arange(len(angles))) * (self.touched.sum(axis=1) == 2)
-        ends = [outside[corner == k][np.argmax(np.abs(outside[corner == k]))] for k in np.unique(corner[corner > 0])]
+        ends = []
+        for k in np.unique(corner[corner > 0]):
+            at_corner = outside[corner == k]
+            ends.append(at_corner[np.argmax(np.abs(at_corner))])
         return np.median(ends) if ends else 0.0
 
     def lagging(self, angles: FloatArray, lag: float) -> ContactIntervals:
@@ -181,7 +183,8 @@ def _settled(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArr
     spread = robust_deviation(speed[corner] - ordinary)
     moving = corner & (speed > ordinary + _MOVING * spread)
     state = touched @ (1 << np.arange(touched.shape[1]))
-    for members in (state == number for number in np.unique(state[corner])):  # one that stopped on its way is elsewhere
+    for number in np.unique(state[corner]):  # one that stopped on its way is elsewhere
+        members = state == number
         away = np.hypot(*(place[members] - np.median(place[members], axis=0)).T)
         moving[members] |= away > _ASIDE * max(robust_deviation(away), 1e-8)
     # the piece beside a moving one hides a remainder of the way below the noise, and would do so at every corner

@@ -131,7 +131,8 @@ class Command(Terminal):
             folder, prefix = path if path.is_dir() else path.parent, ""
             while any(hashes.get(prefix + name, digest) != digest for name, digest in files.items()):
                 folder, prefix = folder.parent, f"{folder.name}/{prefix}"
-            hashes |= {prefix + name: digest for name, digest in files.items()}
+            for name, digest in files.items():
+                hashes[prefix + name] = digest
         return hashes
 
     @property
@@ -185,10 +186,11 @@ class Command(Terminal):
     def judge(self, parts: Mapping[str, Sequence[Condition]], missing: Sequence[str] = ()) -> None:
         """Note the conditions of named parts, each once; end with exit code 3 if one forbids trust, or parts miss."""
         places = defaultdict(list)
+        serious: list[str] = []
         for name, conditions in parts.items():
             for text in sentences(conditions):
                 places[text].append(name)
-        serious = sentences(untrusted(condition for conditions in parts.values() for condition in conditions))
+            serious += sentences(untrusted(conditions))
         notes = {text: f"{', '.join(names)}: {text}" for text, names in places.items()}
         for note in notes.values():
             self.note(note)
@@ -383,8 +385,9 @@ def _places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
     """
     values: dict[str, Any] = {}
     for name, value in settings.items():
-        several = enumerate(value) if isinstance(value, (list, tuple)) else ()
-        values |= {name: value, **{f"{name}.{number}": item for number, item in several}}
+        values[name] = value
+        for number, item in enumerate(value) if isinstance(value, list | tuple) else ():
+            values[f"{name}.{number}"] = item
     places = {}
     for key, path in values.items():
         if isinstance(path, Path) and path.exists():

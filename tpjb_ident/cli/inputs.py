@@ -171,7 +171,7 @@ def open_source(c: Command, predicted: bool = False) -> tuple[Any, Any, list[obj
     A table whose points another program has predicted needs no bearing. With them come the words of a command that
     name the same.
     """
-    campaign, table, bearing = (c.typed[name] for name in ("campaign", "coefficients", "bearing"))
+    campaign, table, bearing = c.typed["campaign"], c.typed["coefficients"], c.typed["bearing"]
     words = [] if bearing is None else ["--bearing", bearing]
     if table is None and campaign is not None:
         source = c.open(campaign)

@@ -31,7 +31,9 @@ def option(command: str, parameter: str) -> ParameterInfo:
     row = _OPTIONS.get(f"{command} {parameter}") or _OPTIONS[parameter]
     candidates = row["completes"].split()
     about: dict[str, Any] = {"metavar": row["metavar"] or None, "help": row["help"].format(names=", ".join(candidates))}
-    about |= {end: json.loads(row[end]) for end in ("min", "max") if row[end]}
+    for end in ("min", "max"):
+        if row[end]:
+            about[end] = json.loads(row[end])
     if row["names"] == "argument":
         return Argument(**about)
     if candidates:

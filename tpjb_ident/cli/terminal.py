@@ -117,14 +117,18 @@ class Terminal:
         if self._silent:
             return
         shown, title = texts[:MOST_ROWS] if file else texts, printable(title)
-        varying = list(range(len(columns)))
-        if len(shown) > 1 and _total(_sizes([headings, *shown])) > _width():  # constant numbers go to the title
-            varying = [i for i, column in enumerate(columns) if column.words or len({row[i] for row in shown}) > 1]
-            constant = [i for i in range(len(columns)) if i not in varying and shown[0][i].strip(" -")]
-            title = "; ".join([title, *(readable(columns[i].with_unit(shown[0][i].strip())) for i in constant)])
-        names, *body = [[row[i] for i in varying] for row in [headings, *shown]]
+        is_wide = len(shown) > 1 and _total(_sizes([headings, *shown])) > _width()
+        varying = []
+        for i, column in enumerate(columns):
+            if not is_wide or column.words or len({row[i] for row in shown}) > 1:
+                varying.append(i)
+            elif shown[0][i].strip(" -"):  # constant numbers go to the title
+                title += f"; {readable(column.with_unit(shown[0][i].strip()))}"
+        body = []
+        for row in [headings, *shown]:
+            body.append([row[i] for i in varying])
         words = [k for k, i in enumerate(varying) if columns[i].words]
-        lines = ["", *wrapped(title, _width()), *table_lines(names, body, words, _width()), ""]
+        lines = ["", *wrapped(title, _width()), *table_lines(body[0], body[1:], words, _width()), ""]
         if len(shown) < len(texts):
             lines.append(f"{len(texts) - len(shown)} more rows: {file} has all {len(texts)}")
         print("\n".join(lines), flush=True)
@@ -226,9 +230,10 @@ def _width() -> int:
 
 def _fitted(text: str, wraps: bool = True) -> str:
     """Lines with whole words, as wide as a table; messages in a log stay whole, for who searches them."""
-    lines = [readable(line) for line in text.split("\n")]
-    if wraps:
-        lines = [part for line in lines for part in wrapped(line, _width())]
+    lines: list[str] = []
+    for line in text.split("\n"):
+        line = readable(line)
+        lines += wrapped(line, _width()) if wraps else [line]
     return "\n".join(lines)
 
 
@@ -264,8 +269,10 @@ def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Co
     lines.append("-" * min(width, _total([sizes[i] for i in row_columns])))
     for row in rows:
         lines.append(line([row[i] for i in row_columns]))
-        below = [i for i in range(len(columns)) if i not in row_columns and row[i].strip(" -")]
-        texts = [f"{columns[i]}: {row[i].strip()}".lstrip(": ") for i in below]
+        texts = []
+        for i, cell in enumerate(row):
+            if i not in row_columns and cell.strip(" -"):
+                texts.append(f"{columns[i]}: {cell.strip()}".lstrip(": "))
         if texts:
             lines += [f"    {part}" for part in wrapped("; ".join(texts), width - 4)]
     return lines

@@ -14,7 +14,7 @@ from rigdata.operating_point import ROTATIONS, OperatingPoint
 from tpjb_ident.columns import amount, spinning
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.table_reader import read_table
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, POINT_COLUMNS, POINT_KEY
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, POINT_COLUMNS, POINT_KEY, with_endings
 
 HZ = 2.0 * math.pi
 VALUES = list(COEFFICIENT_COLUMNS)
@@ -60,7 +60,7 @@ def read_rows(path: Path) -> pd.DataFrame:
     Columns as in ``prediction.csv``, beside them ``line`` and the standard errors; NaN where nothing states a number.
     """
     table = read_table(path, _NEEDED, _COEFFICIENT)
-    ends = [name + end for name in VALUES for end in ("_lo", "_hi")]
+    ends = with_endings("_lo", "_hi")
     absent: dict[str, Any] = {name: value for name, value in _DEFAULTS.items() if name not in table}
     columns = [*POINT_KEY, *VALUES, *ERRORS, *ends, "x_m", "y_m", "converged", "quality", "status"]
     rows = table.assign(**absent).reindex(columns=columns).assign(line=table.attrs["lines"])
@@ -69,7 +69,7 @@ def read_rows(path: Path) -> pd.DataFrame:
     assumed = rows["excitation_Hz"].isna().map({True: "excitation-not-stated", False: ""})
     rows["excitation_Hz"] = rows["excitation_Hz"].fillna(rows["shaft_speed_Hz"])
     rows["static_load_direction_deg"] = rows["static_load_direction_deg"].fillna(-90.0)
-    low, high = (rows[ends[k::2]].to_numpy(float) for k in (0, 1))
+    low, high = rows[ends[::2]].to_numpy(float), rows[ends[1::2]].to_numpy(float)
     deviations = (high - low) / (2 * HALF_INTERVAL)  # our own tables have both: the interval holds calibration too
     rows[ERRORS] = np.where(np.isnan(deviations), rows[ERRORS], deviations)
     flags = rows["quality"].where(rows["quality"] != "", rows["status"]).astype(object) + "; " + assumed
@@ -114,7 +114,8 @@ def partners(rows: pd.DataFrame, candidates: pd.DataFrame, within: tuple[float, 
     load, direction, frequency = within
     if rows.empty or candidates.empty:
         return np.full(len(rows), -1)
-    keys, candidate_keys = (frame[list(POINT_COLUMNS)].to_numpy(float) for frame in (rows, candidates))
+    keys = rows[list(POINT_COLUMNS)].to_numpy(float)
+    candidate_keys = candidates[list(POINT_COLUMNS)].to_numpy(float)
     gaps = np.abs(candidate_keys[None] - keys[:, None])
     gaps[..., 1] = np.minimum(gaps[..., 1] % 360.0, -gaps[..., 1] % 360.0)
     most = np.abs(keys) * [load, 0.0, frequency, frequency] + [0.0, direction, 0.0, 0.0]

@@ -153,7 +153,7 @@ def joined(measured: pd.DataFrame, predictions: Mapping[str, pd.DataFrame]) -> p
     columns: dict[str, Any] = {"pivots": np.repeat(list(predictions), sizes)}
     columns |= {name: measured[name] for name in (*POINT_KEY, "static_load_measured_N")}
     for name in COEFFICIENT_COLUMNS:
-        value, low, high = (measured[name + end] for end in ("", "_lo", "_hi"))
+        value, low, high = measured[name], measured[f"{name}_lo"], measured[f"{name}_hi"]
         columns |= {name: value, f"{name}_lo": low, f"{name}_hi": high, f"{name}_predicted": predicted[name]}
         columns[f"{name}_difference"] = predicted[name] - value
         columns[f"{name}_ratio"] = (predicted[name] / value).where(low * high > 0)
@@ -205,7 +205,7 @@ def compare_campaign(
     report = progress or (lambda text, done, total: None)
     chosen = settings.identify or IdentifySettings()
     if chosen.clearance is None:
-        chosen = replace(chosen, clearance=min(pad.assembled_clearance for pad in bearing.pads))
+        chosen = replace(chosen, clearance=min(bearing.clearances))
     identification = identify(campaign, chosen, _labelled(report, "identifying"))
     points = [p.point for p in identification.points]
     report("waiting for the model", 0, 1)
@@ -263,8 +263,13 @@ def possible_variants(
     if bearing.pivot.kind == "rigid":
         formula = "The bearing file says rigid pivots: there is no printed formula to compare."
         refused |= {"kirk": formula, "kirk-secant": formula}
-    names = [name for name in variants if name not in refused]
-    return names or ["rigid"], list(dict.fromkeys(refused[name] for name in variants if name in refused))
+    names, remarks = [], []
+    for name in variants:
+        if name in refused:
+            remarks.append(refused[name])
+        else:
+            names.append(name)
+    return names or ["rigid"], list(dict.fromkeys(remarks))
 
 
 def _remarks(settings: CompareSettings, static: StaticTests, bearing: Bearing) -> tuple[str, ...]:

@@ -62,8 +62,9 @@ def measured_side(campaign: Campaign, identification: Identification | None, sta
     if identification is not None:
         coefficients = identification.to_frame()
         changes = identification.calibration_changes / np.sqrt(max(len(identification.calibration_changes), 1))
-        named = dict(zip(identification.calibration_names, changes.reshape(len(changes), -1, 8), strict=False))
-        sensors = {name: moved for name, moved in named.items() if name.partition(":")[0] in _OF_INSTRUMENTS}
+        for name, moved in zip(identification.calibration_names, changes.reshape(len(changes), -1, 8)):
+            if name.partition(":")[0] in _OF_INSTRUMENTS:
+                sensors[name] = moved
     pivots = clearance = None
     if static is not None:
         if static.curves:
@@ -142,7 +143,8 @@ def _alone(side: Side, used: IntArray) -> list[str]:
 def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.DataFrame:
     if not len(pairs):
         return pd.DataFrame()
-    frame_a, frame_b = (s.coefficients.iloc[pairs[:, k]].reset_index(drop=True) for k, s in enumerate((a, b)))
+    frame_a = a.coefficients.iloc[pairs[:, 0]].reset_index(drop=True)
+    frame_b = b.coefficients.iloc[pairs[:, 1]].reset_index(drop=True)
     columns: dict[str, Any] = {name: frame_a[name] for name in POINT_COLUMNS}
     columns["rotation"] = frame_a.get("rotation", ROTATIONS[0])  # a table that does not say means the usual one
     for name in ("static_load_measured_N", "quality"):
@@ -154,9 +156,10 @@ def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.Data
     omega_squared = (2 * np.pi) ** 2 * (frame_a["excitation_Hz"] * frame_b["excitation_Hz"]).to_numpy(float)
     common[:, 4:] /= omega_squared[:, None]
     for j, name in enumerate(COEFFICIENT_COLUMNS):
-        systematic = [frame.get(f"{name}_se_systematic", 0.0) ** 2 for frame in (frame_a, frame_b)]
+        column = f"{name}_se_systematic"
+        systematic = frame_a.get(column, 0.0) ** 2 + frame_b.get(column, 0.0) ** 2
         none = _NO_CHANGE * _mean_direct(frame_a, name)
-        columns |= _judged(name, (frame_a, frame_b), sum(systematic) - 2.0 * common[:, j], none, 8 * len(pairs))
+        columns |= _judged(name, (frame_a, frame_b), systematic - 2.0 * common[:, j], none, 8 * len(pairs))
     flags = [frame.get("quality", pd.Series("", frame.index)) for frame in (frame_a, frame_b)]
     doubtful = (flags[0] + "; " + flags[1]).map(errors_in).astype(bool)
     for name in columns:
@@ -170,7 +173,7 @@ def _random(frame: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray]:
     if f"{name}_random95" not in frame:
         half = 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]).to_numpy(float)
         return (half / HALF_INTERVAL) ** 2, np.full(len(frame), np.inf)
-    error, half = (frame[f"{name}{ending}"].to_numpy(float) for ending in ("_se", "_random95"))
+    error, half = frame[f"{name}_se"].to_numpy(float), frame[f"{name}_random95"].to_numpy(float)
     with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
         quantile = np.nan_to_num(half / error, nan=HALF_INTERVAL)
     return error**2, np.interp(-quantile, -stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL), _FREEDOM)
@@ -185,7 +188,8 @@ def _judged(
     The degrees of freedom are Welch's and Satterthwaite's. Of `number` differences that are looked at together one in
     twenty is beyond its own interval by chance; "yes" holds for all of them at once (Bonferroni).
     """
-    (random_a, freedom_a), (random_b, freedom_b) = (_random(frame, name) for frame in frames)
+    random_a, freedom_a = _random(frames[0], name)
+    random_b, freedom_b = _random(frames[1], name)
     variance = random_a + random_b + np.maximum(systematic, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):  # without scatter there is nothing to count
         freedom = variance**2 / (random_a**2 / freedom_a + random_b**2 / freedom_b)
@@ -194,7 +198,8 @@ def _judged(
     sure = stdtrit(freedom, 1 - 0.5 * (1 - _LEVEL) / max(number, 1)) * np.sqrt(variance)
     columns: dict[str, Any] = {}
     for side, frame in zip("ab", frames, strict=True):
-        columns |= {f"{name}_{side}{end}": frame[name + end] for end in _ENDS}
+        for end in _ENDS:
+            columns[f"{name}_{side}{end}"] = frame[name + end]
     gap = columns[f"{name}_b"] - columns[f"{name}_a"]
     columns |= {f"{name}_difference": gap, f"{name}_difference_lo": gap - half, f"{name}_difference_hi": gap + half}
     verdict = np.where(gap.abs() + half <= none, "no", "cannot tell")
@@ -251,8 +256,8 @@ def _clearance(a: Side, b: Side) -> pd.DataFrame:
 
 def _shown(row: Mapping[Any, Any], name: str, scale: float) -> str:
     """A difference with its interval, for a sentence."""
-    value, low, high = (row[f"{name}_difference{end}"] for end in _ENDS)
-    return with_interval(value, low, high, scale)
+    name = f"{name}_difference"
+    return with_interval(row[name], row[f"{name}_lo"], row[f"{name}_hi"], scale)
 
 
 def difference_sentences(difference: Difference) -> tuple[str, ...]:

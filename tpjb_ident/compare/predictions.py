@@ -105,7 +105,8 @@ def predict_points(
             rotation=static.rotation,
         )
         before = prediction if prediction.converged else None
-        rows |= {point: _row(point, prediction, index) for index, point in enumerate(group)}
+        for index, point in enumerate(group):
+            rows[point] = _row(point, prediction, index)
         if progress is not None:
             progress(f"{static.static_load / 1e3:g} kN", done, len(groups))
     return [rows[point] for point in excited]

@@ -65,8 +65,8 @@ def truth_of(setup: Setup, bearing_text: str = "") -> RigTruth:
         position,
         temperature,
         deflection,
-        pivot_angles=tuple(pad.pivot_angle for pad in pads),
-        clearance=tuple(pad.assembled_clearance for pad in pads),
+        pivot_angles=setup.bearing.pivot_angles,
+        clearance=setup.bearing.clearances,
         bearing_text=bearing_text,
     )
 

@@ -42,7 +42,7 @@ def measure_static(
     campaign: Campaign, bearing: Bearing, with_pivots: bool = True, every_sweep: bool = False
 ) -> StaticTests:
     """Measure what the campaign holds of pivot curves, clearance polygon (of the coldest sweep) and locus."""
-    angles = [pad.pivot_angle for pad in bearing.pads]
+    angles = bearing.pivot_angles
     has_pivots = with_pivots and campaign.of_kind("dry_pivot")
     curves = fit_pivots(campaign, angles, on_refusal="few") if has_pivots else ()
     sweeps, most = coldest_first(campaign.of_kind("clearance")), None if every_sweep else 1
@@ -50,7 +50,9 @@ def measure_static(
     excluded = [Condition("runs-refused", f"{problem.run} ({problem})") for problem in problems]
     clearance = polygons[0] if polygons else None
     locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
-    excluded += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]
+    for part in (*curves[:1], locus):
+        if part is not None:
+            excluded += [c for c in part.status if c == "runs-refused"]
     return StaticTests(curves, clearance, locus, tuple(excluded), tuple(polygons[1:]))
 
 
@@ -83,7 +85,7 @@ def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Prob
         if run.id in refused:
             continue
         try:
-            polygon = measure_run(run, [pad.pivot_angle for pad in bearing.pads])
+            polygon = measure_run(run, bearing.pivot_angles)
         except RigDataError as error:
             problems += [Problem("warning", p.file, p.place, p.what, p.cure, run.id) for p in error.problems]
             continue
@@ -103,7 +105,7 @@ def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Prob
 
 def wrong_scale(run: Run, polygon: ClearancePolygon, bearing: Bearing) -> list[Problem]:
     """A clearance that is a multiple of the drawing's: the probes' scale is wrong, or it is another bearing's file."""
-    measured, drawn = np.nanmean(polygon.clearance), np.mean([pad.assembled_clearance for pad in bearing.pads])
+    measured, drawn = np.nanmean(polygon.clearance), np.mean(bearing.clearances)
     if _SCALE[0] * drawn < measured < _SCALE[1] * drawn:
         return []
     channels = f"channels {' and '.join(channel.name for channel in run.of('displacement'))}"

@@ -41,10 +41,9 @@ def agreements(table: pd.DataFrame) -> pd.DataFrame:
     ``n`` and of those ``inside`` the measured interval.
     """
     deviations = table[[f"{column}_ratio" for column in DIRECT.values()]].set_axis(list(DIRECT), axis=1) - 1.0
-    inside = {
-        name: table[f"{column}_predicted"].between(table[f"{column}_lo"], table[f"{column}_hi"])
-        for name, column in DIRECT.items()
-    }
+    inside = {}
+    for name, column in DIRECT.items():
+        inside[name] = table[f"{column}_predicted"].between(table[f"{column}_lo"], table[f"{column}_hi"])
     models = deviations.groupby(table["pivots"], sort=False)
     columns = {
         "median": models.median(),
@@ -173,8 +172,7 @@ def _extrapolation_sentence(comparison: Comparison) -> list[str]:
 def _clearance_sentence(comparison: Comparison) -> list[str]:
     if comparison.clearance is None or comparison.bearing is None:
         return []
-    drawn = np.array([pad.assembled_clearance for pad in comparison.bearing.pads])
-    gap = comparison.clearance.clearance - drawn
+    gap = comparison.clearance.clearance - np.array(comparison.bearing.clearances)
     if not np.isfinite(gap).any():
         return []
     pad = np.nanargmax(np.abs(gap))

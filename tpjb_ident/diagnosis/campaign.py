@@ -155,10 +155,9 @@ def measure_campaign(
     """Identify a campaign and measure its static tests."""
     if not campaign.of_kind("dynamic"):
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to diagnose")
-    least = min(pad.assembled_clearance for pad in bearing.pads)
     identification = identify(
         campaign,
-        IdentifySettings(clearance=least),
+        IdentifySettings(clearance=min(bearing.clearances)),
         lambda text, done, total: report(f"identifying, {text}", 20 * done, 100 * total),
     )
     report("pivot curves, clearance and locus", 20, 100)

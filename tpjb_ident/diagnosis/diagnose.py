@@ -28,7 +28,7 @@ from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Observations, Where
 from tpjb_ident.diagnosis.verdict.decide import Decision, decide
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, POINT_KEY, coefficient_column
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, POINT_KEY, coefficient_column, with_endings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -166,7 +166,7 @@ def _coefficients(observations: Observations, vector: FloatArray) -> pd.DataFram
         column, factor = coefficient_column(element.observable), omega if element.observable[0] == "c" else 1.0
         for end, sign in (("", 0.0), ("_lo", -1.0), ("_hi", 1.0)):
             row[column + end] = float(value + sign * width) / factor
-    columns = [*POINT_KEY, *(name + end for name in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi"))]
+    columns = [*POINT_KEY, *with_endings("", "_lo", "_hi")]
     return pd.DataFrame(list(rows.values()), columns=columns)
 
 

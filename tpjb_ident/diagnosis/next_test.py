@@ -52,7 +52,7 @@ class Design:
 
     def fits(self, *explanations: Sequence[Effect]) -> bool:
         """Whether the model knows what these explanations would do in this test."""
-        return not any(e.name in self.unsure for effects in explanations for e in effects)
+        return not any(e.name in self.unsure for e in itertools.chain(*explanations))
 
     def planned(self, setup: Setup) -> Observations:
         """Observation vector that the baseline predicts, with the noise to be expected."""
@@ -87,7 +87,7 @@ class _OperatingRange:
     def of(cls, layout: Layout, pads: int) -> _OperatingRange:
         points = [t.point for t in layout.dynamic] or [(5000.0, -math.pi / 2, 22.0 * HZ)]
         load, direction, speed = sorted(points)[len(points) // 2]
-        lines = tuple(sorted({w for t in layout.dynamic for w in t.excitation})) or (speed,)
+        lines = tuple(sorted(set[float]().union(*(t.excitation for t in layout.dynamic)))) or (speed,)
         return cls(load, max(p[0] for p in points), min(p[0] for p in points), direction, speed, lines, pads)
 
     @property
@@ -177,7 +177,8 @@ def grown(setup: Setup) -> Setup:
 
 def _dry(layout: Layout, pads: int) -> list[Design]:
     numbers = range(1, pads + 1)
-    missing = [k for k in numbers if k not in {d.pad for d in layout.dry}]
+    tested = {d.pad for d in layout.dry}
+    missing = [k for k in numbers if k not in tested]
     if missing:
         return [
             Design(f"a dry load-deflection test on pad #{k}, 0.5-5 kN", Layout((), dry=dry([k]))) for k in missing

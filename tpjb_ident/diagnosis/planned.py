@@ -26,7 +26,7 @@ _NOISE = {"h": 0.001, "temperature": 0.05, "locus": 0.1e-6, "clearance": 0.1e-6,
 
 def planned_observations(setup: Setup, layout: Layout) -> Observations:
     """What the baseline predicts for a layout, with the covariance one may expect."""
-    elements = all_elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
+    elements = all_elements(layout, setup.bearing.pivot_angles)
     value = Forward(setup, layout, elements)()
     noise = by_family(elements, value, {**_NOISE, "load": Deciding.missed[0]})
     return Observations(layout, value, np.diag(noise**2), stated_sigma(elements, value, TRUSTED["h"]), elements)

@@ -147,7 +147,9 @@ class Solution:
 
     def conditions(self) -> Conditions:
         """What the terms' tests say of the rig: it touches every point."""
-        conditions = [condition for term in self.terms for condition in term.conditions(self.fitted[term.name])]
+        conditions: Conditions = ()
+        for term in self.terms:
+            conditions += term.conditions(self.fitted[term.name])
         text = "the runs together give no H, as where they are driven below their noise: it is the windows' alone"
         # where a gain explains what an axis does as well, the gain is told
         return tuple(dict.fromkeys((*conditions, *holding((self.ran_away, "iteration-limit", text)))))
@@ -244,7 +246,9 @@ class Solver:
         sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)), k)  # none of its blocks counts
         conditional = np.asarray(np.linalg.inv(sums.A[:, :k, :k]), dtype=float)
         parts = [rows.residuals(weight, conditional[group]) for group, rows, weight in fits]
-        joined = (np.concatenate([getattr(part, name) for part in parts]) for name in Residuals.__dataclass_fields__)
+        joined = []
+        for name in Residuals.__dataclass_fields__:
+            joined.append(np.concatenate([getattr(part, name) for part in parts]))
         return sums, Residuals(*joined)
 
     def _state(self, blocks: Blocks, places: slice, slope: ComplexArray, with_slope: BoolArray) -> State:

@@ -140,8 +140,7 @@ def evenly_chosen(direction: IntArray, most: int) -> IntArray:
 def _start_pairs(direction: IntArray, seed: int) -> IntArray:
     """Pairs of windows from different directions, shape (STARTS, 2)."""
     rng = np.random.default_rng(seed)
-    n = len(direction)
-    pairs = rng.integers(0, n, size=(8 * STARTS, 2))
+    pairs = rng.integers(0, len(direction), size=(8 * STARTS, 2))
     different = direction[pairs[:, 0]] != direction[pairs[:, 1]]
     chosen = pairs[different][:STARTS]
     return chosen if len(chosen) else pairs[pairs[:, 0] != pairs[:, 1]][:STARTS]

@@ -15,7 +15,7 @@ from rigdata.near_names import hint
 from tpjb_ident.columns import in_us_units, place_of
 from tpjb_ident.conditions import errors_in
 from tpjb_ident.errors import TpjbError
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_KEY
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_KEY, with_endings
 
 if TYPE_CHECKING:  # imported late: the command line asks for the names of the formats
     import pandas as pd
@@ -66,19 +66,22 @@ def chosen_rows(frame: pd.DataFrame, force: bool = False) -> Chosen:
     left_out = tuple(_place(row) for row in frame[~finite].to_dict("records"))
     if not finite.any():
         raise ExportError("no point of the table has finite coefficients. Identify or predict again.")
-    intervals = [name + end for name in COEFFICIENT_COLUMNS for end in ENDS]
     records = frame[finite].to_dict("records")
-    reasons = [_distrust(row) for row in records]
-    table = frame[finite].reindex(columns=[*POINT_COLUMNS, *intervals]).astype(float)
+    qualities, trusted, doubtful = [], [], []
+    for row in records:
+        reason = _distrust(row)
+        qualities.append(_flags(row, reason))
+        trusted.append(not reason)
+        if reason:
+            doubtful.append(f"{_place(row)}: {reason}")
+    table = frame[finite].reindex(columns=[*POINT_COLUMNS, *with_endings(*ENDS)]).astype(float)
     table["rotation"] = [row.get("rotation") or _COUNTER_CLOCKWISE for row in records]
-    table["quality"] = [_flags(row, reason) for row, reason in zip(records, reasons, strict=True)]
-    table["trusted"] = [not reason for reason in reasons]
-    doubtful = tuple(f"{_place(row)}: {reason}" for row, reason in zip(records, reasons, strict=True) if reason)
+    table["quality"], table["trusted"] = qualities, trusted
     exported = table if force else table[table["trusted"]]
     keys = [*STATIC_KEY, "excitation_Hz"]
     for load in exported.loc[exported.duplicated(keys), "static_load_N"]:
         raise ExportError(f"the point {load:g} N stands twice at one frequency. Export one method at a time.")
-    return Chosen(exported.sort_values(keys, ignore_index=True), left_out, doubtful)
+    return Chosen(exported.sort_values(keys, ignore_index=True), left_out, tuple(doubtful))
 
 
 def _place(row: Mapping[Any, Any]) -> str:
@@ -111,8 +114,10 @@ def flags(table: pd.DataFrame) -> list[str]:
 
 def _flags(row: Mapping[Any, Any], reasons: str) -> str:
     """Named conditions of a row with what forbids trust, each once; ``"ok"`` if there is nothing."""
-    names = [row.get("quality", row.get("status")), reasons]
-    texts = [text for name in names if isinstance(name, str) for text in name.split("; ")]
+    texts = reasons.split("; ")
+    quality = row.get("quality", row.get("status"))
+    if isinstance(quality, str):
+        texts = quality.split("; ") + texts
     return "; ".join(dict.fromkeys(text for text in texts if text not in ("", "ok"))) or "ok"
 
 

@@ -111,10 +111,10 @@ def export(
         reasons = "\n".join(chosen.doubtful[:5])
         raise NotTrustedError(f"no point can be trusted, nothing is exported:\n{reasons}\n--force writes them, marked.")
     target.mkdir(parents=True, exist_ok=True)
-    before = {path.name for path in target.iterdir()}
+    before = set(target.iterdir())
     _write(target, rows, to, f"tpjb-ident: coefficients of {name or origin}", options)
-    files = tuple(sorted(path.name for path in target.iterdir() if path.name not in before))
-    return Export(target, files, chosen)
+    files = sorted(path.name for path in set(target.iterdir()) - before)
+    return Export(target, tuple(files), chosen)
 
 
 def _write(target: Path, rows: pd.DataFrame, to: str, source: str, options: dict[str, int]) -> None:

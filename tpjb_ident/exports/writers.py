@@ -30,7 +30,7 @@ from tpjb_ident.exports.formats import COLUMNS, ENDS, ROSS_VERSIONS, ExportError
 from tpjb_ident.presentation import UNITS, us_table
 from tpjb_ident.runtime import tables
 from tpjb_ident.runtime.tables import printable, write_atomic, write_text
-from tpjb_ident.schema import KINDS, STATIC_KEY
+from tpjb_ident.schema import KINDS, STATIC_KEY, with_endings
 
 NAME = "bearing_coefficients"
 #: Beside files of a form that holds no intervals.
@@ -52,11 +52,10 @@ _TEMPLATES = jinja2.Environment(
 
 def _coefficient_table(points: pd.DataFrame) -> pd.DataFrame:
     """The table as it leaves: speed in rpm, frequency in rad/s."""
-    intervals = [name + end for name in COLUMNS.values() for end in ENDS]
     place = ["static_load_N", "static_load_direction_deg", "shaft_speed_rpm", "rotation", "frequency_rad_per_s"]
     speed, frequency = 60 * points["shaft_speed_Hz"], _HZ * points["excitation_Hz"]
     rates = points.assign(shaft_speed_rpm=speed, frequency_rad_per_s=frequency)
-    return rates[[*place, *intervals, "quality", "trusted"]]
+    return rates[[*place, *with_endings(*ENDS), "quality", "trusted"]]
 
 
 def write_csv(folder: Path, points: pd.DataFrame, source: str, name: str = NAME) -> None:
@@ -218,16 +217,17 @@ def grids(points: pd.DataFrame, axes: str) -> list[Grid]:
     """Sort points by load and direction into files over ``"speed"``, ``"excitation"`` or ``"both"``."""
     parts = []
     for _, rows in points.groupby(["static_load_N", "static_load_direction_deg", "mirrored"]):
-        frequency, speed = (rows[name].map(_rounded) for name in ("excitation_Hz", "shaft_speed_Hz"))
+        frequency, speed = rows["excitation_Hz"].map(_rounded), rows["shaft_speed_Hz"].map(_rounded)
         line = frequency.mask(frequency == speed, _SYNCHRONOUS)
         # all speeds were run at the same frequencies
         is_grid = frequency.nunique() * speed.nunique() == len(rows)
         rows = rows.assign(line=line).sort_values(["shaft_speed_Hz", "excitation_Hz"])
         if axes == "both" and (is_grid or (line == _SYNCHRONOUS).all()):
-            parts.append(rows)
+            parts.append(Grid(rows))
         else:
-            parts += [part for _, part in rows.groupby("line" if axes == "speed" else "shaft_speed_Hz")]
-    return [Grid(part) for part in parts]
+            for _, part in rows.groupby("line" if axes == "speed" else "shaft_speed_Hz"):
+                parts.append(Grid(part))
+    return parts
 
 
 def _rounded(frequency: float) -> float:
@@ -290,8 +290,8 @@ def write_ross_bearing(folder: Path, bearing: Any, version: int | None = None) -
         bearing = bearing.with_pads(bearing.pads[::-1])
     number, reason = ross_version(version)
     pads = bearing.pads
-    angles = [pad.pivot_angle for pad in pads]
-    assembled = fmean(pad.assembled_clearance for pad in pads)  # that ROSS takes: preloads give each its own
+    angles = list(bearing.pivot_angles)
+    assembled = fmean(bearing.clearances)  # that ROSS takes: preloads give each its own
     fields = {
         "name": printable(bearing.name),
         "number": number,

@@ -127,7 +127,7 @@ def _film(point: BandPoint, clearance: float | None) -> tuple[float, FloatArray,
     film = film_products(point.runs)
     change, scatter = film.change, film.scatter
     if not film.seen:  # without a clearance nothing is stated
-        rms, peak = (max(getattr(s, name) for s in point.runs) / (clearance or np.inf) for name in ("rms", "peak"))
+        rms, peak = np.max([(s.rms, s.peak) for s in point.runs], axis=0) / (clearance or np.inf)
         stated = band_change("pair" if pair else point.kind, rms, peak, _one_sided(point.runs))
         scatter = np.fmin(scatter, (line_scatter(rms) if film.even else stated) / np.sqrt(2))
         change = np.fmin(change, stated)
@@ -271,7 +271,7 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
     D, F = vector(rig, data.blocks, "displacement"), film_force(rig, data.blocks)
     usable = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1)
     used = data.blocks.part(np.flatnonzero(usable))
-    DD, FD = (line_products(used, rows[usable], D[usable]) for rows in (D, F))
+    DD, FD = line_products(used, D[usable], D[usable]), line_products(used, F[usable], D[usable])
     condition = np.sqrt(np.linalg.cond(DD))
     h = np.full(DD.shape, np.nan + 0j)
     regular = condition < ONE_LINE

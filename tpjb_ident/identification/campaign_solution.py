@@ -375,7 +375,10 @@ def covariances_of(
     """Covariances (8, 8) of a point of a solve by source, random and shared ones; what scatters `by_run` is random."""
     shared = {name: share[point] for name, share in solution.shares.items() if np.any(share[point])}
     random = {"random": solution.records[point]}
-    return random | {name: shared.pop(name) for name in by_run if name in shared}, shared
+    for name in by_run:
+        if name in shared:
+            random[name] = shared.pop(name)
+    return random, shared
 
 
 def total(covariances: Mapping[str, FloatArray]) -> FloatArray:
@@ -391,11 +394,16 @@ def shared_changes(
     They are scaled so that the mean of the rows' products is their covariance [N/m]; with the names of the sources.
     `more`: one deviation (P, 8) of further sources by name.
     """
-    shared = [(term, parameter) for term in solution.terms if not term.points for parameter in term.parameters]
-    rows = [k for k, (term, _) in enumerate(shared) if term.name not in by_run]
+    rows, names, count = [], [], 0
+    for term in solution.terms:
+        for parameter in () if term.points else term.parameters:
+            if term.name not in by_run:
+                rows.append(count)
+                names.append(f"{term.name}: {parameter.name}")
+            count += 1
     further = more or {}
-    names = (*(f"{shared[k][0].name}: {shared[k][1].name}" for k in rows), *further)
+    names += further
     if not names:
-        return np.zeros((1, 8 * len(points))), names
+        return np.zeros((1, 8 * len(points))), ()
     factors = np.concatenate([solution.factors[np.ix_(rows, points)], *(f[None] for f in further.values())])
-    return factors.reshape(len(names), -1) * np.sqrt(len(names)), names
+    return factors.reshape(len(names), -1) * np.sqrt(len(names)), tuple(names)

@@ -11,7 +11,7 @@ from rigdata.problem import RigDataError
 from rigdata.vector import zero_uncertainty
 from tpjb_ident.bands.responses import BandPoint, read_points
 from tpjb_ident.bands.run_spectra import is_broadband
-from tpjb_ident.check.observation import observe
+from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.conditions import Conditions, holding, merged
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.estimate.arrowhead import real_numbers
@@ -118,8 +118,14 @@ def _joined(campaign: Campaign, parts: Sequence[Identification]) -> Identificati
 
     Points that other frequencies contradict say so; positions are as uncertain as the probes' stated zeros.
     """
-    points = [point for part in parts for point in part.points]
-    names = tuple(dict.fromkeys(name for part in parts for name in part.calibration_names))
+    points: list[PointResult] = []
+    sources, conditions = {}, {}
+    for part in parts:
+        points += part.points
+        sources.update(dict.fromkeys(part.calibration_names))
+        for condition in part.conditions:
+            conditions[condition.sentence()] = condition
+    names = tuple(sources)
     changes, stop = np.zeros((max(len(names), 1), len(points), 8)), 0
     for part in parts:
         first, stop = stop, stop + len(part.points)
@@ -129,7 +135,6 @@ def _joined(campaign: Campaign, parts: Sequence[Identification]) -> Identificati
     order = sorted(range(len(points)), key=lambda i: points[i].point)
     zero = zero_uncertainty(campaign.channels.values(), "displacement")
     checked = with_frequency_outliers([points[i] for i in order])
-    conditions = {condition.sentence(): condition for part in parts for condition in part.conditions}
     return replace(
         parts[0],
         points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in checked),
@@ -151,7 +156,10 @@ def assemble(
 ) -> Identification:
     """Estimate all points from runs already turned to phasors."""
     workers = workers or Workers()
-    checked = campaign_verdicts(campaign, [seen for digest in finished.digests for seen in digest.observations])
+    observations: list[Observation] = []
+    for digest in finished.digests:
+        observations += digest.observations
+    checked = campaign_verdicts(campaign, observations)
     finished = finished.without(checked.unusable)
     digests = finished.digests
     dry = dry or DryTest()
@@ -199,8 +207,12 @@ def identify_bands(
         observations.append(observe(run))
     checked = campaign_verdicts(campaign, observations)
     bad = checked.unusable
-    unusable = [ExcludedRun(run.id, run.point, RigDataError(bad[run.id])) for run in runs if run.id in bad]
-    usable = [run for run in runs if run.id not in bad]
+    usable, unusable = [], []
+    for run in runs:
+        if run.id in bad:
+            unusable.append(ExcludedRun(run.id, run.point, RigDataError(bad[run.id])))
+        else:
+            usable.append(run)
     excluded: list[ExcludedRun] = []
 
     def solve(rig: Rig) -> BandSolution:
@@ -216,6 +228,7 @@ def identify_bands(
     rig = campaign_rig(campaign, bare=bare, to_set_point=settings.correct, off=checked.off)
     rig = rig.doubting(checked.doubted)
     solved = solved_with_clocks(rig, min(run.sample_rate for run in runs), solve)
+    identified: list[PointResult] = []
     results, numbers = [], []
     points = solved.points
     for b, point in enumerate(points):
@@ -226,13 +239,12 @@ def identify_bands(
         quality = merged(*of_loads, without, *of_records, *of_lines)
         result, parts = _result(solved, b, quality, settings.clearance)
         results.append(result)
+        identified += result.points
         numbers += parts
     changes, names = _shared(solved, numbers)
-    places = [point.point for point in points]
-    named = excluded_runs(excluded, len(runs), places, any_excitation=True)
-    identified = tuple(point for band in results for point in band.points)
+    named = excluded_runs(excluded, len(runs), [point.point for point in points], any_excitation=True)
     about = (*named, *unstated(campaign)), tuple(results), names, cell_stiffness(solved.part)
-    return Identification(campaign.id, settings.method, identified, changes, *about)
+    return Identification(campaign.id, settings.method, tuple(identified), changes, *about)
 
 
 def _shared(solved: BandSolution, parts: list[int]) -> tuple[FloatArray, tuple[str, ...]]:
@@ -264,10 +276,13 @@ def _result(solved: BandSolution, b: int, quality: Conditions, clearance: float 
     data, usable = solved.points[b], solved.usable_of(b)
     lines = tuple(_line(solved, data, int(k)) for k in usable)
     parts = [q for q, part in enumerate(solved.parts) if solved.band[part[0]] == b and len(usable)]
-    points = [_point(solved, q, quality, clearance) for q in parts]
-    # what runs scatter by is one for all parts: no chance between them
-    free = [np.full(8, solved.part.noise_freedom(q)) for q in parts]
-    by_noise = [replace(p, stiffness=replace(p.stiffness, dof=dof)) for p, dof in zip(points, free)]
+    points, by_noise = [], []
+    for q in parts:
+        point = _point(solved, q, quality, clearance)
+        # what runs scatter by is one for all parts: no chance between them
+        dof = np.full(8, solved.part.noise_freedom(q))
+        points.append(point)
+        by_noise.append(replace(point, stiffness=replace(point.stiffness, dof=dof)))
     fits = fits_over_frequency(by_noise, _shared(solved, parts)[0])
     models, chosen = (fits[0].fits, fits[0].supported) if fits else ({}, "raw H")
     figures = data.names, data.runs[0].period, data.resolution, tuple(points)

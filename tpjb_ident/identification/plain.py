@@ -24,7 +24,7 @@ from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_phasors import extract
 from tpjb_ident.results.point_result import quality_cell
 from tpjb_ident.runs.point_data import PointData, gather
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
+from tpjb_ident.schema import POINT_KEY, with_endings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,9 +54,10 @@ class PlainPoint:
 def plain_points(campaign: Campaign, settings: PlainSettings) -> list[PlainPoint]:
     """Solve every operating point of a campaign as the paper prints it."""
     runs = []
-    for run in (run for run in campaign.of_kind("dynamic") if not is_broadband(run)):
-        lines = LineSet((Line("excitation", run.point.excitation_hz),), (), (), run.point.shaft_speed_hz)
-        runs.append(extract(run, lines, window=settings.window))
+    for run in campaign.of_kind("dynamic"):
+        if not is_broadband(run):
+            lines = LineSet((Line("excitation", run.point.excitation_hz),), (), (), run.point.shaft_speed_hz)
+            runs.append(extract(run, lines, window=settings.window))
     return [_solved(data, settings) for data in gather(runs)]
 
 
@@ -83,8 +84,7 @@ def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.Dat
         numbers = np.stack([real_numbers(p.h) * factor, p.standard_error * factor], axis=1)
         figures = (settings.norm, settings.window, len(p.data.runs), p.data.whole.sum(), quality_cell(p.status))
         rows.append([*point.key, *numbers.ravel(), *figures])
-    columns = [name + ending for name in COEFFICIENT_COLUMNS for ending in ("", "_se")]
-    return pd.DataFrame(rows, columns=[*POINT_KEY, *columns, *_FIGURES])
+    return pd.DataFrame(rows, columns=[*POINT_KEY, *with_endings("", "_se"), *_FIGURES])
 
 
 def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
@@ -95,8 +95,7 @@ def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
         file.attrs["equation"] = "F = R h, Eq. (15): h = hxx, hxy, hyx, hyy; rows 2 k and 2 k + 1 are window k"
         for number, p in enumerate(points):
             group = file.create_group(f"point-{number:03d}")
-            point = p.data.point
-            group.attrs.update(zip(POINT_KEY, point.key))
+            group.attrs.update(zip(POINT_KEY, p.data.point.key))
             group.attrs["runs"] = p.data.names
             whole = p.data.whole
             rows = (*r_matrix(p.data.D[whole], p.data.F[whole]), p.data.run_index[whole])

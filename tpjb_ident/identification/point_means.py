@@ -39,13 +39,15 @@ class PointMeans:
 def point_means(rig: Rig, data: PointData) -> PointMeans:
     """Robust start and means of one point."""
     z, channels = channel_windows(data, rig)
-    present = np.array([[channel is not None for channel in run] for run in channels])
+    present = []
+    for run in channels:
+        present.append([channel is not None for channel in run])
     D, F = vectors(z, data, rig)
     table = phasor_table(D, F, data.run_index)
     weights, start, status = _robust_start(table)
     film = _film(rig, data.mass)
     readings = Readings([sensor.clock for sensor in rig.channels], film)
-    means = window_means(z, data.run_index, _window_times(data), readings, weights, present)
+    means = window_means(z, data.run_index, _window_times(data), readings, weights, np.array(present))
     condition = displacement_condition(table.D, weights[table.valid])
     shaft, conditions = _shaft(data, means, rig)
     residual = _residual_density(data, rig, means, film)

@@ -127,8 +127,9 @@ def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
 
     Over a window a line that is off by df turns by pi df T on average; the rest is where its phase is counted from.
     """
-    names = [[line.name for line in each.excitation + each.nuisance] for each in (result.lines, lines)]
-    if names[0] != names[1]:
+    former = result.lines
+    names = [line.name for line in former.excitation + former.nuisance]
+    if names != [line.name for line in lines.excitation + lines.nuisance]:
         return None
     shift = lines.frequencies - result.lines.frequencies
     if np.abs(shift).max() * result.length > MAX_RETUNED:

@@ -219,8 +219,7 @@ def plan_windows(n_samples: int, rate: float, lines: LineSet, length: float | No
     available = n_samples / rate
     # Very long records are cut into more windows, not into windows that fill the memory.
     wanted = length or max(shortest, min(available / _COUNT, MAX_SAMPLES / rate))
-    limits = [("a window", length or math.inf), ("the record", available)]
-    for name, seconds in limits:
+    for name, seconds in [("a window", length or math.inf), ("the record", available)]:
         if seconds < shortest * 0.999:
             raise RecordTooShortError(
                 f"{name} of {seconds:.3g} s cannot tell the lines apart: the nearest to the excitation is "

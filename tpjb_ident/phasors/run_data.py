@@ -56,9 +56,8 @@ def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
             directed += run.vector_channels(quantity)
     if command:
         directed += run.of("command")
-    recorded = {name for device in run.devices for name in device.channels}
     for channel in directed:
-        if channel.name not in recorded:
+        if not any(channel.name in device.channels for device in run.devices):
             run.record(channel.name, 0, 0)  # says that the file lacks it
     readers = []
     for device in run.devices:
@@ -234,9 +233,10 @@ def mains_lines(run: RunPhasors) -> tuple[ComplexArray | None, ComplexArray | No
     if place is None:
         return None, None
     mains = run.lines.whole[place]
-    harmonics = (n * e.frequency for e in run.lines.excitation for n in (2, 3))
-    if any(abs(f - mains.frequency) <= mains.wander for f in harmonics):
-        return None, None
+    for excited in run.lines.excitation:
+        for n in (2, 3):
+            if abs(n * excited.frequency - mains.frequency) <= mains.wander:
+                return None, None
     typical = []
     for z in (run.displacement[:, place], run.force[:, place]):
         complete = z[np.isfinite(z).all(axis=1)]

@@ -136,7 +136,9 @@ def extract(
     `clocks`: by how much lines turn faster by a device's clock, relative.
     """
     readers = device_readers(run)
-    channels = [(c, reader.device.name) for reader in readers for c in reader.channels]
+    channels = []
+    for reader in readers:
+        channels += [(c, reader.device.name) for c in reader.channels]
     channels.sort(key=lambda described: VECTOR_QUANTITIES.index(described[0].quantity))
     length, count = plan_windows(run.length, run.sample_rate, lines, window)
     seconds = length / run.sample_rate
@@ -234,8 +236,7 @@ def run_phasors(run: Run, settings: PhasorSettings | None = None) -> RunPhasors:
     settings = settings or PhasorSettings()
     if run.excitation_kind != "sine":
         text = f"is excited by {run.excitation_kind}; coefficients come from sines, one frequency per run"
-        cure = "Excite with sines, or leave the run out"
-        raise refuse(run.file, "excitation", text, cure, run.id)
+        raise refuse(run.file, "excitation", text, "Excite with sines, or leave the run out", run.id)
     run = with_kept_beginning(run)
     beginning = beginning_of(run, SHORT) if run.length > SHORT else run
     try:

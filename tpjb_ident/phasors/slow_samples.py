@@ -155,8 +155,10 @@ def live_run(run: Run) -> Run:
     for quantity in ("force", "displacement"):
         alike = [name for name, c in run.channels.items() if c.quantity == quantity]
         repeated = 0.0  # largest share of readings equal to the one before, apart from the longest stretch
-        for s in (statistics[name] for name in alike if not statistics[name].constant):
-            repeated = max(repeated, (s.repeats - s.longest_flat + 1) / max(s.values - s.longest_flat, 1))
+        for name in alike:
+            s = statistics[name]
+            if not s.constant:
+                repeated = max(repeated, (s.repeats - s.longest_flat + 1) / max(s.values - s.longest_flat, 1))
         # else noise is below a converter's step, and standing still is usual
         if repeated <= _NOISE_FREE:
             problems += [_problem(run, name, statistics[name]) for name in alike if stands_still(statistics[name])]
@@ -198,7 +200,10 @@ def contradictions(
             groups.setdefault((str(channels[name].quantity), channels[name].plane), []).append(name)
     contradicting = []
     for (quantity, _), names in groups.items():
-        rows = np.vstack([np.column_stack([run_slopes[name] for name in names]) for run_slopes in slopes])
+        columns = []
+        for name in names:
+            columns.append(np.concatenate([run_slopes[name] for run_slopes in slopes]))
+        rows = np.column_stack(columns)
         spread = np.repeat(np.clip(noise[quantity], _CURVED, 1.0), len(rows) // len(slopes))
         if len(names) > 2 and _chance([channels[name] for name in names], rows, spread) < _BY_CHANCE:
             listed = ", ".join(names)

@@ -192,7 +192,7 @@ def unexpected_lines(
                 frequencies += _peaks(record, columns, np.append(listed_lines, frequencies), smallest)
     top = REACH * max(result.lines.driven)
     lobe = _LOBE / records[0].duration
-    frequencies = [f for f in frequencies if f < top and np.abs(images - f).min(initial=np.inf) > lobe]
+    frequencies = [f for f in frequencies if f < top and np.all(np.abs(images - f) > lobe)]
     strange = tuple(sorted(f for f in frequencies if f not in listed_lines))[:MAX_LINES]
     if not strange:  # what leaks from lines that nobody expects makes faint ones stand out
         return tuple(sorted(set(frequencies))), ()

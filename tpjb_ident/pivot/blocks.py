@@ -161,7 +161,9 @@ def cut_blocks(time: FloatArray, vectors: FloatArray, holds: tuple[Hold, ...], l
             if k % 2 and count < 4:  # the rest of a short hold is too much to lose
                 count = max(1, round((stop - start) / length))
                 piece = (stop - start) / count
-            pieces += [(start + i * piece, start + (i + 1) * piece, k // 2 if k % 2 else -1) for i in range(count)]
+            of_hold = k // 2 if k % 2 else -1
+            for i in range(count):
+                pieces.append((start + i * piece, start + (i + 1) * piece, of_hold))
     table = np.array(pieces).reshape(-1, 3)
     edges, number = table[:, :2], table[:, 2].astype(int)
     first, last = np.searchsorted(time, edges.T - 0.5 * period)

@@ -8,7 +8,6 @@ end it. Both are tried with several time constants, weighed by how well they fit
 at the largest load counts as an error of all deflections alike.
 """
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -43,13 +42,17 @@ def without_creep(
     for least, most in ((_ALONE, 0.0), (_BESIDE, 0.0), (_AMONG, 0.5)):
         if sum(map(bool, conditions.values())) < most * len(conditions):
             break
-        for pad in [pad for pad, condition in conditions.items() if not condition]:
+        for pad, condition in list(conditions.items()):
+            if condition:
+                continue
             own = [record for record in less if record.pad == pad]
             if _less_alike(own, noise, _OF_ONE, 0.5 * least)[2]:  # hardly any is none
                 others = [record for record in less if record.pad != pad]  # whose noise no creep of this pad is part of
                 own, _, conditions[pad] = _less_alike(own, pooled_noise(others) if others else noise, _OF_ONE, least)
                 crept = iter(own)
-                less = [next(crept) if record.pad == pad else record for record in less]
+                for place, record in enumerate(less):
+                    if record.pad == pad:
+                        less[place] = next(crept)
         if not any(conditions.values()):
             less, noise, shared = _less_alike(records, noise, _PLAUSIBLE, _LEAST)
             return less, noise, dict.fromkeys(conditions, shared)
@@ -63,7 +66,9 @@ def _less_alike(
     held = [record for record in records if record.holds]
     if not held:
         return list(records), noise, ()
-    durations = [hold.duration for hold in itertools.chain.from_iterable(record.holds for record in held)]
+    durations = []
+    for record in held:
+        durations.extend([hold.duration for hold in record.holds])
     times = np.median(durations) * np.array(_TIMES)
     less = list(records)
     condition: Conditions = ()

@@ -87,12 +87,12 @@ def read_dry_run(run: Run, angle: float | None) -> DryRecord:
         cure = "Export every sample, not one a step; state the sample_rate of a slower device; else repeat the test"
         raise refusal(run, "record", what, cure)
     order = np.argsort(time, kind="stable")  # a logger may repeat or shuffle time stamps
-    time, load, place = (values[order] for values in (time, load, place))
+    time, load, place = time[order], load[order], place[order]
     good = good[order]
     # an overshoot of the load, which friction remembers, is no glitch for being short
     turns = good_samples(load, max(round(_COURSE[0] * rate), 3)) & np.isfinite(time)
     course = time[turns], load[turns]
-    time, load, place = (values[good] for values in (time, load, place))
+    time, load, place = time[good], load[good], place[good]
     order = np.argsort(np.linalg.norm(load, axis=1))
     few = max(3, len(load) // 20)
     push = np.median(load[order[-few:]], axis=0) - np.median(load[order[:few]], axis=0)
@@ -163,12 +163,14 @@ def with_load_zero(records: Sequence[DryRecord]) -> list[DryRecord]:
     them points and begins. Where the manifest states no uncertainty of the zero it counts if it is clear alone.
     """
     stated = zero_uncertainty(axial_channels(records[0].run).values(), "force")
-    lines = [record for record in records if abs(record.load_direction.angle) < LOAD_LIMIT]
-    turn = np.array([record.load_direction.angle for record in lines])
-    load = np.array([record.blocks.load.mean() for record in lines])
-    across = np.array([record.blocks.across_load.mean() for record in lines])
-    error = np.maximum([record.load_direction.se for record in lines], _STRAIGHT) * load
-    design = directions(turn + [record.angle + 0.5 * math.pi for record in lines])
+    lines = []
+    for record in records:
+        blocks, towards = record.blocks, record.load_direction
+        if abs(towards.angle) < LOAD_LIMIT:
+            lines.append((record.angle, towards.angle, towards.se, blocks.load.mean(), blocks.across_load.mean()))
+    angle, turn, deviation, load, across = np.reshape(lines, (-1, 5)).T
+    error = np.maximum(deviation, _STRAIGHT) * load
+    design = directions(turn + (angle + 0.5 * math.pi))
     freedom = len(lines) - 2
     zero, covariance, text = np.zeros(2), np.diag(stated**2), ""
     if freedom > 0 and np.linalg.matrix_rank(design, 0.1) == 2:

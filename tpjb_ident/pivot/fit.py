@@ -132,7 +132,9 @@ def _fit_pads(pads: Sequence[Sequence[DryRecord]], structure: str) -> list[Pivot
     data = [fit_data(records, noise) for records in pads]
     data, scatter = with_shared_errors(pads, data)
     variants = list(itertools.product(LAWS.values(), (False, True)))
-    fits = [[fit_law(law, contact, pad_data) for law, contact in variants] for pad_data in data]
+    fits = []
+    for pad_data in data:
+        fits.append([fit_law(law, contact, pad_data) for law, contact in variants])
     fits = with_shared_shape(fits, posterior_weights(fits), data)
     curves = []
     for records, candidates, weights in zip(pads, fits, posterior_weights(fits), strict=True):
@@ -224,7 +226,7 @@ def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
     """Loop over the loads as applied that both branches cover: taking off the friction would close it."""
     used = steps.weight > 0
     applied = steps.load / (1.0 - law.theta[FRICTION] * steps.branch)
-    up, down = (applied[used & (steps.branch == branch)] for branch in (1, -1))
+    up, down = applied[used & (steps.branch == 1)], applied[used & (steps.branch == -1)]
     if min(len(up), len(down)) < 2:
         return None
     return measure_loop(law, float(max(up.min(), down.min())), float(min(up.max(), down.max())))

@@ -190,7 +190,9 @@ def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> FloatArray:
     """Posterior shares (pads, n) of the n fits of every pad, which are those of the same laws in the same order."""
     names, number = np.unique([fit.name for fit in fits[0]], return_inverse=True)
     contact = np.array([fit.contact for fit in fits[0]])
-    evidence = np.array([[fit.log_evidence for fit in candidates] for candidates in fits])
+    evidence = []
+    for candidates in fits:
+        evidence.append([fit.log_evidence for fit in candidates])
     of_law = np.eye(len(names))[number]
     law_prior = np.where(names == "spline", _SPLINE_PRIOR, 1.0)
     law_prior *= _PSEUDO_PADS / law_prior.sum()

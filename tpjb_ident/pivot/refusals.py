@@ -66,10 +66,12 @@ def refused_records(
     if not records:
         return [], [], NoiseModel(1.0, 1.0, 1.0)
     records, noise = with_load_zero(records), pooled_noise(records)
-    moved = [displacement_direction(record.blocks, noise, record.quantisation) for record in records]
-    records = [replace(record, displacement_direction=way) for record, way in zip(records, moved, strict=True)]
-    problems = check_directions(records, pad_angles)
-    return records, problems + check_placement(records) + check_spares(records, noise), noise
+    directed = []
+    for record in records:
+        direction = displacement_direction(record.blocks, noise, record.quantisation)
+        directed.append(replace(record, displacement_direction=direction))
+    problems = check_directions(directed, pad_angles)
+    return directed, problems + check_placement(directed) + check_spares(directed, noise), noise
 
 
 def check_directions(records: Sequence[DryRecord], pad_angles: FloatArray) -> list[Problem]:

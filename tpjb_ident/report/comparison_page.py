@@ -117,14 +117,13 @@ def _sections(comparison: Comparison, frame: pd.DataFrame, flagged: Sequence[tup
         "Intervals are 95 %, random and calibration errors together. Outliers is the share of record windows "
         "that got no weight."
     )
-    pads = () if comparison.bearing is None else comparison.bearing.pads
-    drawn = np.array([pad.pivot_angle for pad in pads]), np.array([pad.assembled_clearance for pad in pads])
-    polygon, predicted = comparison.clearance, {}
+    bearing, polygon, predicted = comparison.bearing, comparison.clearance, {}
+    angles, drawn = np.zeros((2, 0)) if bearing is None else np.array([bearing.pivot_angles, bearing.clearances])
     if comparison.loci is not None:
         for name, rows in comparison.loci.groupby("pivots", sort=False):
             predicted[str(name)] = rows[["x_m_predicted", "y_m_predicted"]].to_numpy()
-    clearances = [] if polygon is None else [clearance_table(polygon, drawn[1])]
-    places = position_panels(polygon, drawn, comparison.locus, predicted)
+    clearances = [] if polygon is None else [clearance_table(polygon, drawn)]
+    places = position_panels(polygon, (angles, drawn), comparison.locus, predicted)
     return [
         *coefficient_sections(frame),
         _pivot_section(comparison),
@@ -198,7 +197,10 @@ def _flagged(comparison: Comparison) -> list[tuple[str, Condition]]:
     parts += [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
     tests = {"clearance": comparison.clearance, "locus": comparison.locus}
     parts += [(name, test.status) for name, test in tests.items() if test is not None]
-    return [(place, condition) for place, conditions in parts for condition in conditions]
+    flagged = []
+    for place, conditions in parts:
+        flagged += [(place, condition) for condition in conditions]
+    return flagged
 
 
 def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:

@@ -1,6 +1,7 @@
 """A diagnosis in words, and its report: verdict, residuals before and after, candidates, how it was made."""
 
 import functools
+import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -61,7 +62,7 @@ def verdict_sentences(
             deviations=deviations,
             worst=max(deviations, key=lambda c: abs(deviations[c][0])) if deviations else "",
             direct=DIRECT,
-            rivals=[effect for group in verdict.indistinguishable for effect in group[1:]],
+            rivals=list(itertools.chain(*(group[1:] for group in verdict.indistinguishable))),
             checks=dict.fromkeys(word.check for word in words if word),
             worse=worse,
             beyond=[a for a in verdict.assumptions if abs(a.deviation) > Deciding.visible],
@@ -141,11 +142,12 @@ def next_command(source: Sequence[object], verdict: Verdict, folder: Path) -> li
 
 def parameter_rows(verdict: Verdict) -> list[list[str]]:
     """One row per parameter of the effects, in the units that people read."""
-    return [
-        [label_in_words(e.name), label_in_words(key), f"#{p.value:.0f}" if key in _PLACES else amount(p)]
-        for e in verdict.effects
-        for key, p in e.parameters.items()
-    ]
+    rows = []
+    for e in verdict.effects:
+        for key, p in e.parameters.items():
+            size = f"#{p.value:.0f}" if key in _PLACES else amount(p)
+            rows.append([label_in_words(e.name), label_in_words(key), size])
+    return rows
 
 
 #: The gaps of a verdict in words; each is another question.
@@ -177,7 +179,6 @@ def write_diagnosis_report(
     points = () if result.identification is None else result.identification.points
     title = "Effects added to the model, with 95 % intervals"
     added = Table(title, ["effect", "parameter", "value"], parameter_rows(verdict))
-    worst = next((d.observable for d in verdict.disagreement if d.observable[0] in "kc"), "kyy")
     page = Page(
         title=f"{campaign.id}: what the model lacks",
         subtitle=campaign.description,
@@ -185,7 +186,7 @@ def write_diagnosis_report(
         facts=tested_facts(campaign, result.setup.bearing, points),
         values=values_table(points),
         flags=flags_line([p.quality for p in points], len(points)),
-        lead=worst,
+        lead=next((d.observable for d in verdict.disagreement if d.observable[0] in "kc"), "kyy"),
         key_table=added if verdict.effects else _gap_table(verdict),
         sections=_sections(result, coefficient_sections(table) if len(table) else []),
         **origin,
@@ -207,8 +208,7 @@ def _other_explanations(verdict: Verdict) -> Section:
     """What else it could be, and the test that tells."""
     notes = []
     for group in verdict.indistinguishable:
-        names = " or ".join(in_words(name) for name in group)
-        notes.append(f"These data cannot tell apart: {names}.")
+        notes.append(f"These data cannot tell apart: {' or '.join(map(in_words, group))}.")
     if verdict.effects:
         notes += _rivals(verdict)
     if verdict.next_test and verdict.verdict != "consistent":
@@ -220,16 +220,20 @@ def _rivals(verdict: Verdict) -> list[str]:
     """Fitted explanations that the named one does not leave as far behind as a name asks for, with their sizes."""
     names = {effect.name for effect in verdict.effects}
     listed = verdict.candidates
-    named = [c for c in listed if {label.split()[0] for label in c.parameters} - set(TERMS) == names][:1]
-    probability = sum(c.probability for c in named)
+    named, probability = None, 0.0
+    for candidate in listed:
+        fitted = {label.split()[0] for label in candidate.parameters}
+        if fitted - set(TERMS) == names:
+            named, probability = candidate, candidate.probability
+            break
     odds = Deciding.included / (1.0 - Deciding.included)
     notes = []
     for rival in listed:
-        if rival not in named and rival.probability * odds > probability:
-            sizes = [
-                finding(label.split()[0], {key: Estimate(**value) for key, value in parameters.items()})
-                for label, parameters in rival.parameters.items()
-            ]
+        if rival is not named and rival.probability * odds > probability:
+            sizes = []
+            for label, parameters in rival.parameters.items():
+                estimates = {key: Estimate(**value) for key, value in parameters.items()}
+                sizes.append(finding(label.split()[0], estimates))
             share = f"probability {rival.probability:.2f}, that of what is named {probability:.2f}"
             notes.append(f"It may also be that {' and '.join(sizes)}: {share}.")
     return notes or [f"No other explanation that was fitted comes within odds of 1 to {odds:.0f} of it."]

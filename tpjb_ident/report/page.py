@@ -88,7 +88,10 @@ class Page:
     @property
     def panels(self) -> list[Panel]:
         """All panels, in order of the sections."""
-        return [panel for section in self.sections for panel in section.panels]
+        panels: list[Panel] = []
+        for section in self.sections:
+            panels += section.panels
+        return panels
 
 
 def render_page(page: Page, svg: Mapping[str, str]) -> str:

@@ -60,7 +60,7 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
     """What was tested, for the head of a page: bearing, loads, speeds, excitation, runs, when and by whom."""
     facts = {}
     if bearing is not None:
-        diameter, length = (amount(v, "size", ".4g") for v in (bearing.journal_diameter, bearing.length))
+        diameter, length = amount(bearing.journal_diameter, "size", ".4g"), amount(bearing.length, "size", ".4g")
         facts["Bearing"] = f"{bearing.name}, {len(bearing.pads)} pads, Ø {diameter} × {length}"
     facts |= set_points([p.point.key for p in points])
     amplitude = max((p.amplitude for p in points if np.isfinite(p.amplitude)), default=0.0)
@@ -78,8 +78,8 @@ def set_points(keys: Sequence[tuple[float, float, float, float, str]]) -> dict[s
     """Loads, speeds and excitation of operating points, whose keys are given."""
     if not keys:
         return {}
-    loads, directions, speeds, excitations, senses = zip(*keys, strict=True)
-    shaft = ", ".join(spinning(*turning) for turning in sorted(set(zip(speeds, senses, strict=True))))
+    loads, directions, speeds, excitations, senses = zip(*keys)
+    shaft = ", ".join(spinning(*turning) for turning in sorted(set(zip(speeds, senses))))
     at = ", ".join(f"{angle:g}°" for angle in sorted(set(directions)))
     load = _span({value / size("load") for value in loads}, symbol("load"))
     return {"Static load": f"{load} at {at}", "Shaft": shaft, "Excitation": _span(set(excitations), "Hz")}
@@ -227,7 +227,9 @@ def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
 
 def budget_table(result: Identification) -> Table:
     """What the 95 % intervals of all coefficients are made of, source by source, as in ``budget.csv``."""
-    sources = list(dict.fromkeys(name for p in result.points for name in p.budget))
+    sources = {}
+    for p in result.points:
+        sources.update(p.budget)
     rows = []
     for place, p in zip(point_labels(points_table(result.points)), result.points, strict=True):
         deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}

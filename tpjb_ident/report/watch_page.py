@@ -1,6 +1,5 @@
 """The page of a campaign while it is measured: what to do now, what there is, what is still to run."""
 
-from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -50,17 +49,13 @@ def write_watch_page(folder: Path, snapshot: Snapshot, refresh: int, origin: Map
 
 def coverage_table(snapshot: Snapshot) -> Table:
     """How many runs of every kind and set-up have landed."""
-    groups = defaultdict(list)
+    counts: dict[str, Any] = {}
     for status in snapshot.states:
         kind = status.run.kind
         name = set_point(status.run.point) if kind == "dynamic" else KINDS_IN_WORDS.get(kind, kind)
-        groups[name].append(status)
-    rows = []
-    for name, group in groups.items():
-        good = sum(s.counts for s in group)
-        again = sum(s.state == "repeat" for s in group)
-        missing = sum(s.state in _WAITING for s in group)
-        rows.append([name, *map(str, (good, again, missing))])
+        states = np.array([status.counts, status.state == "repeat", status.state in _WAITING], dtype=int)
+        counts[name] = counts.get(name, 0) + states
+    rows = [[name, *map(str, numbers)] for name, numbers in counts.items()]
     return Table("How far the plan is", ["", "good", "to repeat", "to run"], rows)
 
 
@@ -78,7 +73,7 @@ def _sections(snapshot: Snapshot, bearing: Any) -> list[Section]:
     pivots = [pivot_stiffness_table(measured.curves, None)] if measured.curves else []
     clearances = []
     if measured.polygon is not None:
-        clearances.append(clearance_table(measured.polygon, np.array([p.assembled_clearance for p in bearing.pads])))
+        clearances.append(clearance_table(measured.polygon, np.array(bearing.clearances)))
     waiting = []
     for status in snapshot.states:
         run = status.run

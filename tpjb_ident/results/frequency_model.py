@@ -24,7 +24,7 @@ from tpjb_ident.estimate.statistics import half_width
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.results.point_result import PointResult, by_static_point
-from tpjb_ident.schema import KINDS
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, MASS
 
 #: Method of points of a band where nothing tells noise from motion.
 BLIND = "band-hv"
@@ -41,10 +41,12 @@ _FIGURES = (
     "probability",
     "largest_misfit",
 )
-_VALUES = tuple(column for kind in KINDS.values() for column in kind.columns)
+_VALUES = (*COEFFICIENT_COLUMNS, *MASS.columns)
 _ENDINGS = ("", "_lo", "_hi", "_se", "_dof")
 #: Columns of a model in the tables.
-MODEL_COLUMNS = (*_FIGURES, *(name + ending for name in _VALUES for ending in _ENDINGS))
+MODEL_COLUMNS = [*_FIGURES]
+for _value in _VALUES:
+    MODEL_COLUMNS += [_value + ending for ending in _ENDINGS]
 
 
 @dataclass(frozen=True)

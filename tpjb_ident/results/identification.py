@@ -18,7 +18,7 @@ from tpjb_ident.presentation import Presented
 from tpjb_ident.results.frequency_model import MODEL_COLUMNS, FrequencyModel, StaticFits, fits_over_frequency
 from tpjb_ident.results.point_result import PointResult, quality_cell
 from tpjb_ident.rounding import counted
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY, with_endings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -105,7 +105,9 @@ class Identification(Presented):
     def _table(self, estimates: Callable[[PointResult], Iterable[DynamicStiffness]]) -> pd.DataFrame:
         import pandas as pd
 
-        models = {place: group.supported for group in self.frequency_fits() for place in group.places}
+        models = {}
+        for group in self.frequency_fits():
+            models.update(dict.fromkeys(group.places, group.supported))
         rows = []
         for place, point in enumerate(self.points):
             model = {"frequency_model": models.get(place, "single line")}
@@ -126,7 +128,9 @@ class Identification(Presented):
         """What every source adds to every coefficient's uncertainty: ``budget.csv``."""
         import pandas as pd
 
-        rows = [row for p in self.points for row in _budget_rows(p)]
+        rows = []
+        for point in self.points:
+            rows += _budget_rows(point)
         return pd.DataFrame(rows, columns=[*POINT_KEY, *_BUDGET_COLUMNS])
 
     def frequency_fits(self) -> list[StaticFits]:
@@ -199,8 +203,7 @@ def _estimate_row(p: PointResult, est: DynamicStiffness, model: dict[str, str]) 
 def coefficient_columns(est: DynamicStiffness) -> dict[str, float]:
     """K and C with their intervals under the names of ``coefficients.csv``."""
     numbers = est.figures() * np.repeat([1.0, 1 / est.omega], 4)[:, None]
-    names = [name + ending for name in COEFFICIENT_COLUMNS for ending in _ENDINGS]
-    return dict(zip(names, numbers.ravel().tolist()))
+    return dict(zip(with_endings(*_ENDINGS), numbers.ravel().tolist()))
 
 
 def _budget_rows(p: PointResult) -> list[list[Any]]:
@@ -211,21 +214,19 @@ def _budget_rows(p: PointResult) -> list[list[Any]]:
     """
     est, parts = p.stiffness, p.budget
     factor = np.repeat([1.0, 1 / est.omega], 4)
-    names = [f"{symbol}{entry}" for symbol in "kc" for entry in ENTRIES]
     variances = np.array([np.maximum(np.diag(part), 0.0) for part in parts.values()]).reshape(-1, 8)
     shares = np.nan_to_num(variances / np.maximum(variances.sum(axis=0), np.finfo(float).tiny))
     errors = np.sqrt(variances) * factor
     rows = []
-    for i, name in enumerate(names):
+    for i, column in enumerate(COEFFICIENT_COLUMNS):
         for j, source in enumerate(parts):
             kind, dof = ("random", est.dof[i]) if source in p.scattering else ("systematic", np.inf)
             unit = "N/m" if i < 4 else "Ns/m"
-            rows.append([*p.point.key, name, unit, source, kind, errors[j, i], shares[j, i], dof])
+            rows.append([*p.point.key, column[:3], unit, source, kind, errors[j, i], shares[j, i], dof])
     return rows
 
 
 _KEY_COLUMNS = (*STATIC_KEY, "excitation")
-_PARTS = [f"h{entry}_{part}_N_per_m" for part in ("real", "imag") for entry in ENTRIES]
 _FIGURES = (
     "coherence_x",
     "coherence_y",
@@ -237,12 +238,11 @@ _FIGURES = (
     "condition_number",
     "quality",
 )
-_LINE_COLUMNS = (
-    *_KEY_COLUMNS,
-    "excitation_Hz",
-    *(name + ending for name in _PARTS for ending in ("", "_lo", "_hi", "_se", "_se_systematic")),
-    *_FIGURES,
-)
+_LINE_COLUMNS = [*_KEY_COLUMNS, "excitation_Hz"]
+for _part in ("real", "imag"):
+    for _entry in ENTRIES:
+        _LINE_COLUMNS += [f"h{_entry}_{_part}_N_per_m{_end}" for _end in ("", "_lo", "_hi", "_se", "_se_systematic")]
+_LINE_COLUMNS += _FIGURES
 _MODEL_COLUMNS = (*_KEY_COLUMNS, "model", "supported", "method", *MODEL_COLUMNS, "quality")
 
 

@@ -67,9 +67,12 @@ def amplitude_slope(data: PointData, h: ComplexArray, weights: FloatArray) -> Am
             angle = round(np.degrees(run.direction) % 180.0, 1)
             groups.setdefault(angle, []).append((np.log2(np.linalg.norm(D)), excess))
     # Differences within a direction only: what a direction as a whole is off by is no amplitude effect.
-    centred = [np.array(g) - np.mean(g, axis=0) for g in groups.values()]
-    centred = [g for g in centred if np.ptp(g[:, 0]) > np.log2(MIN_RATIO)]
-    runs = sum(len(g) for g in centred)
+    centred, runs = [], 0
+    for group in groups.values():
+        rows = np.array(group) - np.mean(group, axis=0)
+        if np.ptp(rows[:, 0]) > np.log2(MIN_RATIO):
+            centred.append(rows)
+            runs += len(rows)
     if runs - len(centred) < 2:
         return AmplitudeSlope()
     x, y = np.concatenate(centred).T

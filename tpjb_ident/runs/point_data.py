@@ -83,11 +83,13 @@ def excluded_runs(
 ) -> Conditions:
     """Which of the campaign's `of` dynamic runs take no part, and why; which operating points have no run left."""
     reasons = listed([f"{run.run} ({run.reason})" for run in excluded], _LISTED, "; ")
-    lost = [run for run in excluded if not any(run.belongs(point, any_excitation) for point in points)]
-    places = [place_of(run.point.static_load, run.point.excitation_hz) for run in lost]
-    if any_excitation:
-        places = [amount(run.point.static_load, "load") for run in lost]
-    runs = listed([run.run for run in lost], _LISTED)
+    lost, places = [], []
+    for run in excluded:
+        if not any(run.belongs(point, any_excitation) for point in points):
+            lost.append(run.run)
+            load = run.point.static_load
+            places.append(amount(load, "load") if any_excitation else place_of(load, run.point.excitation_hz))
+    runs = listed(lost, _LISTED)
     return holding(
         (excluded, "runs-left-out", f"{len(excluded)} of {of} dynamic runs take no part: {reasons}"),
         (lost, "point-lost", f"no usable run at {'; '.join(dict.fromkeys(places))}: {runs}"),
@@ -184,8 +186,12 @@ class PointData(RunsOfPoint):
     def counted(self, weights: FloatArray | float = 1.0) -> list[tuple[RunPhasors, IntArray]]:
         """Runs with the places of their whole windows, those that have any; of some weight where one is given, (n,)."""
         good = self.whole & (weights > 0)
-        places = [np.flatnonzero(good & (self.run_index == i)) for i in range(len(self.runs))]
-        return [(run, rows) for run, rows in zip(self.runs, places) if len(rows)]
+        counted = []
+        for i, run in enumerate(self.runs):
+            places = np.flatnonzero(good & (self.run_index == i))
+            if len(places):
+                counted.append((run, places))
+        return counted
 
     def says(self, condition: str) -> bool:
         """Whether one of the runs carries a condition of this name."""
@@ -208,8 +214,10 @@ def gather(runs: Sequence[RunPhasors]) -> list[PointData]:
             # of one set point that the drive missed, runs find the frequency each by itself
             alike = (p for p in points if abs(p.excitation - line.excitation) <= _ONE_LINE * p.excitation)
             points.setdefault(next(alike, line), []).append((run, i))
-    members = [pair for points in loads.values() for pair in points.items()]
-    return [point_data(*pair) for pair in sorted(members, key=lambda pair: pair[0].key)]
+    members: dict[OperatingPoint, list[tuple[RunPhasors, int]]] = {}
+    for points in loads.values():
+        members |= points
+    return [point_data(*pair) for pair in sorted(members.items(), key=lambda pair: pair[0].key)]
 
 
 def point_of(point: OperatingPoint, frequency: float) -> OperatingPoint:
@@ -241,5 +249,7 @@ def mean_temperatures(run: Run) -> dict[int, float]:
 
 def pad_means(runs: Sequence[dict[int, float]]) -> dict[int, float]:
     """Mean temperature by pad over the runs that have it [K]."""
-    pads = sorted({pad for run in runs for pad in run})
-    return {pad: float(np.mean([run[pad] for run in runs if pad in run])) for pad in pads}
+    means = {}
+    for pad in sorted(set[int]().union(*runs)):
+        means[pad] = float(np.mean([run[pad] for run in runs if pad in run]))
+    return means

@@ -321,15 +321,18 @@ def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -
     result = verdicts([report for report in reports if report.run.kind == "dynamic"])
     for report in reports:
         result.doubted.update(report.doubted)
-        result.off.update({(report.run.id, name): deviation for name, deviation in report.off.items()})
+        for name, deviation in report.off.items():
+            result.off[report.run.id, name] = deviation
     for observation in static:
         for i in observation.pick("displacement") if observation.run.kind == "clearance" else ():
             result.swept[observation.run.id, observation.channels[i].name] = np.ptp(observation.spread[:, i]) / 2
     # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
     optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
     for run, problems in result.shared.items():
-        result.doubtful.setdefault(run, []).extend(p for p in problems if p.place in optional)
-        problems[:] = [p for p in problems if p.place not in optional]
+        for problem in tuple(problems):
+            if problem.place in optional:
+                problems.remove(problem)
+                result.doubtful.setdefault(run, []).append(problem)
     return result
 
 
@@ -381,11 +384,15 @@ def dry_test(campaign: Campaign, settings: PhasorSettings, method: str) -> DryTe
             raise RigDataError(errors)
     points = gather([run_phasors(run, settings) for run in runs])
     estimates = [estimate_table(phasor_table(p.D, p.F, p.run_index), p.omega, method) for p in points]
-    good = sorted((est for est in estimates if np.isfinite(est.covariance).all()), key=lambda est: est.omega)
-    bad = [f"{est.omega / (2 * np.pi):g} Hz" for est in estimates if not np.isfinite(est.covariance).all()]
+    good, bad = [], []
+    for est in estimates:
+        if np.isfinite(est.covariance).all():
+            good.append((est.omega, est.h, est.covariance))
+        else:
+            bad.append(f"{est.omega / (2 * np.pi):g} Hz")
+    good.sort(key=lambda numbers: numbers[0])
     text = f"the baseline runs at {', '.join(bad)} give no answer: two directions are needed"
     conditions = holding((bad, "baseline-missing", text))
     if not good:
         return DryTest(conditions=conditions)
-    parts = (np.array([getattr(est, name) for est in good]) for name in ("omega", "h", "covariance"))
-    return DryTest(RigStiffness(*parts), conditions)
+    return DryTest(RigStiffness(*map(np.array, zip(*good))), conditions)

@@ -41,7 +41,7 @@ def compared(first: Path, second: Path, file: str, tolerance: float) -> Differen
         return Difference(file, "missing" if old.is_file() else "new")
     if old.read_bytes() == new.read_bytes():
         return Difference(file, "same")
-    before, now = (dict(_values(_content(path))) for path in (old, new))
+    before, now = dict(_values(_content(old))), dict(_values(_content(new)))
     if "" in before:  # no values with places
         return Difference(file, "not judged")
     size, change = 0.0, ""

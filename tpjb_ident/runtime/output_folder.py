@@ -102,7 +102,9 @@ def _bring(staging: Path, target: Path, command: str) -> None:
 def _join_records(staging: Path, target: Path, command: str) -> None:
     """Have run.json tell of the folder's other commands too, an entry each, and note what this one no longer writes."""
     new, before = files_in(staging), former_runs(target)
-    ours = {name for entry in before.values() for name in outputs_of(entry)} | {RECORD}
+    ours = {RECORD}
+    for entry in before.values():
+        ours.update(outputs_of(entry))
     foreign = [name for name in new if (target / name).exists() and name not in ours]
     if foreign:
         raise BadInputError(
@@ -121,9 +123,10 @@ def _finish_moving(target: Path) -> None:
         return
     if (ready / RECORD).exists():
         (target / RECORD).unlink(missing_ok=True)
-    for name in [name for name in files_in(ready) if name not in (RECORD, _STALE)]:
-        (target / name).parent.mkdir(parents=True, exist_ok=True)
-        (ready / name).replace(target / name)
+    for name in files_in(ready):
+        if name not in (RECORD, _STALE):
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            (ready / name).replace(target / name)
     if (ready / RECORD).exists():
         for name in json.loads((ready / _STALE).read_text("utf-8")):
             former = (target / name).resolve()

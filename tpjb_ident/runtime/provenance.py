@@ -61,7 +61,10 @@ def _run_from_1(document: Document) -> Document:
         settings = entry.get("settings") if isinstance(entry, dict) else None
         if isinstance(settings, dict) and isinstance(places := entry.get("inputs_at"), dict):
             # a file without a place of its own is one that the campaign carries: nobody typed it
-            typed = {k: v for k, v in settings.items() if k in places or not str(v).endswith(".toml")}
+            typed = {}
+            for key, value in settings.items():
+                if key in places or not str(value).endswith(".toml"):
+                    typed[key] = value
             entry.setdefault("options", typed)
     return document
 

@@ -20,7 +20,7 @@ from rigdata.near_names import nearest_name
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.presentation import UNITS
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, TABLES, Column
+from tpjb_ident.schema import TABLES, Column, with_endings
 
 #: Larger tables are refused before they are read [bytes].
 _LARGEST = 2**28
@@ -93,8 +93,7 @@ def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str]
             raise BadInputError(f"{path.name}: column {name} is missing{hint}. Add it.")
     for column in header:
         if misspelt is not None and column.definition is None and misspelt.fullmatch(column.name):
-            coefficients = [name + ending for name in COEFFICIENT_COLUMNS for ending in ("", "_se", "_lo", "_hi")]
-            near = nearest_name(column.name, coefficients)
+            near = nearest_name(column.name, with_endings("", "_se", "_lo", "_hi"))
             raise BadInputError(f"{path.name}: column {column.name!r} is no coefficient. Did you mean {near}?")
     lines = []
     for line, cells in records:
@@ -123,7 +122,7 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
         if path.stat().st_size > _LARGEST:
             raise BadInputError(f"{path.name}: is larger than {_LARGEST >> 20} MB. Is it the right file?")
         with path.open(encoding="utf-8-sig", newline="") as stream:
-            head = next((line for line in stream if line.strip() and not line.lstrip().startswith("#")), "")
+            head = next((line for line in stream if line.lstrip()[:1] not in ("", "#")), "")
             stream.seek(0)
             reader = csv.reader(stream, delimiter=max(_DELIMITERS, key=head.count), strict=True)
             for row in reader:

@@ -5,7 +5,8 @@ from pathlib import Path
 
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: The function of OpenBLAS by the names that its builds give it.
-_NAMES = tuple(f"{a}openblas_set_num_threads{b}" for a in ("scipy_", "") for b in ("64_", ""))
+_NAME = "openblas_set_num_threads"
+_NAMES = (f"scipy_{_NAME}64_", f"scipy_{_NAME}", f"{_NAME}64_", _NAME)
 #: The system's list of what is loaded, where it has one.
 _LOADED = Path("/proc/self/maps")
 

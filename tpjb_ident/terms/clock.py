@@ -31,7 +31,10 @@ class Clock(Factor):
         self._devices = devices
         self._taken_off = np.array([rig.rates.get(device, 0.0) for device in devices])
         self.parameters = tuple(Parameter(device or "records", "100 ppm", _QUARTZ) for device in devices)
-        self.sensors = np.array([[s.clock == device for device in devices] for s in rig.channels], dtype=float)
+        turns = []
+        for sensor in rig.channels:
+            turns.append([sensor.clock == device for device in devices])
+        self.sensors = np.array(turns, dtype=float)
 
     def rates(self, value: FloatArray) -> dict[str, float]:
         """Rates by device, relative."""

@@ -57,5 +57,7 @@ class Delay(Factor):
             return said
         if not self.rig.out_of_step:
             return (*said, Condition(OUT_OF_STEP, "; ".join(self.words(fitted))))
-        conditions = (condition for shown in self.rig.contradicted.values() for condition in shown)
-        return (*(condition for condition in conditions if condition == OUT_OF_STEP), *said)
+        conditions = []
+        for shown in self.rig.contradicted.values():
+            conditions += [condition for condition in shown if condition == OUT_OF_STEP]
+        return (*conditions, *said)

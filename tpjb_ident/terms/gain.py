@@ -1,5 +1,7 @@
 """Gains of single sensors, as far as the manifest states their uncertainty: one number a sensor for the campaign."""
 
+import itertools
+
 import numpy as np
 
 from rigdata.arrays import ComplexArray, IntArray
@@ -18,7 +20,7 @@ class Gain(Factor):
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
-        table = [[rig.off.get((run, sensor.name), 0.0) for sensor in rig.channels] for run in blocks.runs]
+        table = [rig.off.get((run, sensor.name), 0.0) for run, sensor in itertools.product(blocks.runs, rig.channels)]
         #: (runs, m): deviation of a gain that is another one in a run
         self._off = np.reshape(table, (len(blocks.runs), len(rig)))
         self._places: list[tuple[int, int, int]] = []

@@ -23,12 +23,13 @@ class RunGain(Factor):
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
         runs, first = np.unique(blocks.run, return_index=True)
-        sizes = dict(zip(runs.tolist(), blocks.gain_scatter[first].tolist()))
         self._first = dict(zip(runs.tolist(), first.tolist()))
-        self._places = [(r, int(j)) for r, size in sizes.items() if size > 0 for j in rig.pick("force")]
-        self.parameters = tuple(
-            Parameter(f"{rig.channels[j].name} in {blocks.runs[r]}", "1", sizes[r]) for r, j in self._places
-        )
+        self._places, parameters = [], []
+        for r, size in zip(runs.tolist(), blocks.gain_scatter[first].tolist()):
+            for j in rig.pick("force") if size > 0 else ():
+                self._places.append((r, int(j)))
+                parameters.append(Parameter(f"{rig.channels[j].name} in {blocks.runs[r]}", "1", size))
+        self.parameters = tuple(parameters)
 
     def exponent(self, blocks: Blocks) -> ComplexArray:
         """One in the cell's own row, in the blocks of that run."""

@@ -74,11 +74,10 @@ class Unplanned:
 def place_record(campaign: Campaign, path: Path, done: frozenset[str]) -> Unplanned:
     """Find the planned run that a record is, or repeats."""
     file, stem = path.relative_to(campaign.path).as_posix(), path.stem
-    named = [
-        run
-        for run in campaign.runs
-        if stem.lower().startswith(run.id.lower()) and _AGAIN.fullmatch(stem[len(run.id) :])
-    ]
+    named = []
+    for run in campaign.runs:
+        if stem.lower().startswith(run.id.lower()) and _AGAIN.fullmatch(stem[len(run.id) :]):
+            named.append(run)
     planned, evidence = max(named, key=lambda run: len(run.id), default=None), "its name"
     if planned is None:
         try:
@@ -88,8 +87,7 @@ def place_record(campaign: Campaign, path: Path, done: frozenset[str]) -> Unplan
     if planned is None:
         return Unplanned(file, None, "", "no planned run has its load, frequency and direction")
     run_id = file if any(run.id == stem for run in campaign.runs) else stem
-    relation = "repeats" if planned.id in done else "is"
-    text = f"{relation} {planned.id} by {evidence}"
+    text = f"{'repeats' if planned.id in done else 'is'} {planned.id} by {evidence}"
     return Unplanned(file, run_in_file(planned, path, file, run_id), planned.id, text)
 
 

@@ -67,9 +67,9 @@ def judge_states(
     # a bad run is replaced by a later one of the same test that is better
     done = [status for status in states if status.counts]
     for number, status in enumerate(states):
-        better = [d for d in done if _test(d.run) == _test(status.run) and d.landed >= status.landed]
-        if status.state == "repeat" and better:
-            states[number] = replace(status, state="replaced")
+        for later in done if status.state == "repeat" else ():
+            if _test(later.run) == _test(status.run) and later.landed >= status.landed:
+                states[number] = replace(status, state="replaced")
     return states, common
 
 
@@ -226,7 +226,9 @@ def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
     if not waiting:
         unfinished = [s for s in states if s.state in ("repeat", "being written")]
         return [] if unfinished else [Step("next", "Every run of the plan has landed.")]
-    group = [run for run in waiting if at is not None and run.kind in _TURNING and _set_up(run) == _set_up(at)]
+    group = []
+    if at is not None:
+        group = [run for run in waiting if run.kind in _TURNING and _set_up(run) == _set_up(at)]
     run = (group or waiting)[0]
     remainder = f"{len(group) - 1} more at this load" if len(group) > 1 else f"{len(waiting) - 1} more in the plan"
     change = "" if group or at is None else " (new set-up)"

@@ -210,9 +210,8 @@ class Watcher:
 
     def _measured(self, good: Campaign) -> Measured:
         """Results of the runs that count, each made anew where its runs have news."""
-        pads = () if self.bearing is None else self.bearing.pads
-        angles = [pad.pivot_angle for pad in pads]
-        clearance = min((pad.assembled_clearance for pad in pads), default=None)
+        angles = () if self.bearing is None else self.bearing.pivot_angles
+        clearance = None if self.bearing is None else min(self.bearing.clearances)
         settings = IdentifySettings(clearance=clearance, keep_weights=False)
         measures: dict[str, tuple[str, Callable[[], Any]]] = {
             "identification": ("dynamic", lambda: identify(good, settings, store=self.store)),

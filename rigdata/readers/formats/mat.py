@@ -58,7 +58,8 @@ def read_mat(path: Path) -> list[Series]:
         if value.size == 1 and value.item() > 0 and _RATES.fullmatch(_last_part(name).lower()):
             rates.append(value.item())
         elif value.size >= _SHORTEST:
-            channels |= {channel.name: channel for channel in _columns(name, value, texts)}
+            for channel in _columns(name, value, texts):
+                channels[channel.name] = channel
     if not channels:
         names = ", ".join(name for name, _ in variables[:6]) or "no numbers at all"
         fault = f"holds no vector of at least {_SHORTEST} numbers, only {names}"
@@ -174,7 +175,10 @@ def _columns(name: str, value: np.ndarray, texts: dict[str, list[str]]) -> Itera
 
 def _listed(lists: dict[str, list[str]], named: re.Pattern[str], lengths: tuple[int, ...]) -> list[str]:
     """The first list of such a name and length; empty where there is none."""
-    return next((cells for key, cells in lists.items() if named.search(key) and len(cells) in lengths), [])
+    for key, cells in lists.items():
+        if named.search(key) and len(cells) in lengths:
+            return cells
+    return []
 
 
 @dataclass

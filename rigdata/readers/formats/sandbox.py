@@ -93,10 +93,13 @@ def main(function: str, path: Path, seconds: int, answer: Path) -> None:
     except Exception as problem:  # whatever another library raises on a broken file: it is the file's fault here
         np.savez(answer, error=f"cannot be read ({type(problem).__name__}: {str(problem)[:120]})")
     else:
-        heads = [[channel.name, channel.unit, channel.group] for channel in series]
-        numbers = {f"values {i}": channel.values for i, channel in enumerate(series)}
-        times = {f"time {i}": channel.time for i, channel in enumerate(series) if channel.time is not None}
-        np.savez(answer, heads=json.dumps(heads), **numbers, **times)
+        heads, arrays = [], {}
+        for i, channel in enumerate(series):
+            heads.append([channel.name, channel.unit, channel.group])
+            arrays[f"values {i}"] = channel.values
+            if channel.time is not None:
+                arrays[f"time {i}"] = channel.time
+        np.savez(answer, heads=json.dumps(heads), **arrays)
 
 
 if __name__ == "__main__":

@@ -61,8 +61,9 @@ def too_long_text(path: Path, names: Sequence[str], base: int = 0) -> str | None
         for start, block in _pieces(stream, size):
             heaps.update(start + match.start() - base for match in re.finditer(_SIGNATURE, block))
             for name in names:
-                ends = [match.end() - 1 for match in re.finditer(name.encode() + b"\0", block)]
-                followers += [(name, block[end : end + _BEHIND]) for end in ends]
+                for match in re.finditer(name.encode() + b"\0", block):
+                    end = match.end() - 1
+                    followers.append((name, block[end : end + _BEHIND]))
     for name, piece in followers:
         for place in range(len(piece) - _REFERENCE.size + 1):
             length, address, _ = _REFERENCE.unpack_from(piece, place)

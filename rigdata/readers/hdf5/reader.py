@@ -186,7 +186,8 @@ class Hdf5Reader(RunReader):
                 names += [name for name in lengths if name not in self.channels]
             clocks = time_columns(names, self.channels)
             timed = {}
-            for clock in [names[i] for i in clocks]:
+            for place in clocks:
+                clock = names[place]
                 time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
                 grid = timed_grid(lengths[clock], clock, time, clock, run_rate)
                 timed[clock] = grid if rate is None or self.channels[clock].clock else replace(grid, rate=rate)
@@ -259,8 +260,10 @@ class Hdf5Reader(RunReader):
 
     def _unit(self, group: Any, name: str) -> str:
         attributes = self._dataset(group, name).attrs
-        keys = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]
-        return str(_text(attributes[keys[0]]) or "") if keys else ""
+        for key in UNIT:
+            if key in attributes and is_text(attributes.get_id(key), self.path):
+                return str(_text(attributes[key]) or "")
+        return ""
 
 
 def _text(value: Any) -> object:

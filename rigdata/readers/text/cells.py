@@ -118,10 +118,7 @@ _MISSING_WORDS = """
     -Inf INF -INF
 """
 MISSING = dict.fromkeys(["", *_MISSING_WORDS.split()])
-_NUMBER = {
-    mark: re.compile(rf"[+−-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
-    for mark in ".,"
-}
+_NUMBER = {sep: re.compile(rf"[+−-]?(?:[0-9]+(?:[{sep}][0-9]*)?|[{sep}][0-9]+)(?:[eE][+-]?[0-9]+)?") for sep in ".,"}
 
 
 def is_stamp(cell: str) -> bool:

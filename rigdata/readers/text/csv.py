@@ -43,7 +43,7 @@ def read_text(record: RecordFile) -> Contents:
     used = {name for name, channel in channels.items() if channel.quantity != "ignore"} if channels else {*names}
     if not used.intersection(names):
         raise record.refuse("", "holds none of the channels that are used", "Check the channels' names")
-    places = [i for i, name in enumerate(names) if i in clocks or (name in used and i not in head.dates)]
+    places = sorted({i for i, name in enumerate(names) if name in used}.difference(head.dates).union(clocks))
     columns, problems = read_table(head, places)
     length = len(columns[places[0]])
     timing = places if None in serving(names, clocks, channels) else clocks
@@ -60,8 +60,8 @@ def read_text(record: RecordFile) -> Contents:
     units = ["s" if i in head.stamps else unit for i, unit in enumerate(head.units)]
     series = [Series(names[i], units[i], columns[i][:length], None, f"column {i + 1}") for i in places]
     if channels:
-        described = {*channels, *(names[i] for i in clocks)}
-        return Contents(series, unread=tuple(n for n in names if n and n not in described), problems=problems)
+        described = {"", *channels, *(names[i] for i in clocks)}
+        return Contents(series, unread=tuple(n for n in names if n not in described), problems=problems)
     series = [column for column in series if column.name and np.isfinite(column.values).any()]
     if all(is_time(column.name) for column in series):
         raise record.refuse("", "holds no column of numbers", "Export the run again")
@@ -104,7 +104,8 @@ def read_table(head: Head, places: Sequence[int]) -> tuple[dict[int, FloatArray]
 def _options(head: Head, places: Sequence[int], numbers: bool, skip: Any) -> dict[str, Any]:
     """How pyarrow is to read the columns, as numbers or as texts; `skip` is asked about lines of a wrong width."""
     labels = [f"c{i}" for i in range(len(head.names))]  # names of a file need not be unique or present
-    types = {labels[i]: pa.float64() if numbers and i not in head.stamps else pa.string() for i in places}
+    texts = head.stamps if numbers else places
+    types = {labels[i]: pa.string() if i in texts else pa.float64() for i in places}
     delimiter = "\t" if head.delimiter == " " else head.delimiter
     return {
         "read_options": pv.ReadOptions(

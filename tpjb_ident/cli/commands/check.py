@@ -88,7 +88,9 @@ def check_summary(c: Command, name: str, problems: Sequence[Problem], campaign: 
     """Gather the content of check.json; without a campaign, where it could not even be opened."""
     from rigdata.manifest.fields import KINDS
 
-    counts = {severity: sum(p.severity == severity for p in problems) for severity in SEVERITIES}
+    counts = dict.fromkeys(SEVERITIES, 0)
+    for problem in problems:
+        counts[problem.severity] += 1
     return {
         "schema": "tpjb-check/1",
         "campaign": name,

@@ -57,9 +57,9 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
     bearing = bearing or (drawings[0].name if len(drawings) == 1 else None)
     exports, problems = _read_exports(c, folder, column_names(before) if update else ())
     drawing = (folder if bearing else c.target) / (bearing or BEARING)
-    angles: list[float] = []
+    angles: tuple[float, ...] = ()
     with suppress(BearingError):  # it cannot be read yet
-        angles = [pad.pivot_angle for pad in load_bearing(drawing).pads] if drawing.is_file() else []
+        angles = load_bearing(drawing).pivot_angles if drawing.is_file() else ()
     if update:
         text, changes = updated_manifest(before, exports, angles)
         channels: list[list[str]] = []
@@ -87,7 +87,7 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
 
 
 def _draft(
-    c: Command, folder: Path, bearing: str | None, exports: Sequence[Export], angles: list[float]
+    c: Command, folder: Path, bearing: str | None, exports: Sequence[Export], angles: Sequence[float]
 ) -> tuple[str, str, list[list[str]]]:
     """Text of a new manifest, what was found, and channel by channel; the bearing's draft is written beside it."""
     from rigdata.survey.draft import draft_manifest

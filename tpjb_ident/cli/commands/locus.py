@@ -25,8 +25,7 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     from tpjb_ident.report.comparison_page import clearance_table
     from tpjb_ident.report.sections import position_panels
 
-    angles = np.array([pad.pivot_angle for pad in drawing.pads])
-    drawn = np.array([pad.assembled_clearance for pad in drawing.pads])
+    angles, drawn = np.array([drawing.pivot_angles, drawing.clearances])
     with c.results("measuring positions"):
         static = measure_static(source, drawing, every_sweep=True)
         measured = {"clearance": static.clearance, "locus": static.locus}

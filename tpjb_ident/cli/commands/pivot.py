@@ -21,7 +21,7 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     source = c.open(campaign)
     drawing = c.bearing_of(source)
     with c.results("fitting pivot curves"):
-        curves = fit_pivots(source, [pad.pivot_angle for pad in drawing.pads], on_refusal="few")
+        curves = fit_pivots(source, drawing.pivot_angles, on_refusal="few")
         formula = printed_formula(drawing)
         c.table("pivot_curves", pivot_table(curves, formula=formula))
         c.table("pivot_pads", pads_table(curves))

@@ -63,7 +63,8 @@ def plan(
             show("parts of the campaign", 1, 2)
             table, parts = planning.data_sets(setup, tests)
             c.table("data_sets", table)
-            plans |= {f"isolability_{name}": part for name, part in parts.items()}
+            for name, part in parts.items():
+                plans[f"isolability_{name}"] = part
         c.table("effects", result.to_frame())
         panels = []
         for name, part in plans.items():

@@ -27,14 +27,21 @@ def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
         refuse_special(path)
         if not path.exists():
             raise BadInputError(f"--input {path}: no such file or folder. Check the path.")
-    files = [file for name, entry in entries.items() for file in files_of(results, name, entry, given or ())]
+    files: list[dict[str, str]] = []
+    for name, entry in entries.items():
+        files += files_of(results, name, entry, given or ())
     if not files:
         raise BadInputError(f"{results}: {RECORD} names no results. Run the command again.")
     mismatches = [file for file in files if file["state"] != "same"]
     count = f"{len(files) - len(mismatches)} of {len(files)}" if mismatches else "all"
     c.print(f"{results}: {count} results and inputs are the same bytes as when the commands ended.")
+    differing, missing = [], []
     for file in mismatches:
         c.print(f"{file['command']}: {file['role']} {file['file']} {STATES[file['state']]}")
+        if (file["role"], file["state"]) == ("input", "missing"):
+            missing.append(file["file"])
+        else:
+            differing.append(file["file"])
     for name, entry in entries.items():
         former = texts_of(entry, "versions")
         changed = [f"{key} {former[key]} (now {now})" for key, now in versions().items() if former.get(key, now) != now]
@@ -45,10 +52,8 @@ def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
         c.options = {"results": results}
         with c.results():
             c.json("verify.json", {"schema": "tpjb-verify/1", "folder": results.name, "files": files})
-    missing = [file["file"] for file in mismatches if (file["role"], file["state"]) == ("input", "missing")]
-    if len(missing) < len(mismatches):
-        names = [file["file"] for file in mismatches if file["file"] not in missing]
-        raise NotTrustedError(f"{results}: not as it was computed: {listed(names)}. Run the command again.")
+    if differing:
+        raise NotTrustedError(f"{results}: not as it was computed: {listed(differing)}. Run the command again.")
     if missing:
         raise BadInputError(
             f"{results}: the results are unchanged, but {len(missing)} inputs ({listed(missing, 1)}) are not where "
@@ -82,7 +87,9 @@ def files_of(results: Path, name: str, entry: Mapping[str, Any], inputs: Sequenc
     for place in inputs or [results / place for place in texts_of(entry, "inputs_at").values()]:
         inner = campaign_place(place)
         folders += [inner if inner.is_dir() else inner.parent, *([place] if place.is_dir() else ())]
-    around = [parent for folder in folders for parent in folder.resolve().parents]
+    around: list[Path] = []
+    for folder in folders:
+        around += folder.resolve().parents
     for file, recorded_hash in texts_of(entry, "inputs_sha256").items():
         if recorded_hash != "missing":  # it was not there then either
             # its folder tells it from another file of its name

@@ -95,7 +95,7 @@ def _measured_laws(c: Command, campaign: Campaign, bearing: Bearing) -> dict[str
     from tpjb_ident.pivot.fit import fit_pivots
 
     try:
-        curves = fit_pivots(campaign, [pad.pivot_angle for pad in bearing.pads])
+        curves = fit_pivots(campaign, bearing.pivot_angles)
         return {"measured": measured_laws(curves, len(bearing.pads), campaign.id)}
     except ValueError as error:  # one of our own refusals: the page is of use without these curves
         c.warn(f"no measured pivots: {error}")

@@ -108,8 +108,8 @@ def _write_results(c: Command, snapshot: Snapshot, bearing: Any, refresh: int) -
             c.table("coefficients", snapshot.measured.identification.to_frame())
         runs = []
         for s in snapshot.states:
-            run = {key: getattr(s.run, key) for key in ("id", "kind", "file")}
-            state = {key: getattr(s, key) for key in ("state", "landed", "planned")}
+            run = {"id": s.run.id, "kind": s.run.kind, "file": s.run.file}
+            state = {"state": s.state, "landed": s.landed, "planned": s.planned}
             runs.append({**run, **state, "findings": [asdict(finding.problem) for finding in s.findings]})
         document = {
             "schema": "tpjb-watch/1",
@@ -140,8 +140,7 @@ def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
         if points:
             c.show_table(points_table(points), name)
     steps = [step.text for step in snapshot.steps]
-    problems = [str(problem) for problem in snapshot.problems]
-    lines = [*steps, *snapshot.lacks, *problems, *snapshot.measured.refusals]
+    lines = [*steps, *snapshot.lacks, *map(str, snapshot.problems), *snapshot.measured.refusals]
     for line in lines:
         if line not in printed:
             c.print(line)

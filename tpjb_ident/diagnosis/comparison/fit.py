@@ -106,11 +106,11 @@ class Fit:
     def unsized(self) -> tuple[str, ...]:
         """Labels of faults whose size is not told from none: its 95 % interval holds where nothing happens."""
         rows = zip(self.faults, self.amplitudes, self.unknowns.slices, self.errors, strict=True)
-        return tuple(
-            fault.label
-            for fault, size, at, error in rows
-            if not np.any(np.abs(size - self.unknowns.origin[at]) > HALF_INTERVAL * error)
-        )
+        labels = []
+        for fault, size, at, error in rows:
+            if not np.any(np.abs(size - self.unknowns.origin[at]) > HALF_INTERVAL * error):
+                labels.append(fault.label)
+        return tuple(labels)
 
     @property
     def needs_more(self) -> bool:

@@ -69,8 +69,7 @@ class Path:
         low, high = np.maximum(low, -width), np.minimum(high, width)
         if self.nodes is not None:
             return np.linspace(low, high, _POINTS)
-        likeliest = np.linalg.solve(square + np.diag(1.0 / width**2), pull)
-        return np.clip(likeliest, low, high)[None, :]
+        return np.clip(np.linalg.solve(square + np.diag(1.0 / width**2), pull), low, high)[None, :]
 
 
 def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
@@ -128,7 +127,9 @@ def lengthened(
             nodes = [node for node in _wanted(path.fault, size) if node not in changes]
             asked.append((i, changes, (path.fault, nodes)))
     parts = [asked[k :: run.opened.count] for k in range(run.opened.count)]
-    jobs = [(place, [job for _, _, job in part], most) for part in parts]
+    jobs = []
+    for part in parts:
+        jobs.append((place, [job for _, _, job in part], most))
     for part, rows in zip(parts, run(path_changes, jobs), strict=True):
         for (i, changes, (fault, _)), row in zip(part, rows, strict=True):
             if changes or row:

@@ -142,6 +142,5 @@ class Problem:
 
 def loosened(observations: Observations, shares: FloatArray) -> Observations:
     """Trust no temperature of a pad that hardly carries in the baseline; `shares` (n,)."""
-    idle = np.nan_to_num(shares, nan=1.0) < Deciding.idle
-    noise = np.where(idle, Deciding.idle_temperature, 0.0)
+    noise = np.where(np.nan_to_num(shares, nan=1.0) < Deciding.idle, Deciding.idle_temperature, 0.0)
     return replace(observations, covariance=observations.covariance + np.diag(noise**2))

@@ -52,7 +52,10 @@ class Comparison:
     @property
     def shares(self) -> dict[str, float]:
         """Inclusion probability of every name, on whichever pad or direction."""
-        return {name: self.holding(name) for fit in self.fits for name in fit.names}
+        shares: dict[str, float] = {}
+        for fit in self.fits:
+            shares |= {name: self.holding(name) for name in fit.names}
+        return shares
 
     def holding(self, *names: str) -> float:
         """Probability that one or another of some names takes part."""
@@ -79,7 +82,8 @@ class _Search:
         self.moved: set[frozenset[str]] = set()  #: single faults beside which paths were asked
         self.whole = True  #: whether paths are known as far as jumps of K and C ask for
         self.clear = -math.inf  #: coarse estimate from which a start comes before all others [nats]
-        self.places = Counter(name for name, _ in {(fault.name, fault.label) for fault in problem.faults})
+        faults = {(fault.name, fault.label) for fault in problem.faults}
+        self.places = Counter(name for name, _ in faults)
 
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
@@ -355,5 +359,7 @@ class _Search:
         total = logsumexp([*counted, *(start.estimate for start in waiting)])
         probabilities = np.exp(counted - total)
         order = np.lexsort((-logs, -probabilities))
-        promised = tuple(({fault.name for fault in s.faults}, math.exp(s.estimate - total)) for s in waiting)
-        return Comparison({rows[i]: float(probabilities[i]) for i in order}, promised, tenable, self.paths)
+        promised = []
+        for start in waiting:
+            promised.append(({fault.name for fault in start.faults}, math.exp(start.estimate - total)))
+        return Comparison({rows[i]: float(probabilities[i]) for i in order}, tuple(promised), tenable, self.paths)

@@ -40,7 +40,9 @@ class Unknowns:
             self.slices.append(slice(first, first + count))
             priors[:, self.slices[-1]] = fault.prior
         #: where the faults' numbers are
-        self.of_faults = [i for at in self.slices for i in range(at.start, at.stop)]
+        self.of_faults: list[int] = []
+        for at in self.slices:
+            self.of_faults += range(at.start, at.stop)
         self.origin, self.width, self.low, self.high = priors
         plain_rows = np.delete(np.arange(plain.shape[1]), [fault.own for fault in faults if fault.own >= 0])
         #: (t,): where tolerances with their stated prior are

@@ -55,7 +55,7 @@ class Candidate:
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
         """Physical bounds of the amplitudes, (k,) each."""
-        ends = np.array([sorted(p.to_linear(v) for v in (p.low, p.high)) for p in self._leading])
+        ends = np.array([sorted([p.to_linear(p.low), p.to_linear(p.high)]) for p in self._leading])
         return ends[:, 0], ends[:, 1]
 
     @property
@@ -114,7 +114,7 @@ def candidates(setup: Setup, skip: frozenset[str] = frozenset()) -> tuple[Candid
 def _within(parameter: Parameter, setup: Setup) -> Parameter:
     """A parameter with the bounds that a set-up's own number leaves: no more can be missing than there is."""
     pads, housing = setup.bearing.pads, setup.instruments.housing_mass
-    clearance, bore = (min(getattr(pad, name) for pad in pads) for name in ("assembled_clearance", "pad_clearance"))
+    clearance, bore = min(setup.bearing.clearances), min(pad.pad_clearance for pad in pads)
     most_missing = {
         "mass_error": 0.5 * housing,  # who weighs a housing, or adds its parts up, is not wrong by more
         "radial_offset": clearance, "assembled_clearance_change": clearance, "clearance_change": clearance,

@@ -150,7 +150,7 @@ class Forward:
     @functools.cached_property
     def _drawn(self) -> FloatArray:
         """The pivots' angles in the bearing file, from which those of a polygon's sides count, (n_pads,)."""
-        return np.array([pad.pivot_angle for pad in self.setup.bearing.pads])
+        return np.array(self.setup.bearing.pivot_angles)
 
     @functools.cached_property
     def _rows(self) -> IntArray:

@@ -102,13 +102,13 @@ def _at_point(*point: float) -> Where:
 
 
 #: Family and observables of one test, in the order of its values: K and omega C, a position and a load reading.
-_STIFFNESS = [("h", f"{part}{entry}") for part in "kc" for entry in ("xx", "xy", "yx", "yy")]
+_STIFFNESS = [("h", name[:3]) for name in VALUES]
 _LOCUS = [("locus", "locus_x"), ("locus", "locus_y"), ("load", "load_ratio"), ("load", "load_turn")]
 
 
 def _elements(names: Iterable[tuple[str, str]], *places: Where) -> list[Element]:
     """Every observable at every place."""
-    return [Element(family, observable, place) for place in places for family, observable in names]
+    return [Element(*name, place) for place, name in itertools.product(places, names)]
 
 
 def all_elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
@@ -308,8 +308,10 @@ def observe_table(path: Path, reading_error: float | None = None, model: float =
         factor = np.where(np.arange(len(values)) < 4, 1.0, point.excitation)
         row = point.excitation, factor * values, factor * errors
         tests[point.static_load, point.static_load_direction, point.spin].append(row)
-    dynamic = tuple(DynamicTest(*static, tuple(row[0] for row in rows)) for static, rows in tests.items())
-    parts = [(value, np.diag(error**2)) for rows in tests.values() for _, value, error in rows]
-    table = _gathered(Layout(dynamic), (), parts, model)
+    dynamic, parts = [], []
+    for static, points in tests.items():
+        dynamic.append(DynamicTest(*static, tuple(row[0] for row in points)))
+        parts += [(value, np.diag(error**2)) for _, value, error in points]
+    table = _gathered(Layout(tuple(dynamic)), (), parts, model)
     least = Deciding.axis * (reading_error or 0.0) * direct_scale(table.elements, table.value)
     return replace(table, covariance=np.maximum(table.covariance, np.diag(least**2)))

@@ -161,10 +161,9 @@ def _ranked(comparison: Comparison) -> tuple[RankedCandidate, ...]:
     out = []
     for fit, probability in comparison.probabilities.items():
         if fit.faults:
-            parameters = {
-                fault.label: {k: vars(p) for k, p in parameters_of(fit, i).items()}
-                for i, fault in enumerate(fit.faults)
-            }
+            parameters = {}
+            for i, fault in enumerate(fit.faults):
+                parameters[fault.label] = {k: vars(p) for k, p in parameters_of(fit, i).items()}
             score, problem = fit.posterior.total - reference, fit.problem
             held_gap = gap(problem.observations, free_prediction(fit), problem.held)
             out.append(RankedCandidate(fit.label, score, held_gap, parameters, probability))

@@ -1,5 +1,6 @@
 """Rules: what a comparison says, in their order. Constants and what set them: `Deciding`."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -101,8 +102,8 @@ def _places(comparison: Comparison, model: Fit) -> tuple[str, ...]:
     if places[likeliest[0]] >= Deciding.included * sum(places.values()):
         return ()
     shared = set(likeliest[0]).intersection(*likeliest)
-    listed = dict.fromkeys(label for labels in likeliest for label in labels if label not in shared)
-    return tuple(listed)[: Deciding.family]
+    listed = dict.fromkeys(itertools.chain(*likeliest))
+    return tuple(label for label in listed if label not in shared)[: Deciding.family]
 
 
 def look_alikes(held: HeldOut, family: tuple[str, ...]) -> Judgement:

@@ -237,7 +237,7 @@ def _columns(names: Sequence[str], room: float) -> int:
     """Most columns whose widest entries, side by side, fit into `room` inches."""
     for columns in range(min(len(names), 4), 1, -1):
         rows = math.ceil(len(names) / columns)
-        widest = [max(len(name) for name in names[j * rows : (j + 1) * rows] or [""]) for j in range(columns)]
+        widest = [max(map(len, names[j * rows : (j + 1) * rows] or [""])) for j in range(columns)]
         if sum(0.55 + CHARACTER * n for n in widest) <= room:
             return columns
     return 1
@@ -248,8 +248,7 @@ def add_colour_bar(axes: Axes, image: Any, text: str) -> Axes:
     shrink(axes, right=0.75)
     width = _size(axes)[0] * axes.get_position().width
     bar = axes.inset_axes((1.0 + 0.12 / width, 0.0, 0.14 / width, 1.0))
-    figure = axes.figure
-    figure.colorbar(image, cax=bar, label=text).outline.set_visible(False)
+    axes.figure.colorbar(image, cax=bar, label=text).outline.set_visible(False)
     return bar
 
 
@@ -285,7 +284,8 @@ def longest_series(table: pd.DataFrame, over: str) -> pd.DataFrame | None:
     """
     column, quantity, _ = _AXES[over]
     fixed = ["excitation_Hz" if over == "load" else "static_load_N", *STATIC_KEY[1:]]
-    groups = [group for _, group in table.groupby([name for name in fixed if name in table])]
+    keys = [name for name in fixed if name in table]
+    groups = (group for _, group in table.groupby(keys))
     best = max(groups, key=lambda group: group[column].nunique(), default=table)
     if best[column].nunique() < 2:
         return None
@@ -321,10 +321,11 @@ def _set_points(table: pd.DataFrame) -> list[tuple[float, float, list[str]]]:
     forms = {"static_load_direction_deg": "{:g}°", "shaft_speed_Hz": "shaft {:g} Hz", "rotation": "{}"}
     varied = [name for name in forms if name in table and len(table[name].drop_duplicates()) > 1]
     short = table.replace({"rotation": dict(zip(ROTATIONS, ("ccw", "cw"), strict=True))}) if varied else table
-    return [
-        (row["static_load_N"], row["excitation_Hz"], [forms[name].format(row[name]) for name in varied])
-        for row in short.to_dict("records")
-    ]
+    points = []
+    for row in short.to_dict("records"):
+        words = [forms[name].format(row[name]) for name in varied]
+        points.append((row["static_load_N"], row["excitation_Hz"], words))
+    return points
 
 
 def thinned(time: FloatArray, values: FloatArray, most: int) -> tuple[FloatArray, FloatArray]:

@@ -213,14 +213,15 @@ def gap(
     gaps = source if isinstance(source, Mapping) else source.gap_by_observable
     if not gaps:
         raise ValueError("there is no gap by observable to draw")
-    before, after = (np.array([gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
+    before = np.array([gap_at(g, "_before") for g in gaps.values()])
+    after = np.array([gap_at(g, "_after") for g in gaps.values()])
     words = []
     for (name, values), old, new in zip(gaps.items(), before, after, strict=True):
         star = "" if any(key.startswith("heldout") for key in values) else "*"
         worse = " (worse)" if new > max(1.05 * old, 1.0) else ""
         words.append(f"{name.replace('_', ' ')}{star}{worse}")
     figure, axes = new_picture("gap, sigma", "", height=0.2 * len(words) + 1.3)
-    shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
+    shrink(axes, left=max(CHARACTER * max(map(len, words)) + 0.2 - LEFT, 0.0))
     y = np.arange(len(words))
     added = not np.array_equal(before, after)  # else there is no after
     baseline: Style = {"color": PAPER, "edgecolor": LIGHT["orange"], "hatch": "////", "label": "as stated"}
@@ -259,7 +260,7 @@ def isolability(plan: CampaignPlan | ArrayLike, names: Sequence[str] | None = No
     if matrix.shape != (k, k) or len(names) != k:
         raise ValueError(f"the matrix must be square with one name per row, got shape {matrix.shape}")
     words = [label_in_words(name) for name in names]
-    room = CHARACTER * max(len(word) for word in words)
+    room = CHARACTER * max(map(len, words))
     # the panel's own margins and the colour bar come on top of cells and names
     width, height = _SQUARE * k + room + 2.0, max(_SQUARE * k, _TALL) + room + 1.0
     across, down = "could pass for (framed: closer than 3)", "effect at work"
