@@ -11,7 +11,7 @@ from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.phasors.lines import known_lines
 from tpjb_ident.phasors.run_data import RunPhasors
 
-H = np.array([[2.0 + 0.7j, 0.3 - 0.2j], [-0.4 + 0.1j, 1.5 + 0.9j]])
+H = np.array([[2.0 + 0.7j, 0.3 - 0.2j], [-0.4 - 0.2j, 1.5 + 0.9j]])
 
 
 def vector_channels(quantities: tuple[str, ...] = VECTOR_QUANTITIES) -> tuple[Channel, ...]:

@@ -159,6 +159,25 @@ def test_a_film_feeds_the_motion_where_its_damping_takes_no_power():
         assert fed(1j * np.diag([1.0, -factor * 0.1]), 0.1) is named
 
 
+@pytest.mark.parametrize(
+    ("turn", "gain", "named"),
+    [
+        (0.0, 1.0, ()),
+        (1.0, 1.0, ()),
+        (5.0, 1.0, ("damping-hardly-symmetric",)),
+        (12.0, 1.0, ("damping-not-symmetric",)),
+        (0.0, 1.2, ("damping-hardly-symmetric",)),
+    ],
+)
+def test_probes_that_stand_elsewhere_or_read_too_much_make_damping_unsymmetric(turn, gain, named):
+    """The film's own is symmetric, its stiffness need not be; probes stand at 45 and 135 deg."""
+    cos, sin = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    square = np.array([[1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(2)
+    reading = square.T @ np.diag([gain, 1.0]) @ square @ np.array([[cos, -sin], [sin, cos]])
+    film = np.array([[2.0, 1.5], [-1.0, 3.0]]) + 1j * np.array([[0.6, 0.1], [0.1, 6.0]])
+    assert flagged(est=stiff(film @ np.linalg.inv(reading))) == named
+
+
 def pattern(hits, n=10, runs=6, missing=0):
     D = np.ones((n * runs, 2), dtype=complex)
     weights = np.ones(n * runs)

@@ -101,6 +101,8 @@ def test_an_outlier_s_interval_reaches_to_what_the_others_let_expect(tmp_path):
         (FilmChange(0.0, hidden=0.02), MAX_AMPLITUDE, ()),
         (FilmChange(0.02, hidden=1e-4), 0.08, ()),
         (FilmChange(0.06, hidden=1e-4), 0.08, ("film-not-linear",)),
+        (FilmChange(0.07, is_shown=False), 0.04, ("large-amplitude",)),
+        (FilmChange(0.16, is_shown=False), 0.1, ("film-not-linear",)),
         (FilmChange(0.0, hidden=1e-4), NEVER_LINEAR * 1.01, ("large-amplitude",)),
     ],
 )

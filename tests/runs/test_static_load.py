@@ -129,6 +129,7 @@ def test_loads_that_are_off_by_more_than_scatter_are_named_with_their_figure(siz
         (1.04, np.log(1.04) / 1.6, 0.0),
         (1 / 1.04, np.log(1.04) / 1.6, 0.0),
         (np.exp(-0.09j), 0.003, 0.09 / 1.6),
+        (np.exp(0.35j), (1 - np.cos(0.35)) / 1.6, 0.35 / 1.6),
         (0.0, 0.003, 0.0),
     ],
 )  # fmt: skip

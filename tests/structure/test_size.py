@@ -16,7 +16,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (119.0, 14_207),
+    "measurement": (119.17, 14_230),
     "model": (75.20, 10_172),
     "rigdata": (59.18, 8_044),
     "diagnosis": (38.21, 4_706),

@@ -137,6 +137,9 @@ def of_runs(recorded: RunsOfPoint) -> dict[str, Any]:
 _MAX_LOST = 0.6
 #: Share of the force by which runs may differ: beyond it they have no H in common.
 _MAX_DISAGREEMENT = 0.06
+#: Antisymmetric part of the damping over its trace, beyond the interval, that films do not have (0.02 in 340 good
+#: campaigns), and from which a sensor is wrong: an axis by 9 deg, a gain by 15 %.
+_DOUBTFUL, _SKEWED = 0.05, 0.15
 #: Half of a probe's travel in a sweep over the clearance, least and most: a polygon reaches up to twice its clearance.
 _TRAVEL = (0.5, 2.5)
 #: Distance between two mean positions over the clearance, at most.
@@ -232,7 +235,8 @@ def _in_stretch(run: RunPhasors) -> BoolArray:
 def physics(stiffness: DynamicStiffness, inertia: float) -> Conditions:
     """Say whether `inertia` [kg] stays in the force, which nothing measures: on soft cells.
 
-    And where damping, the symmetric part of Im h, is negative beyond doubt: no cross-coupled stiffness is in it.
+    And where damping, the symmetric part of Im h, is negative beyond doubt: no cross-coupled stiffness is in it. By
+    Reynolds' equation the rest is nothing, whatever the bearing: beyond the interval it is the sensors' work.
     """
     if not np.isfinite(stiffness.h).all():
         return ()
@@ -242,7 +246,17 @@ def physics(stiffness: DynamicStiffness, inertia: float) -> Conditions:
     damping = np.linalg.eigvalsh((stiffness.h.imag + stiffness.h.imag.T) / 2)[0]
     text = "the film would feed the motion instead of damping it: check polarity, axes and sign of forces"
     negative = damping < -3 * stiffness.standard_error[4:].max()
-    return holding((inertia > 0, name, remains), (negative, "negative-damping", text))
+    (xx, xy), (yx, yy) = stiffness.h.imag.tolist()
+    skew = (yx - xy) / abs(xx + yy)
+    beyond = abs(skew) - float(np.hypot(*stiffness.half_width()[[5, 6]])) / abs(xx + yy)
+    shown = f"cyx - cxy is {100 * skew:+.0f} % of cxx + cyy, which no film has: as if probes and cells stood "
+    shown += f"{abs(np.degrees(np.arctan(skew))):.0f} deg from one another, or one probe or cell read too much"
+    return holding(
+        (inertia > 0, name, remains),
+        (negative, "negative-damping", text),
+        (beyond > _SKEWED, "damping-not-symmetric", shown),
+        (_DOUBTFUL < beyond <= _SKEWED, "damping-hardly-symmetric", shown),
+    )
 
 
 def directional_pattern(data: PointData, weights: FloatArray) -> Conditions:
