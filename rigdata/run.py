@@ -239,8 +239,7 @@ class Run(RunDescription):
         channels = self.vector_channels(quantity)
         names = tuple(c.name for c in channels)
         readings, time, rate = self._stretch(names, start, stop)
-        values = np.ascontiguousarray(vector_rows(channels, readings).T)
-        return VectorRecord(quantity, values, time, rate, names)
+        return VectorRecord(quantity, np.ascontiguousarray(vector_rows(channels, readings).T), time, rate, names)
 
     def of(self, quantity: str) -> list[Channel]:
         """Channels that measure a quantity."""
@@ -324,5 +323,4 @@ def speed_from_pulses(readings: FloatArray, time: FloatArray) -> FloatArray:
     pulses = pulse_times(readings, time)
     if len(pulses) < 2:
         return np.full(len(readings), np.nan)
-    speeds = 2 * np.pi / np.diff(pulses)
-    return np.interp(time, 0.5 * (pulses[1:] + pulses[:-1]), speeds)
+    return np.interp(time, 0.5 * (pulses[1:] + pulses[:-1]), 2 * np.pi / np.diff(pulses))

@@ -203,8 +203,7 @@ class RunReader(RecordFile):
             return grid.begin + np.arange(start, stop) / grid.rate
         if grid.places is None:
             return self._clock_times(grid.clock, start, stop)
-        times = self._clock_times(grid.clock, 0, len(grid.places))
-        return np.interp(np.arange(start, stop), grid.places, times)
+        return np.interp(np.arange(start, stop), grid.places, self._clock_times(grid.clock, 0, len(grid.places)))
 
     def _along(self, name: str, start: int, stop: int) -> FloatArray:
         """Readings of another device along the run's own times, for those who look at all channels together.

@@ -144,8 +144,7 @@ def converted(reading: FloatArray, sensor: Sensor, bits: int | None) -> FloatArr
     if bits is None:
         return reading
     step = converter_step(sensor, bits)
-    codes = np.clip(np.rint(reading / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-    return codes * step
+    return np.clip(np.rint(reading / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1) * step
 
 
 def converter_step(sensor: Sensor, bits: int) -> float:

@@ -88,6 +88,7 @@ class _Members(Layout):
     """What every request needs, cached until the file changes."""
 
     members: tuple[str, ...]
+    units: dict[str, str]  #: as the file states them
     largest_chunk: int  #: bytes
 
 
@@ -165,20 +166,20 @@ class Hdf5Reader(RunReader):
         """What is sampled together: by time datasets, stated rates, and the length that most channels have."""
         with self._group() as group:
             members = tuple(itertools.islice(group, _MAX_MEMBERS))
-            lengths = {}
-            problems: list[Problem] = []
-            largest = 0
+            datasets, units, problems = {}, {}, list[Problem]()
             for name in members:
                 try:
-                    dataset = self._dataset(group, name)
-                    lengths[name] = dataset.shape[0]
-                    largest = max(largest, chunk_bytes(dataset))
+                    datasets[name] = self._dataset(group, name)
                 except RigDataError as error:  # raised again when that channel is asked for
                     problems.extend(error.problems)
-            if not lengths:
+            for name in self.channels:
+                with suppress(RigDataError):  # as above
+                    units[name] = self._unit(datasets.get(name) or self._dataset(group, name))
+            if not datasets:
                 fault = "the group holds no dataset of numbers"
                 empty = self.problem("error", "", fault, "Store one dataset per channel")
                 raise RigDataError(problems[:_LISTED] or empty)
+            lengths = {name: dataset.shape[0] for name, dataset in datasets.items()}
             rate = self._checked_rate(group.attrs)
             run_rate = rate or self.stated_rate
             names = [name for name in self.channels if name in lengths]
@@ -186,7 +187,8 @@ class Hdf5Reader(RunReader):
                 names += [name for name in lengths if name not in self.channels]
             clocks = time_columns(names, self.channels)
             timed = {}
-            for clock in [names[i] for i in clocks]:
+            for place in clocks:
+                clock = names[place]
                 time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
                 grid = timed_grid(lengths[clock], clock, time, clock, run_rate)
                 timed[clock] = grid if rate is None or self.channels[clock].clock else replace(grid, rate=rate)
@@ -198,14 +200,14 @@ class Hdf5Reader(RunReader):
             remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
             grids, faults = self._planned(timings, run_rate, "dataset", remedy)
             unserved = Grid(max(lengths.values()), "", run_rate or np.nan)
-            return _Members(grids or (unserved,), faults, members, largest)
+            return _Members(grids or (unserved,), faults, members, units, max(map(chunk_bytes, datasets.values())))
 
     def _seconds(self, group: Any, clock: str, start: int, stop: int) -> FloatArray:
         """Some times of a time dataset [s]; one that is not described tells its unit itself."""
         values = self._samples(group, clock, start, stop)
         if clock in self.channels:
             return self.channels[clock].to_si(values)
-        return seconds(Series(clock, self._unit(group, clock), values))
+        return seconds(Series(clock, self._unit(self._dataset(group, clock)), values))
 
     def _checked_rate(self, attributes: Any) -> float | None:
         if _RATE not in attributes:
@@ -250,15 +252,11 @@ class Hdf5Reader(RunReader):
 
     def problems(self) -> tuple[Problem, ...]:
         """Tell which datasets nobody describes, and which state another unit than the manifest."""
-        units = {}
-        with self._group() as group:
-            for name in self.channels:
-                with suppress(RigDataError):  # raised when that channel is asked for
-                    units[name] = self._unit(group, name)
-        return self._notes("datasets", self._layout().members, units)
+        layout = self._layout()
+        return self._notes("datasets", layout.members, layout.units)
 
-    def _unit(self, group: Any, name: str) -> str:
-        attributes = self._dataset(group, name).attrs
+    def _unit(self, dataset: Any) -> str:
+        attributes = dataset.attrs
         keys = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]
         return str(_text(attributes[keys[0]]) or "") if keys else ""
 
@@ -303,8 +301,7 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
             fault = "claims a text longer than the file"
             raise refuse(file, f"attribute {damaged}", fault, "Copy the file again from the rig")
         manifest = _text_attribute(handle, "manifest", file)
-        bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
-    return manifest, bearing
+        return manifest, _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
 
 
 def _text_attribute(handle: Any, name: str, file: str) -> str:
