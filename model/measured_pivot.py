@@ -110,5 +110,4 @@ class MeasuredPivot(_Law):
             return self
         deflections = np.diff(self.deflection_points)
         alone = np.maximum(deflections - compliance * np.diff(self.load), _LEAST_SHARE * deflections)
-        points = np.append(0.0, np.cumsum(alone))
-        return replace(self, deflection_points=points)
+        return replace(self, deflection_points=np.append(0.0, np.cumsum(alone)))
