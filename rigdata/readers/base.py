@@ -115,8 +115,7 @@ class RunReader(RecordFile):
     def _layout(self) -> Any:
         """What is sampled together; the key changes when the file does, so that no old one is served."""
         state = self.path.stat() if self.path.is_file() else None
-        key = (self.path, self.run, state and (state.st_size, state.st_mtime_ns))
-        return self.cache.get(key, self._read_layout)
+        return self.cache.get((self.path, self.run, state and (state.st_size, state.st_mtime_ns)), self._read_layout)
 
     def _read_layout(self) -> Layout:
         """What is sampled together, from the file."""

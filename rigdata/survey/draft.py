@@ -172,8 +172,7 @@ def _faults(text: str) -> int:
     try:
         parse_manifest(text)
     except RigDataError as error:
-        count = sum(problem.severity == "error" for problem in error.problems)
-        return count - bool(open_paths(tomllib.loads(text)))
+        return sum(problem.severity == "error" for problem in error.problems) - bool(open_paths(tomllib.loads(text)))
     return 0
 
 
@@ -263,5 +262,4 @@ def _entry(line: str) -> tuple[str, str]:
 
 def _values(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Values and lines by their keys."""
-    entries = [(*_entry(line), line) for line in lines]
-    return {key: (value, line) for key, value, line in entries if key}
+    return {key: (value, line) for key, value, line in [(*_entry(line), line) for line in lines] if key}

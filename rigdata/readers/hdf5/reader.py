@@ -123,10 +123,14 @@ class Hdf5Reader(RunReader):
         if _GROUP in self.opened_members:  # by whoever called
             yield
             return
-        needed = min(2 * self._layout().largest_chunk, _MOST_CACHE)  # the cache is given when a file is opened
         stack = ExitStack()
         try:
-            self.opened_members[_GROUP] = stack.enter_context(self._group(max(needed, _LEAST_CACHE)))
+            self.opened_members[_GROUP] = stack.enter_context(self._group(_LEAST_CACHE))
+            needed = min(2 * self._layout().largest_chunk, _MOST_CACHE)
+            if needed > _LEAST_CACHE:  # the cache is given when a file is opened
+                self.opened_members.clear()
+                stack.close()
+                self.opened_members[_GROUP] = stack.enter_context(self._group(needed))
             yield
         finally:  # closed without the block's own errors, which are no faults of the file
             self.opened_members.clear()
@@ -298,8 +302,7 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
             raise refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
         damaged = too_long_text(path, ("manifest", "bearing", *UNIT), handle.userblock_size)
         if damaged is not None:
-            fault = "claims a text longer than the file"
-            raise refuse(file, f"attribute {damaged}", fault, "Copy the file again from the rig")
+            raise refuse(file, f"attribute {damaged}", "claims a text longer than the file", "Copy the file again")
         manifest = _text_attribute(handle, "manifest", file)
         return manifest, _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
 
