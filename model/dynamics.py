@@ -63,8 +63,7 @@ def flexing_impedance(film: PadFilm, omega: FloatArray, factor: float, axial: Ax
     conductance = conductances(film.grid, film.work, film.wedge)
 
     def slopes(shapes: Any) -> tuple[Any, Any]:
-        still = shape_slopes(film.grid, film.work, conductance, shapes)
-        return still, squeeze_slopes(film.grid, film.work, shapes)
+        return shape_slopes(film.grid, film.work, conductance, shapes), squeeze_slopes(film.grid, film.work, shapes)
 
     still, moving = film.work.slopes[:, :2], film.work.slopes[:, 2:4]
     if axial is not None:

@@ -108,8 +108,7 @@ def predict(
     force = _number(load, "force", "load")
     direction = _number(load_direction, "angle", "load_direction")
     spin = -speed_si if rotation == ROTATIONS[1] else speed_si
-    neighbour = start.equilibrium if start is not None else None
-    return predict_setup(setup, force, direction, spin, omega, neighbour)
+    return predict_setup(setup, force, direction, spin, omega, start.equilibrium if start is not None else None)
 
 
 def _mesh(mesh: Any) -> Mesh:

@@ -172,8 +172,7 @@ class Prediction:
     @property
     def c(self) -> FloatArray:
         """Im h / omega [N s/m], shape of `h`."""
-        omega = np.asarray(self.excitation, float)[..., None, None]
-        return self.h.imag / omega
+        return self.h.imag / np.asarray(self.excitation, float)[..., None, None]
 
     def __getattr__(self, name: str) -> Any:
         if len(name) == 3 and name[0] in "kc" and set(name[1:]) <= {"x", "y"}:
@@ -312,5 +311,4 @@ class Prediction:
             return math.nan
         fine, rough = (np.diagonal(p.bearing_h, axis1=-2, axis2=-1) for p in (self, coarse))
         change = np.abs([(fine - rough).real, (fine - rough).imag])
-        scale = np.maximum(np.abs([fine.real, fine.imag]), 0.05 * np.abs(fine))
-        return float(np.max(change / scale)) / 3.0
+        return float(np.max(change / np.maximum(np.abs([fine.real, fine.imag]), 0.05 * np.abs(fine)))) / 3.0

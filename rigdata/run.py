@@ -241,8 +241,7 @@ class Run(RunDescription):
         channels = self.vector_channels(quantity)
         names = tuple(c.name for c in channels)
         readings, time, rate = self._stretch(names, start, stop)
-        values = np.ascontiguousarray(vector_rows(channels, readings).T)
-        return VectorRecord(quantity, values, time, rate, names)
+        return VectorRecord(quantity, np.ascontiguousarray(vector_rows(channels, readings).T), time, rate, names)
 
     def of(self, quantity: str) -> list[Channel]:
         """Channels that measure a quantity."""

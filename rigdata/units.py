@@ -218,8 +218,7 @@ def temperature_offset(unit: str) -> float:
 
 def is_signal(unit: str) -> bool:
     """Whether `unit` is what a data logger sees (V, mA, mV/V), not an engineering unit."""
-    powers = parse_unit(unit).powers
-    return is_bridge_ratio(unit) or powers in (parse_unit("V").powers, parse_unit("A").powers)
+    return is_bridge_ratio(unit) or parse_unit(unit).powers in (parse_unit("V").powers, parse_unit("A").powers)
 
 
 def is_bridge_ratio(unit: str) -> bool:

@@ -160,8 +160,7 @@ class EffectKind:
         """
         if self.per_pad is None:
             return self.parameters
-        pad_parameters = (replace(self.per_pad, name=f"{self.per_pad.name}_{k}") for k in range(1, pads + 1))
-        return (*self.parameters, *pad_parameters)
+        return (*self.parameters, *(replace(self.per_pad, name=f"{self.per_pad.name}_{k}") for k in range(1, pads + 1)))
 
     def missing(self, bearing: Bearing) -> str:
         """Why a bearing cannot have this effect; empty if it can.

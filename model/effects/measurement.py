@@ -64,8 +64,7 @@ def probe_gain(setup: Setup, factor: float) -> Setup:
 def probe_rotation(setup: Setup, angle: float) -> Setup:
     """Both probes really stand at their stated angle + this."""
     # a probe at theta + angle reads d . e(theta + angle) = (R(-angle) d) . e(theta)
-    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-    return _misread(setup, turn)
+    return _misread(setup, np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]]))
 
 
 @effect_on(
@@ -131,8 +130,7 @@ def housing_mass(setup: Setup, mass_error: float) -> Setup:
 def one_probe_gain(setup: Setup, probe: float, factor: float) -> Setup:
     """Readings of one displacement probe are factor times the truth."""
     rows = np.array([[math.cos(a), math.sin(a)] for a in setup.instruments.probe_axes])
-    gains = np.where(np.arange(1, 3) == probe, factor, 1.0)
-    return _misread(setup, np.linalg.solve(rows, gains[:, None] * rows))
+    return _misread(setup, np.linalg.solve(rows, np.where(np.arange(1, 3) == probe, factor, 1.0)[:, None] * rows))
 
 
 @effect_on(

@@ -108,8 +108,7 @@ def _pad_deformation(
 def _between_lines(out: FloatArray, matrix: FloatArray, gather: FloatArray) -> FloatArray:
     """A matrix on the solid's face as one between its lines along the arc, of the film's columns, column by column."""
     face = matrix.reshape(-1, out.shape[1], matrix.shape[1] // len(gather), len(gather))
-    lines = np.einsum("xs,asbt,ty->xayb", out, face, gather, optimize=True)
-    return lines.reshape(len(out) * len(face), -1)
+    return np.einsum("xs,asbt,ty->xayb", out, face, gather, optimize=True).reshape(len(out) * len(face), -1)
 
 
 def axis_maps(face: Line, film: Line, even: bool | None) -> tuple[Any, Any, Any]:
@@ -140,5 +139,4 @@ def axis_maps(face: Line, film: Line, even: bool | None) -> tuple[Any, Any, Any]
 
 def force_weights(grid: FilmGrid) -> FloatArray:
     """Radial and tangential force by the pressure at the unknown nodes, (2, unknowns) [m^2]."""
-    inner = grid.area[1:-1, grid.first : -1]
-    return np.stack([(c[1:-1, None] * inner).ravel() for c in (grid.cos, grid.sin)])
+    return np.stack([(c[1:-1, None] * grid.area[1:-1, grid.first : -1]).ravel() for c in (grid.cos, grid.sin)])

@@ -86,8 +86,7 @@ class Search:
         table["supplied"] = table["heating"] = math.inf
         table["inlet"] = self.case.supply
         table["resting"] = math.nan
-        angles = [f.pad.pivot_angle % math.tau for f in films]
-        return PadStack(table, np.argsort(angles, kind="stable"), curves)
+        return PadStack(table, np.argsort([f.pad.pivot_angle % math.tau for f in films], kind="stable"), curves)
 
     def _state(self) -> SearchState:
         works, crosses = self.works, self.crosses
@@ -212,7 +211,8 @@ class Search:
         # where a pad has no curve, here or there, nothing is moved; pads that friction holds stay where they are held
         has_curves = not np.isnan(self.begun.position - start.begun.position).any()
         moved = self.begun if has_curves and not self.setup.friction else start.begun
-        shift = Begun(*(np.nan_to_num(new - old) for new, old in zip(moved, start.begun, strict=True)))
+        pairs = zip(moved, start.begun, strict=True)
+        shift = Begun(*(np.where(np.isnan(new - old), 0.0, new - old) for new, old in pairs))
         for m, (film, neighbour) in enumerate(zip(self.films, start.films, strict=True)):
             if self.case.mixing and math.isfinite(self.case.fresh):
                 pads["passed"][m] = through_flow(neighbour)[1]

@@ -105,6 +105,8 @@ def _most_loaded(
         for chosen in itertools.combinations(pads.tolist(), size):
             carrying = loaded.copy()
             carrying[pads] = np.isin(pads, chosen)
+            if not fallback.converged and np.array_equal(carrying, ~np.isnan(fallback.begun.tilt)):
+                continue  # what is known began with these
             is_fallback = fallback.converged and np.all(carrying != fallback.idle)
             trial = fallback if is_fallback else _with_pads(setup, load, speed, carrying)
             if trial.converged:

@@ -115,8 +115,7 @@ class RunReader(RecordFile):
     def _layout(self) -> Any:
         """What is sampled together; the key changes when the file does, so that no old one is served."""
         state = self.path.stat() if self.path.is_file() else None
-        key = (self.path, self.run, state and (state.st_size, state.st_mtime_ns))
-        return self.cache.get(key, self._read_layout)
+        return self.cache.get((self.path, self.run, state and (state.st_size, state.st_mtime_ns)), self._read_layout)
 
     def _read_layout(self) -> Layout:
         """What is sampled together, from the file."""
@@ -206,8 +205,7 @@ class RunReader(RecordFile):
             return grid.begin + np.arange(start, stop) / grid.rate
         if grid.places is None:
             return self._clock_times(grid.clock, start, stop)
-        times = self._clock_times(grid.clock, 0, len(grid.places))
-        return np.interp(np.arange(start, stop), grid.places, times)
+        return np.interp(np.arange(start, stop), grid.places, self._clock_times(grid.clock, 0, len(grid.places)))
 
     def _along(self, name: str, start: int, stop: int) -> FloatArray:
         """Readings of another device along the run's own times, for those who look at all channels together.

@@ -172,8 +172,7 @@ def _faults(text: str) -> int:
     try:
         parse_manifest(text)
     except RigDataError as error:
-        count = sum(problem.severity == "error" for problem in error.problems)
-        return count - bool(open_paths(tomllib.loads(text)))
+        return sum(problem.severity == "error" for problem in error.problems) - bool(open_paths(tomllib.loads(text)))
     return 0
 
 

@@ -96,8 +96,7 @@ def in_seconds(exports: Sequence[Export], described: Tables) -> tuple[list[Expor
     unit = next((unit for unit in TIME_FACTORS if unit in typed), likely)
     source = "file" if typed or unit == "s" else "guess"
     units |= dict.fromkeys(open_, Entry(unit, source, f"not stated: as seconds it would be {rate:.3g} Hz"))
-    in_unit = [export if export.states_times or unit == "s" else _scaled(export, unit) for export in exports]
-    return in_unit, units
+    return [export if export.states_times or unit == "s" else _scaled(export, unit) for export in exports], units
 
 
 def _scaled(export: Export, unit: str) -> Export:

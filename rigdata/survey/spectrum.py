@@ -39,8 +39,7 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> Spectrum:
     centred = filled - filled.mean()
     centred = centred - place * (centred @ place) / (place @ place)
     window = np.hanning(n)
-    amplitude = 2.0 * np.abs(np.fft.rfft(centred * window)) / window.sum()
-    return np.asarray(np.fft.rfftfreq(n, 1.0 / rate)), amplitude
+    return np.asarray(np.fft.rfftfreq(n, 1.0 / rate)), 2.0 * np.abs(np.fft.rfft(centred * window)) / window.sum()
 
 
 def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> Peaks:

@@ -129,8 +129,7 @@ def _stored(record: SimulatedRun, rig: VirtualRig, time_name: str = "") -> _Colu
         if "duplicate_column" in kinds:
             doubled.append((name, values))
     columns += doubled
-    is_empty = "empty_file" in rig.fault_kinds(run)
-    return [(name, values[:0]) for name, values in columns] if is_empty else columns
+    return [(name, values[:0]) for name, values in columns] if "empty_file" in rig.fault_kinds(run) else columns
 
 
 def _write_hdf5(path: Path, rig: VirtualRig, records: _Records) -> None:

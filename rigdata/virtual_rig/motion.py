@@ -228,8 +228,7 @@ def clearance_motion(run: PlannedRun, sweep: ClearanceSweep, truth: RigTruth, no
     time = np.arange(round(sweep.seconds * run.rate)) / run.rate
     direction = 2 * np.pi * time / sweep.seconds
     position = swept_position(truth, push, direction)
-    load = push * directions(direction)
-    return Motion(time, position, load, truth.cold_temperatures, {"push_N": push})
+    return Motion(time, position, push * directions(direction), truth.cold_temperatures, {"push_N": push})
 
 
 def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: float = _SLIDE_LAG) -> FloatArray:

@@ -144,8 +144,7 @@ def converted(reading: FloatArray, sensor: Sensor, bits: int | None) -> FloatArr
     if bits is None:
         return reading
     step = converter_step(sensor, bits)
-    codes = np.clip(np.rint(reading / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-    return codes * step
+    return np.clip(np.rint(reading / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1) * step
 
 
 def converter_step(sensor: Sensor, bits: int) -> float:
@@ -187,8 +186,7 @@ def slow_drift(rng: np.random.Generator, rows: int, time: FloatArray) -> FloatAr
     """Slow monotone drift (rows, n), zero in the mean, with a standard deviation of 1 from start to end."""
     share = np.linspace(-0.5, 0.5, len(time))
     size = rng.standard_normal((rows, 1))
-    bend = rng.uniform(-1.0, 1.0, (rows, 1))
-    return size * (share + bend * (share**2 - np.mean(share**2)))
+    return size * (share + rng.uniform(-1.0, 1.0, (rows, 1)) * (share**2 - np.mean(share**2)))
 
 
 def _pick_up(noise: Noise, names: list[str], time: FloatArray, seed: int, run: str) -> FloatArray:
@@ -297,8 +295,7 @@ class VirtualRig:
         runs = {run.id: run for run in self.runs}
         run = runs[runs[run_id].record]
         copied = [fault.other for fault in self.faults_of(run.id) if fault.kind == "duplicate_run"]
-        source = runs[copied[0] or ""] if copied else run
-        return replace(self._simulated(source), run=run)
+        return replace(self._simulated(runs[copied[0] or ""] if copied else run), run=run)
 
     def faults_of(self, record: str) -> tuple[Fault, ...]:
         """Faults that strike one of the runs of a record."""

@@ -185,8 +185,7 @@ class RigPlan:
     def turning(self, **shaft: Any) -> Self:
         """The same tests with another ``rotation`` of the shaft, or another ``shaft_speed`` [rad/s]."""
         dynamic = tuple(replace(point, **shaft) for point in self.dynamic)
-        locus = tuple(replace(point, **shaft) for point in self.locus)
-        return replace(self, dynamic=dynamic, locus=locus)
+        return replace(self, dynamic=dynamic, locus=tuple(replace(point, **shaft) for point in self.locus))
 
     def runs(self, pivot_angles: Sequence[float]) -> tuple[PlannedRun, ...]:
         """All runs in order; `pivot_angles` [rad] give the dry tests their directions."""

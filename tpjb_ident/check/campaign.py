@@ -11,7 +11,6 @@ import numpy as np
 from rigdata.campaign import Campaign
 from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.run import Run
-from rigdata.survey.exports import records_below
 from tpjb_ident.arguments import as_campaign
 from tpjb_ident.check.findings import far, is_shared, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
@@ -170,13 +169,14 @@ def _leftovers(campaign: Campaign) -> list[Problem]:
         return []
     if not names:
         return []
-    shown = listed([ascii(name)[1:-1][:60] for name in names])
-    text = f"no run names the {noun}{'s' * (len(names) > 1)} {shown}"
+    text = f"no run names the {noun}{'s' * (len(names) > 1)} {listed([ascii(name)[1:-1][:60] for name in names])}"
     cure = "Add them to the manifest, or nothing if they are not wanted"
     return [Problem("note", campaign.path.name, "", text, cure)]
 
 
 def _files(campaign: Campaign) -> list[str]:
+    from rigdata.survey.exports import records_below  # with it come the readers of text: not for who identifies alone
+
     named = set(map(Path.resolve, campaign.files.values()))
     return [path.name for path in records_below(campaign.path) if path.resolve() not in named]
 

@@ -1,5 +1,6 @@
 """The `tpjb` command. Nothing else imports this package."""
 
+import gc
 import os
 import sys
 from typing import Any
@@ -11,14 +12,14 @@ from tpjb_ident.runtime.threads import THREAD_VARIABLES
 def main() -> None:
     """Run the command line; the entry point of `tpjb` and of ``python -m tpjb_ident``."""
     _one_thread_for_small_matrices()
+    gc.set_threshold(100_000)  # most of what a command makes stays: to walk through it all again and again frees little
     interrupts.listen()
-    streams: list[Any] = [sys.stdout, sys.stderr]
-    for stream in streams:
+    stream: Any
+    for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # else there is none at all (pythonw), or it is a caller's own
-            utf8 = "utf" in (stream.encoding or "").lower()
             # a terminal or a pipe that has no µ or ± shows a question mark: no result is lost to a sign. UTF-8 lacks
             # only what stands for a file name's broken bytes; written as an escape, that is valid JSON too
-            stream.reconfigure(errors="backslashreplace" if utf8 else "replace")
+            stream.reconfigure(errors="backslashreplace" if "utf" in (stream.encoding or "").lower() else "replace")
     try:
         from tpjb_ident.cli.commands.app import app
 

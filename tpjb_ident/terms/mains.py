@@ -7,6 +7,7 @@ by least squares. That has many minima, so it is no term of the linear solve: wh
 before the solve, and what the angles leave uncertain is its own share of the budget.
 """
 
+import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -80,7 +81,7 @@ class MainsEquations:
     patterns: ComplexArray  #: (m, 2) complex, m
     sigma: FloatArray  #: (g,), N: of a run's force residual
 
-    @property
+    @functools.cached_property
     def scale(self) -> float:
         """What H is divided by among the unknowns [N/m]."""
         return float(np.linalg.norm(self.F) / np.linalg.norm(self.D))
@@ -194,8 +195,7 @@ def fit_mains(D: ComplexArray, F: ComplexArray, pickup: Pickup, scatter: float) 
     if spare < 1 or len(D) < _MIN_DIRECTIONS or not np.isfinite(D).all() or not np.isfinite(F).all():
         return None
     problem = MainsEquations(D, F, pickup.patterns, scatter * np.linalg.norm(F, axis=1))
-    minima = problem.solve()
-    if not minima:
+    if not (minima := problem.solve()):
         return None
     cost = minima[0].cost
     inflation = (_PRIOR_DOF + cost) / (_PRIOR_DOF + spare)

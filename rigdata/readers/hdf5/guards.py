@@ -12,6 +12,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import h5py
+
 from rigdata.problem import RigDataError, refuse
 from rigdata.readers.base import SAMPLE, refuse_claim
 
@@ -101,8 +103,6 @@ def _is_sound(stream: BinaryIO, at: int, size: int) -> bool:
 
 def resolve(start: Any, path: str, file: str, run: str | None = None) -> Any:
     """Walk `path` from the group `start`, one link at a time; None where there is no such member."""
-    import h5py
-
     remedy = "Copy the data into this file"
     place, remaining, is_soft = start, _parts(path), False
     for _ in range(_MAX_STEPS):
@@ -130,8 +130,6 @@ def _parts(path: str) -> list[str]:
 
 def claimed_bytes(member: Any) -> int:
     """Bytes that a dataset claims to be, as numbers or as one stored chunk; zero of what is none."""
-    import h5py
-
     if not isinstance(member, h5py.Dataset) or member.shape is None:
         return 0
     return max(SAMPLE * math.prod(member.shape), chunk_bytes(member))

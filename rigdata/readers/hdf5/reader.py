@@ -88,6 +88,7 @@ class _Members(Layout):
     """What every request needs, cached until the file changes."""
 
     members: tuple[str, ...]
+    units: dict[str, str]  #: as the file states them
     largest_chunk: int  #: bytes
 
 
@@ -122,10 +123,14 @@ class Hdf5Reader(RunReader):
         if _GROUP in self.opened_members:  # by whoever called
             yield
             return
-        needed = min(2 * self._layout().largest_chunk, _MOST_CACHE)  # the cache is given when a file is opened
         stack = ExitStack()
         try:
-            self.opened_members[_GROUP] = stack.enter_context(self._group(max(needed, _LEAST_CACHE)))
+            self.opened_members[_GROUP] = stack.enter_context(self._group(_LEAST_CACHE))
+            needed = min(2 * self._layout().largest_chunk, _MOST_CACHE)
+            if needed > _LEAST_CACHE:  # the cache is given when a file is opened
+                self.opened_members.clear()
+                stack.close()
+                self.opened_members[_GROUP] = stack.enter_context(self._group(needed))
             yield
         finally:  # closed without the block's own errors, which are no faults of the file
             self.opened_members.clear()
@@ -165,20 +170,20 @@ class Hdf5Reader(RunReader):
         """What is sampled together: by time datasets, stated rates, and the length that most channels have."""
         with self._group() as group:
             members = tuple(itertools.islice(group, _MAX_MEMBERS))
-            lengths = {}
-            problems: list[Problem] = []
-            largest = 0
+            datasets, units, problems = {}, {}, list[Problem]()
             for name in members:
                 try:
-                    dataset = self._dataset(group, name)
-                    lengths[name] = dataset.shape[0]
-                    largest = max(largest, chunk_bytes(dataset))
+                    datasets[name] = self._dataset(group, name)
                 except RigDataError as error:  # raised again when that channel is asked for
                     problems.extend(error.problems)
-            if not lengths:
+            for name in self.channels:
+                with suppress(RigDataError):  # as above
+                    units[name] = self._unit(datasets.get(name) or self._dataset(group, name))
+            if not datasets:
                 fault = "the group holds no dataset of numbers"
                 empty = self.problem("error", "", fault, "Store one dataset per channel")
                 raise RigDataError(problems[:_LISTED] or empty)
+            lengths = {name: dataset.shape[0] for name, dataset in datasets.items()}
             rate = self._checked_rate(group.attrs)
             run_rate = rate or self.stated_rate
             names = [name for name in self.channels if name in lengths]
@@ -199,14 +204,14 @@ class Hdf5Reader(RunReader):
             remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
             grids, faults = self._planned(timings, run_rate, "dataset", remedy)
             unserved = Grid(max(lengths.values()), "", run_rate or np.nan)
-            return _Members(grids or (unserved,), faults, members, largest)
+            return _Members(grids or (unserved,), faults, members, units, max(map(chunk_bytes, datasets.values())))
 
     def _seconds(self, group: Any, clock: str, start: int, stop: int) -> FloatArray:
         """Some times of a time dataset [s]; one that is not described tells its unit itself."""
         values = self._samples(group, clock, start, stop)
         if clock in self.channels:
             return self.channels[clock].to_si(values)
-        return seconds(Series(clock, self._unit(group, clock), values))
+        return seconds(Series(clock, self._unit(self._dataset(group, clock)), values))
 
     def _checked_rate(self, attributes: Any) -> float | None:
         if _RATE not in attributes:
@@ -251,15 +256,11 @@ class Hdf5Reader(RunReader):
 
     def problems(self) -> tuple[Problem, ...]:
         """Tell which datasets nobody describes, and which state another unit than the manifest."""
-        units = {}
-        with self._group() as group:
-            for name in self.channels:
-                with suppress(RigDataError):  # raised when that channel is asked for
-                    units[name] = self._unit(group, name)
-        return self._notes("datasets", self._layout().members, units)
+        layout = self._layout()
+        return self._notes("datasets", layout.members, layout.units)
 
-    def _unit(self, group: Any, name: str) -> str:
-        attributes = self._dataset(group, name).attrs
+    def _unit(self, dataset: Any) -> str:
+        attributes = dataset.attrs
         for key in UNIT:
             if key in attributes and is_text(attributes.get_id(key), self.path):
                 return str(_text(attributes[key]) or "")
@@ -303,11 +304,9 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
             raise refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
         damaged = too_long_text(path, ("manifest", "bearing", *UNIT), handle.userblock_size)
         if damaged is not None:
-            fault = "claims a text longer than the file"
-            raise refuse(file, f"attribute {damaged}", fault, "Copy the file again from the rig")
+            raise refuse(file, f"attribute {damaged}", "claims a text longer than the file", "Copy the file again")
         manifest = _text_attribute(handle, "manifest", file)
-        bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
-    return manifest, bearing
+        return manifest, _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
 
 
 def _text_attribute(handle: Any, name: str, file: str) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import logsumexp, ndtr
+from scipy.special import ndtr
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Levels, Linear
@@ -83,7 +83,7 @@ def _score(path: Path, at: slice, levels: Levels, strain: Strain) -> Score:
     inner = np.swapaxes(slopes, 1, 2) @ square[:, None] @ slopes + np.eye(len(width))
     log_det = np.linalg.slogdet(inner)[1] + errors.log_norm[:, None]
     rows = 0.5 * (change - product[:, :1, 0] - log_det) - levels.half_det[:, None] + errors.log_weights[:, None]
-    totals = logsumexp(rows, axis=0)
+    totals = np.logaddexp.reduce(rows, axis=0)
     best = int(np.argmax(totals))
     leading = int(np.argmax(rows[:, best]))
     p = strain.p(levels.mean(leading, at, weights[best]))

@@ -289,8 +289,7 @@ class _Search:
         if not members:
             return path
         columns = fit.linear.jacobian[:, fit.unknowns.amplitudes :]
-        column = np.sum([share * columns[:, i] for i, share in members.items()], axis=0)
-        return Path(path.fault, column[:, None])
+        return Path(path.fault, np.sum([share * columns[:, i] for i, share in members.items()], axis=0)[:, None])
 
     def _propose(self, score: Score, faults: tuple[Fault, ...], linear: Linear, coarse: bool = False) -> None:
         """Add a fault to a model."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 from collections.abc import Callable, Sequence
@@ -140,7 +141,9 @@ class Forward:
 
     def fresh(self, near: bool = False) -> Forward:
         """Return a copy that knows what this one knows now, whatever this one goes on to solve."""
-        return replace(self, cache=self.cache.copy(near))
+        forward = copy.copy(self)  # with where its elements are, which is worked out once
+        forward.cache = self.cache.copy(near)
+        return forward
 
     @property
     def of_differences(self) -> Forward:

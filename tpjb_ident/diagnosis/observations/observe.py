@@ -296,8 +296,7 @@ def _stiffness(identification: Identification, load: float) -> float:
     points = [p for p in identification.points if np.isfinite(p.stiffness.h).all()]
     if not points:
         return math.inf
-    nearest = min(points, key=lambda p: (abs(p.point.static_load - load), p.point.excitation))
-    return nearest.stiffness.direct[0]
+    return min(points, key=lambda p: (abs(p.point.static_load - load), p.point.excitation)).stiffness.direct[0]
 
 
 def observe_table(path: Path, reading_error: float | None = None, model: float = TRUSTED["h"]) -> Observations:
