@@ -1,5 +1,8 @@
 """What terms say of a rig and where records cannot tell; the mass, which several frequencies contradict."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -118,6 +121,17 @@ def test_a_mass_of_half_as_much_again_is_told_and_allowed_for(soft, seed):
     assert "the inertia of 45 kg" in condition.detail
     assert 0.5 * MASS / 1.96 < rig.mass_uncertainty < 0.5 * MASS
     assert np.abs(away(again, truth)).max() < 3.5
+
+
+@pytest.mark.parametrize("seed", seeds(3))
+def test_a_floating_stator_of_less_than_its_mass_is_told_and_allowed_for(seed):
+    case = Case(mount="floating", hertz=HERTZ[:3], mass_error=-0.4, noise=3e-4)
+    blocks, truth, rig = doubted(case, seed)
+    again = solved(rig, blocks, truth)
+    assert again.conditions() == ("housing-mass-doubtful",)
+    assert re.search("the inertia of 1[78](.\\d)? kg", again.conditions()[0].detail)
+    assert np.abs(away(again, truth)).max() < 3.5
+    assert not doubted(replace(case, mass_error=0.4), seed)[2].contradicted  # the film's own may be that
 
 
 @pytest.mark.parametrize(
