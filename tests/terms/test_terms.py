@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.estimate import block_cases
 from tests.estimate.block_cases import (
     COMPLIANCE,
     Case,
@@ -413,6 +414,18 @@ def test_a_floating_stator_tells_wrong_probes_from_a_shaft_that_gives(changes, s
     assert held(solution, truth)
     if not changes:
         assert of(solution, "housing").value[4:6] == pytest.approx(1e9 * gives, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("loss", "mass", "named"), [(0.01, 1.0, ""), (0.2, 10.0, _LATE), (0.2, 1.0, "accelerometers-doubtful")]
+)
+def test_springs_that_lose_much_matter_as_far_as_inertia_does(loss, mass, named, monkeypatch):
+    monkeypatch.setattr(block_cases, "COMPLIANCE", COMPLIANCE.real * (1 - 1j * loss))
+    monkeypatch.setattr(block_cases, "MASS", mass * block_cases.MASS)
+    rig, blocks, truth = made(Case(noise=2e-4))
+    solution = solved(rig, blocks, truth)
+    assert solution.conditions() == ((named,) if named else ())
+    assert held(solution, truth)
 
 
 @pytest.mark.parametrize("share", [0.02, 1e-17])

@@ -163,7 +163,7 @@ class Housing(Term):
         lag, text = fitted.value[-1], _otherwise(fitted, _OTHERWISE)
         if text and np.linalg.norm(fitted.value[:4]) > abs(lag):
             return (Condition("accelerometers-contradict-cells", f"{text}; {share}"),)
-        return _out_of_step(lag, fitted.deviation[-1], "probes", self._omega)
+        return self._out_of_step(lag, fitted.deviation[-1], "probes")
 
     def _standing(self, fitted: Fitted, share: str) -> Conditions:
         """Of accelerometers on a housing on springs; `share`: words for the inertia."""
@@ -189,7 +189,25 @@ class Housing(Term):
             return (Condition("accelerometers-doubtful", text),)
         k = int(np.argmax(np.abs(losses) / error[3:]))
         both = abs(losses[0] - losses[1]) < _LOSS + 3 * float(np.hypot(*error[3:]))
-        return _out_of_step(losses[k], error[3 + k], "cells" if both else f"cells along {'XY'[k]}", self._omega)
+        return self._out_of_step(losses[k], error[3 + k], "cells" if both else f"cells along {'XY'[k]}")
+
+    def _out_of_step(self, phase: float, error: float, sensors: str) -> Conditions:
+        """Accelerometers against the sensors that tell the housing's motion: `phase` [rad] by which they lag.
+
+        Late cells turn h, and so do early ones, behind less of a filter than is stated; late accelerometers, or springs
+        that lose more than usual, the inertia alone.
+        """
+        if abs(phase) < _LOSS + 3 * error:
+            return ()
+        late = sensors if phase < 0 else "accelerometers"
+        text = (
+            f"{np.degrees(abs(phase)):.1f} deg, as if the {late} were {1e3 * abs(phase) / self._omega:.2g} ms late or "
+            f"behind a filter; between the {sensors} and the housing there is none. State `delay` or `filter` of the "
+            "channels"
+        )
+        is_early = self.rig.mount != "cells" or any(s.quantity == "force" and s.response for s in self.rig.channels)
+        is_harmless = 0 < phase * self._inertia < HARMLESS and not is_early
+        return (Condition("accelerometers-doubtful" if is_harmless else OUT_OF_STEP, text),)
 
     def standing_on(self, fitted: Fitted) -> ComplexArray | None:
         """Compliance of the springs under the housing (2, 2) [m/N]; None where no accelerometer shows it."""
@@ -294,15 +312,3 @@ def _otherwise(fitted: Fitted, least: float) -> str:
         return ""
     along = np.degrees(np.arctan2(axes[1, k], axes[0, k])) % 180
     return f"they show {1 + stretch[k]:.2f} times the motion along {along:.0f} deg that the probes show"
-
-
-def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> Conditions:
-    """Accelerometers against the sensors that tell the housing's motion: `phase` [rad] by which they lag."""
-    if abs(phase) < _LOSS + 3 * error:
-        return ()
-    late = sensors if phase < 0 else "accelerometers"
-    text = (
-        f"{np.degrees(abs(phase)):.1f} deg, as if the {late} were {1e3 * abs(phase) / omega:.2g} ms late or behind a "
-        f"filter; between the {sensors} and the housing there is none. State `delay` or `filter` of the channels"
-    )
-    return (Condition(OUT_OF_STEP, text),)
