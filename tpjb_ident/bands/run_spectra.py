@@ -33,8 +33,10 @@ from tpjb_ident.bands.samples import (
     interpolated,
     read_samples,
     without_disturbances,
+    without_periodic,
 )
-from tpjb_ident.phasors.compensation import compensated, filled_channels
+from tpjb_ident.conditions import Conditions, merged
+from tpjb_ident.phasors.compensation import compensated, filled_channels, unstated_filters
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import SHORT, PhasorSettings, RunPhasors, beginning_of
 from tpjb_ident.phasors.whole_record import local_maxima
@@ -266,6 +268,7 @@ def run_spectra(
     length, width = (cut.length, LEFT_OUT) if period is None else (period, LEFT_OUT_OF_PERIOD)
     clean = without_disturbances(cut, lines, period)
     seconds, mean, motion = length / clean.rate, samples.rows.mean(axis=1), _motion(clean)
+    unstated = () if slower else _unstated_filters(clean, band[1], period)
 
     def transformed(record: Samples, places: IntArray) -> RunSpectra:
         z = _bins(record.rows, length, places)
@@ -284,7 +287,7 @@ def run_spectra(
             none,
             none,
             run.housing_mass,
-            record.conditions,
+            merged(record.conditions, unstated),
             temperatures=temperatures,
             temperature=temperature,
             command=None if record.command is None else _bins(record.command, length, places),
@@ -316,6 +319,14 @@ def _turned(spectra: RunSpectra, samples: Samples, places: IntArray) -> RunSpect
         bins = np.fft.fft(samples.rows * wave, axis=1)[:, places * len(spectra.start)]
         turned[order] = replace(spectra, z=bins.T[None] * (2 / samples.length))
     return replace(spectra, turned=turned)
+
+
+def _unstated_filters(samples: Samples, top: float, period: int | None) -> Conditions:
+    """What the noise says of filters: above the band, or in all of what a period leaves."""
+    noise = without_periodic(samples.rows, period) * np.hanning(samples.length)
+    lowest = _WIDE * top if period is None else 0.0
+    spectrum = np.fft.rfft(noise, axis=1).T
+    return unstated_filters(samples.channels, spectrum, samples.length / samples.rate, (lowest, top))
 
 
 def _motion(samples: Samples) -> tuple[float, float, FloatArray]:

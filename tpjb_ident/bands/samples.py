@@ -284,12 +284,12 @@ def without_disturbances(samples: Samples, lines: tuple[Line, ...], period: int 
     waves = even_design(n, samples.rate, np.array([line.frequency for line in lines]))[:, : 2 * len(lines)]
     creep = np.polynomial.legendre.legvander(np.linspace(-1, 1, n), _CREEP)
     columns = (creep[:, :, None] * waves[:, None, :]).reshape(n, -1).T
-    basis, target = (_without_periodic(rows, period) for rows in (columns, stack))
+    basis, target = (without_periodic(rows, period) for rows in (columns, stack))
     gram = basis @ basis.T + _NOTHING * n * np.eye(len(basis))
     return replace(samples, rows=stack - np.linalg.solve(gram, basis @ target.T).T @ columns)
 
 
-def _without_periodic(rows: FloatArray, period: int | None) -> FloatArray:
+def without_periodic(rows: FloatArray, period: int | None) -> FloatArray:
     """What changes (k, n) from period to period."""
     if period is None:
         return rows

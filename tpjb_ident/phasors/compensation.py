@@ -21,12 +21,13 @@ from typing import TypeVar
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.calibration import Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition, Conditions, holding, merged
 from tpjb_ident.phasors.lines import SPEED_DRIFT
 from tpjb_ident.phasors.run_data import RunPhasors, device_readers
-from tpjb_ident.phasors.whole_record import WholeRecord, local_maxima, vertex
+from tpjb_ident.phasors.whole_record import local_maxima, vertex
 
 #: Seconds from the start that are looked at, and powers of two of samples, at least and at most.
 _LOOK, _LEAST_POWER, _MOST_POWER = 2.0, 13, 15
@@ -223,31 +224,35 @@ def compensated(result: Phasors, run: Run, slower: Mapping[str, SlowerChannel], 
     )
 
 
-def unstated_filters(result: RunPhasors, records: Sequence[WholeRecord]) -> Conditions:
-    """Say which quantities seem to be behind a low-pass that the manifest does not state."""
-    for record in records:
-        channels = [result.channels[k] for k in record.places]
-        octaves = _UNFILTERED * record.rate * 2.0 ** -np.arange(_OCTAVES, -1, -1)
-        octaves = octaves[octaves * record.duration > _LEAST_BINS]
-        if len(octaves) <= _LEAST_OCTAVES:
-            continue
-        parts = np.split(record.spectrum, np.round(octaves * record.duration).astype(int))[1:-1]
-        level = 20 * np.log10([np.median(np.maximum(np.abs(part), np.finfo(float).tiny), axis=0) for part in parts])
-        falls = level[:2].mean(axis=0) - level
-        steps, corner = np.diff(falls, axis=0), len(falls) - np.argmax(falls[::-1] <= _FLAT, axis=0)
-        steepest, quantity = steps.max(axis=0), np.array([channel.quantity for channel in channels])
-        falling = (falls[-1] > _FALL) & (falls.min(axis=0) > -_FLAT)
-        beyond = [steepest[k] - steepest[quantity != quantity[k]].max(initial=0.0) for k in range(len(channels))]
-        filtered = falling & (steepest > _STEEP) & (corner > 1) & (np.abs(steps[0]) < _FLAT)
-        flat = np.abs(falls).max(axis=0) < _FLAT
-        if flat.any() and (flat | filtered).all():
-            suspect = filtered & ~np.isin(quantity, quantity[~filtered])
-        else:
-            suspect = falling & (np.array(beyond) > _INERTIA)
-        suspects = [k for k in np.flatnonzero(suspect) if not channels[k].response]
-        # what probes and cells show alike is the shaft's vibration, or a filter that both have
-        if suspects and not {"displacement", "force"} <= set(quantity[suspects]):
-            edge, names = octaves[corner[suspects].max()], ", ".join(channels[k].name for k in suspects)
-            name = "filter-unstated" if max(result.lines.driven) > _NEAR_CORNER * edge else "filter-above-excitation"
-            return (Condition(name, f"the noise of {names} falls from about {edge:.0f} Hz on"),)
-    return ()
+def unstated_filters(
+    channels: Sequence[Channel], noise: ComplexArray, duration: float, band: tuple[float, float]
+) -> Conditions:
+    """Say which of m channels seem to be behind a low-pass that the manifest does not state.
+
+    `noise` (n_bins, m): spectrum of what no line explains, every 1 / `duration` [Hz]; `band`: from where on it is noise
+    [Hz], zero where it is everywhere, and up to where the excitation goes.
+    """
+    octaves = _UNFILTERED * 2 * (len(noise) - 1) / duration * 2.0 ** -np.arange(_OCTAVES, -1, -1)
+    octaves = octaves[(octaves * duration > _LEAST_BINS) & (octaves >= band[0])]
+    if len(octaves) <= (_LEAST_OCTAVES if not band[0] else 2):
+        return ()
+    parts = np.split(noise, np.round(octaves * duration).astype(int))[1:-1]
+    level = 20 * np.log10([np.median(np.maximum(np.abs(part), np.finfo(float).tiny), axis=0) for part in parts])
+    falls = level[: 1 if band[0] else 2].mean(axis=0) - level
+    steps, corner = np.diff(falls, axis=0), len(falls) - np.argmax(falls[::-1] <= _FLAT, axis=0)
+    steepest, quantity = steps.max(axis=0), np.array([channel.quantity for channel in channels])
+    falling = (falls[-1] > _FALL) & (falls.min(axis=0) > -_FLAT)
+    beyond = [steepest[k] - steepest[quantity != quantity[k]].max(initial=0.0) for k in range(len(channels))]
+    filtered = falling & (steepest > _STEEP) & (corner > 1) & (np.abs(steps[0]) < _FLAT)
+    flat = np.abs(falls).max(axis=0) < _FLAT
+    if flat.any() and (flat | filtered).all():
+        suspect = filtered & ~np.isin(quantity, quantity[~filtered])
+    else:
+        suspect = falling & (np.array(beyond) > _INERTIA)
+    suspects = [k for k in np.flatnonzero(suspect).tolist() if not channels[k].response]
+    # what probes and cells show alike is the shaft's vibration, or a filter that both have
+    if not suspects or {"displacement", "force"} <= set(quantity[suspects]):
+        return ()
+    edge, names = octaves[corner[suspects].max()], ", ".join(channels[k].name for k in suspects)
+    name = "filter-unstated" if band[1] > _NEAR_CORNER * edge else "filter-above-excitation"
+    return (Condition(name, f"the noise of {names} falls from about {edge:.0f} Hz on"),)

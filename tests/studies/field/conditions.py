@@ -63,6 +63,7 @@ FAULTS: dict[str, Fault] = {
     "capacitor": lambda v, r, i: (
         NO_VOLTS + lfilter(*butter(1, 1.0, "high", fs=2000.0), np.append(v, v) - v.mean())[-len(v) :]
     ),
+    "filter": lambda v, r, i: lfilter(*butter(4, 250.0, fs=2000.0), v - v[0]) + v[0],
     "input": lambda v, r, i: lfilter(*butter(1, 1.0, "high", fs=2000.0), v - v[0]),
     "second four": lambda v, r, i: v * (1.1 if 4 <= i < 8 else 1.0),
     "first four": lambda v, r, i: v * (7.87 / 7.78 if i < 4 else 1.0),
@@ -287,6 +288,7 @@ def bad_data() -> list[Condition]:
     inverted, square = {"gain": -1.0}, {"probes": (0.0, 90.0)}
     warming = {"temperatures": (20.0, 60.0), "frequencies": (25.0,)}
     loud = {"hum": {"force": 40.0, "displacement": 5e-7}}
+    filtered, random = {"fault": FAULTS["filter"]}, {**BAND, "excitation": "random"}
     return [
         bad("probes at 45 deg described at 0, clearance run", *two_axes(45, 135), with_clearance=True, **square),
         bad("probes 30 deg off, clearance run", *two_axes(75, 165), with_clearance=True),
@@ -326,6 +328,11 @@ def bad_data() -> list[Condition]:
         bad("probes late by 1 ms, floating, not stated", ("X1", {"late": 1e-3}), **HEAVY),
         bad("cells' clock 300 ppm, not stated", ("L1 A1", {"ppm": 300.0}), seconds=6.0),
         bad("cells lose 8 samples in each record", ("L1 A1", {"fault": FAULTS["slip"]})),
+        bad("probes behind a filter that is not stated", ("X1", filtered)),
+        bad("probes behind a filter, random", ("X1", filtered), **random),
+        bad("probes behind a filter, multi-sine", ("X1", filtered), **{**random, "excitation": "multisine"}),
+        bad("probes 15 deg off", *two_axes(60, 150)),
+        bad("mass of a floating stator stated in lb", stated_mass=46.3, frequencies=(25.0, 45.0, 70.0), **FLOATING),
         bad("rate stated as 2.5 kHz", setup={"nominal_rate": 2500.0}),
         bad("one direction", directions=(30.0,), repeats=4),
         bad("drive on 1X", speed=25.0, unbalance=0.5, frequencies=(25.0,)),
