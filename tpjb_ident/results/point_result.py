@@ -138,8 +138,8 @@ _MAX_LOST = 0.6
 #: Share of the force by which runs may differ: beyond it they have no H in common.
 _MAX_DISAGREEMENT = 0.06
 #: Antisymmetric part of the damping over its trace, beyond the interval, that films do not have (0.02 in 340 good
-#: campaigns), and from which a sensor is wrong: an axis by 9 deg, a gain by 15 %.
-_DOUBTFUL, _SKEWED = 0.05, 0.15
+#: campaigns of bearings; seals with inertia have 0.2), from which axes are wrong by 12 deg; how alike stiffness is.
+_DOUBTFUL, _SKEWED, _ALIKE_TURNED = 0.05, 0.22, 0.15
 #: Half of a probe's travel in a sweep over the clearance, least and most: a polygon reaches up to twice its clearance.
 _TRAVEL = (0.5, 2.5)
 #: Distance between two mean positions over the clearance, at most.
@@ -236,7 +236,8 @@ def physics(stiffness: DynamicStiffness, inertia: float) -> Conditions:
     """Say whether `inertia` [kg] stays in the force, which nothing measures: on soft cells.
 
     And where damping, the symmetric part of Im h, is negative beyond doubt: no cross-coupled stiffness is in it. By
-    Reynolds' equation the rest is nothing, whatever the bearing: beyond the interval it is the sensors' work.
+    Reynolds' equation the rest is nothing; where it is more than the interval, and stiffness is turned by the same
+    angle, as by the inertia of no seal but by chance, axes are the sensors' work.
     """
     if not np.isfinite(stiffness.h).all():
         return ()
@@ -246,17 +247,27 @@ def physics(stiffness: DynamicStiffness, inertia: float) -> Conditions:
     damping = np.linalg.eigvalsh((stiffness.h.imag + stiffness.h.imag.T) / 2)[0]
     text = "the film would feed the motion instead of damping it: check polarity, axes and sign of forces"
     negative = damping < -3 * stiffness.standard_error[4:].max()
-    (xx, xy), (yx, yy) = stiffness.h.imag.tolist()
-    skew = (yx - xy) / abs(xx + yy)
-    beyond = abs(skew) - float(np.hypot(*stiffness.half_width()[[5, 6]])) / abs(xx + yy)
-    shown = f"cyx - cxy is {100 * skew:+.0f} % of cxx + cyy, which no film has: as if probes and cells stood "
-    shown += f"{abs(np.degrees(np.arctan(skew))):.0f} deg from one another, or one probe or cell read too much"
+    skew, skew_k = turned = np.array([_skew(stiffness.h.imag), _skew(stiffness.h.real)])
+    rooms = stiffness.half_width()[[5, 6, 1, 2]].reshape(2, 2)  # of c, which is Im h, and k
+    traces = np.abs([np.trace(stiffness.h.imag), np.trace(stiffness.h.real)])
+    room, room_k = np.linalg.norm(rooms, axis=1) / np.maximum(traces, 1e-300)
+    is_turned = abs(skew - skew_k) < _ALIKE_TURNED * abs(skew) + room + room_k
+    beyond = (abs(skew) - room) * is_turned
+    shown = (
+        f"cyx - cxy is {100 * skew:+.0f} % of cxx + cyy, kyx - kxy {100 * skew_k:+.0f} % of kxx + kyy: as if probes "
+    )
+    shown += f"and cells stood {np.degrees(np.arctan(turned)).mean():+.0f} deg from one another"
     return holding(
         (inertia > 0, name, remains),
         (negative, "negative-damping", text),
         (beyond > _SKEWED, "damping-not-symmetric", shown),
         (_DOUBTFUL < beyond <= _SKEWED, "damping-hardly-symmetric", shown),
     )
+
+
+def _skew(part: FloatArray) -> float:
+    """Antisymmetric part of a matrix over its trace: the tangent of the angle by which a symmetric one is turned."""
+    return float((part[1, 0] - part[0, 1]) / (np.trace(part) or np.inf))
 
 
 def directional_pattern(data: PointData, weights: FloatArray) -> Conditions:
