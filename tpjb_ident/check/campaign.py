@@ -18,7 +18,7 @@ from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.probe_readings import check_positions, check_shaft_lines
 from tpjb_ident.check.rig_fit import rig_fit
 from tpjb_ident.check.run_gain import check_agreement, check_film, point_runs
-from tpjb_ident.check.sensor_axes import check_cells, check_probes
+from tpjb_ident.check.sensor_axes import check_cells, check_sweep
 from tpjb_ident.check.set_points import (
     check_excitation,
     check_places,
@@ -108,7 +108,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     check_rotation(sines)
     check_shaft_lines(sines)
     check_sweeps(of_kind("clearance"))
-    check_probes(of_kind("clearance"), of_kind("dry_pivot"))
+    check_sweep(campaign, of_kind("clearance"), of_kind("dry_pivot"))
     check_locus(of_kind("locus"))
     _check_duplicates(observations)
     _check_lengths(observations)

@@ -165,8 +165,7 @@ def assemble(
     dry = dry or DryTest()
     gathered = gather(digests)
     report("estimating", 0, len(gathered))
-    rig = campaign_rig(campaign, bare=dry.stiffness, to_set_point=settings.correct, off=checked.off)
-    rig = rig.doubting(checked.doubted)
+    rig = campaign_rig(campaign, checked.doubted, bare=dry.stiffness, to_set_point=settings.correct, off=checked.off)
     solved = solve_campaign(campaign, gathered, digests, workers, rig)
     excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
     jobs = []
@@ -225,8 +224,7 @@ def identify_bands(
         data = band_blocks(points, rig, loads, settings.clearance)
         return solve_bands(mounted(loads.doubted(rig), data.blocks, campaign.mount, loads.common), data)
 
-    rig = campaign_rig(campaign, bare=bare, to_set_point=settings.correct, off=checked.off)
-    rig = rig.doubting(checked.doubted)
+    rig = campaign_rig(campaign, checked.doubted, bare=bare, to_set_point=settings.correct, off=checked.off)
     solved = solved_with_clocks(rig, min(run.sample_rate for run in runs), solve)
     identified: list[PointResult] = []
     results, numbers = [], []
