@@ -28,6 +28,7 @@ from tpjb_ident.check.signals import check_signal, is_spare
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
+from tpjb_ident.phasors.compensation import with_references
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.run_phasors import run_phasors
 
@@ -290,6 +291,15 @@ def test_a_sweep_holds_sensors_against_the_pads_of_the_bearing_file_and_interval
         low, high = frame[[f"{column}_N_per_m_lo", f"{column}_N_per_m_hi"]].to_numpy()[0]
         assert low < true < high
         assert (high - low > 0.1 * true) == bool(words)
+
+
+def test_coefficients_without_a_reference_count_from_the_runs_mean_temperature(campaign_of):
+    campaign = load_campaign(campaign_of(rocker_rig(3, plan=replace(SMALL_PLAN, dry=(), locus=()))))
+    assert with_references(campaign) is campaign
+    drifting = restated(campaign, PAIR, lambda c: replace(c, temperature_coefficient=3e-3))
+    mean = np.mean([run.mean_temperature() for run in campaign.of_kind("dynamic")])
+    for run in with_references(drifting).runs:
+        assert run.channels["X1A"].temperature_reference == pytest.approx(mean, abs=1.0)
 
 
 SPARE = (

@@ -28,6 +28,7 @@ from tpjb_ident.check.set_points import (
 )
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
 from tpjb_ident.conditions import SEVERITIES, Conditions
+from tpjb_ident.phasors.compensation import with_references
 from tpjb_ident.rounding import listed
 from tpjb_ident.terms.mains import MAINS_ON_LINE
 
@@ -57,7 +58,7 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
     []
     """
     try:
-        campaign = as_campaign(campaign, "check_campaign: campaign")
+        campaign = with_references(as_campaign(campaign, "check_campaign: campaign"))
     except RigDataError as error:
         return _sorted(error.problems)
     observations: list[Observation] = []

@@ -97,7 +97,8 @@ def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object
     if spare < _MIN_SPARE or np.ptp(usual) > _LOST:
         return np.zeros(len(sizes))
     scatter = _MANY_LINES * np.median(np.abs(sizes - usual)) * math.sqrt(len(sizes) / spare)
-    alone, change = sizes - usual, sizes - np.median(sizes)
+    # the middle of two groups as large would halve what they differ by
+    alone, change = sizes - usual, sizes - np.quantile(sizes, 0.5, method="lower")
     differs = np.abs(change) > max(_SAME_RUNOUT, scatter) + _SOFTER * (motion + np.median(motion))
     if differs.mean() >= 0.5:
         above, below = sizes - usual.min(), sizes - usual.max()

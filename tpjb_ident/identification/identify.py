@@ -31,6 +31,7 @@ from tpjb_ident.identification.campaign_solution import (
 )
 from tpjb_ident.identification.point import SOLVED, finished_point, point_share
 from tpjb_ident.identification.settings import IdentifySettings
+from tpjb_ident.phasors.compensation import with_references
 from tpjb_ident.phasors.whole_record import mains_frequency
 from tpjb_ident.results.frequency_model import fits_over_frequency, with_frequency_outliers
 from tpjb_ident.results.identification import BandLine, BandResult, Identification
@@ -95,6 +96,7 @@ def identify(
     2.5 kN, 25 Hz: kxx 53.07 ± 0.49 MN/m, cxx 581.6 ± 5.0 kN s/m, kyy 90.68 ± 0.81 MN/m, cyy 689.1 ± 6.1 kN s/m
     """
     chosen = settings or IdentifySettings()
+    campaign = with_references(campaign)
     runs = campaign.of_kind("dynamic")
     if not runs:
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
