@@ -57,19 +57,17 @@ def _curves(value: Any, name: str) -> Any:
     return curves
 
 
-def least_clearance(campaign: Campaign, warn: Callable[[str], Any]) -> float | None:
-    """Smallest assembled clearance [m] of the bearing that a campaign carries; None without one that can be read."""
+def carried_bearing(campaign: Campaign, warn: Callable[[str], Any]) -> Bearing | None:
+    """Bearing that a campaign carries; None without one that can be read."""
     from model.bearing import BearingError
     from model.bearing_file import parse_bearing
 
-    if not campaign.bearing_text:
-        return None
-    try:
-        bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
-    except BearingError as error:  # coefficients need no bearing
-        warn(f"{error} Until then the amplitude is not held against the clearance.")
-        return None
-    return min(bearing.clearances)
+    if campaign.bearing_text:
+        try:
+            return parse_bearing(campaign.bearing_text, campaign.bearing_name)
+        except BearingError as error:  # coefficients need no bearing
+            warn(f"{error} Until then the amplitude is not held against the clearance.")
+    return None
 
 
 #: What arguments of these names may be.
@@ -102,8 +100,10 @@ def checked(
             if settings is not None:
                 chosen = bound.arguments.get("settings") or settings()
                 if chosen.clearance is None:  # the amplitude check knows the bearing, as on the command line
-                    warn = functools.partial(warnings.warn, stacklevel=3)
-                    chosen = dataclasses.replace(chosen, clearance=least_clearance(bound.arguments["campaign"], warn))
+                    bearing = carried_bearing(
+                        bound.arguments["campaign"], functools.partial(warnings.warn, stacklevel=3)
+                    )
+                    chosen = dataclasses.replace(chosen, clearance=bearing and min(bearing.clearances))
                 bound.arguments["settings"] = chosen
             return function(*bound.args, **bound.kwargs)
         except ValueError as error:

@@ -17,7 +17,7 @@ from rigdata.calibration import Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem
 from rigdata.virtual_rig import Fault, Noise, Sensor
-from tests.good_campaigns import PLAN, directions, sample, stiff_rig
+from tests.good_campaigns import PLAN, ROCKER_STIFFNESS, SMALL_PLAN, directions, rocker_rig, sample, stiff_rig
 from tests.rigs import held_run
 from tests.rigs.held_run import HeldReader, channels
 from tests.seeds import first_quick
@@ -25,8 +25,10 @@ from tpjb_ident.check.campaign import _check_lengths, check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, explanation, indefiniteness, merge, reach, repairs
 from tpjb_ident.check.observation import Observation, _at_rest, excitation_line, steady_level
 from tpjb_ident.check.signals import check_signal, is_spare
+from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
+from tpjb_ident.phasors.compensation import with_references
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.run_phasors import run_phasors
 
@@ -264,6 +266,42 @@ def test_probes_that_stand_elsewhere_than_stated_are_told_by_the_sweep_at_every_
     assert [c for c in point.quality if "from where the load pushes it" in c.detail] == ([reached] if reached else [])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("names", "change", "words"),
+    [
+        (PAIR[:1], {}, []),
+        (PAIR[:1], {"gain": 1.1}, ["X1A reads +1", "X1B reads -9"]),
+        (PAIR[:1], {"turn": -12.0}, ["X1A stands +12"]),
+        (("L1H",), {"gain": 1.12}, ["L1H reads +1", "L1V reads -1"]),
+    ],
+)
+def test_a_sweep_holds_sensors_against_the_pads_of_the_bearing_file_and_intervals_hold_it(
+    campaign_of, names, change, words
+):
+    """Of a campaign without dry runs."""
+    campaign = load_campaign(campaign_of(rocker_rig(3, plan=replace(SMALL_PLAN, dry=(), locus=()))))
+    gain, turn = change.get("gain", 1.0), math.radians(change.get("turn", 0.0))
+    campaign = restated(campaign, names, lambda c: replace(c, gain=c.gain * gain, axis=c.axis + turn))
+    problems = [f"{p.place} {p.what}" for p in check_campaign(campaign) if "clearance" in p.what]
+    assert len(problems) == len(words)
+    assert all(any(text in problem for problem in problems) for text in words), problems
+    frame = identify(campaign, IdentifySettings(methods=())).to_frame()
+    for column, true in (("kxx", ROCKER_STIFFNESS[0, 0]), ("kyy", ROCKER_STIFFNESS[1, 1])):
+        low, high = frame[[f"{column}_N_per_m_lo", f"{column}_N_per_m_hi"]].to_numpy()[0]
+        assert low < true < high
+        assert (high - low > 0.1 * true) == bool(words)
+
+
+def test_coefficients_without_a_reference_count_from_the_runs_mean_temperature(campaign_of):
+    campaign = load_campaign(campaign_of(rocker_rig(3, plan=replace(SMALL_PLAN, dry=(), locus=()))))
+    assert with_references(campaign) is campaign
+    drifting = restated(campaign, PAIR, lambda c: replace(c, temperature_coefficient=3e-3))
+    mean = np.mean([run.mean_temperature() for run in campaign.of_kind("dynamic")])
+    for run in with_references(drifting).runs:
+        assert run.channels["X1A"].temperature_reference == pytest.approx(mean, abs=1.0)
+
+
 SPARE = (
     Sensor.of_type("probe", "X1C", axis=math.radians(90.0), zero=8.1),
     Sensor.of_type("probe", "X1D", axis=0.0, zero=7.9),
@@ -286,6 +324,16 @@ def test_spare_probes_that_contradict_the_others_are_told_of_dry_runs_and_sweep(
     found = [p for p in check_campaign(campaign_of(rig)) if p.severity != "note"]
     assert [(p.severity, p.run) for p in found] == [told[:2] for told in expected], [str(p) for p in found]
     assert all(says in p.what for p, (_, _, says) in zip(found, expected))
+
+
+def test_what_many_channels_are_off_by_alike_makes_each_more_uncertain():
+    report = Reporter(run_of())
+    report.ask("turned", 14.0, "A", "B", angle=14.0)
+    report.ask("sensor gain", 0.1, "A", share=0.1, witness="loads")
+    names, deviations = zip(*report.doubted)
+    assert names == ("A", "B", "A")
+    np.testing.assert_allclose(deviations[0], [0.0, math.sqrt(2) * math.radians(14.0) * CHANGE_AS_DEVIATION], rtol=2e-3)
+    np.testing.assert_allclose(deviations[2], [0.1 * CHANGE_AS_DEVIATION])
 
 
 def test_what_one_of_many_static_runs_shows_stays_its_own():

@@ -106,7 +106,7 @@ def test_unequal_gains_show_in_the_angles_of_the_polygon(campaign, tmp_path, com
         assert says in told
     else:
         assert "warning" in told
-        assert "X1A read" in told
+        assert "X1A read" in told.replace(":", "")  # by the sides already, from 5 % on
         polygon = measure_run(source.of_kind("clearance")[0], ANGLES)
         (sentence,) = (s.sentence() for s in polygon.status if s == "probe-gains-differ")
         assert says in sentence

@@ -18,7 +18,7 @@ from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.probe_readings import check_positions, check_shaft_lines
 from tpjb_ident.check.rig_fit import rig_fit
 from tpjb_ident.check.run_gain import check_agreement, check_film, point_runs
-from tpjb_ident.check.sensor_axes import check_cells, check_probes
+from tpjb_ident.check.sensor_axes import check_cells, check_sweep
 from tpjb_ident.check.set_points import (
     check_excitation,
     check_places,
@@ -28,6 +28,7 @@ from tpjb_ident.check.set_points import (
 )
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
 from tpjb_ident.conditions import SEVERITIES, Conditions
+from tpjb_ident.phasors.compensation import with_references
 from tpjb_ident.rounding import listed
 from tpjb_ident.terms.mains import MAINS_ON_LINE
 
@@ -57,7 +58,7 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
     []
     """
     try:
-        campaign = as_campaign(campaign, "check_campaign: campaign")
+        campaign = with_references(as_campaign(campaign, "check_campaign: campaign"))
     except RigDataError as error:
         return _sorted(error.problems)
     observations: list[Observation] = []
@@ -108,7 +109,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     check_rotation(sines)
     check_shaft_lines(sines)
     check_sweeps(of_kind("clearance"))
-    check_probes(of_kind("clearance"), of_kind("dry_pivot"))
+    check_sweep(campaign, of_kind("clearance"), of_kind("dry_pivot"))
     check_locus(of_kind("locus"))
     _check_duplicates(observations)
     _check_lengths(observations)

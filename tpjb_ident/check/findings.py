@@ -1,7 +1,8 @@
 """Findings of the check: from which answer on a question is told and in which words; what many runs share told once.
 
 A question is one row of `questions.csv`: it compares one number with its limits; which number it is, the other files of
-this folder say. An empty limit is never reached.
+this folder say. An empty limit is never reached. `deviations` times the number is how uncertain a finding makes gain,
+axis [rad] and low corner [Hz] of its channels: 1/1.6 of a change (`CHANGE_AS_DEVIATION`), 0.0109 of one in degrees.
 
 Which wiring fault of two sensors (swapped, inverted, ten times off) would explain what they show goes with it.
 """
@@ -36,6 +37,7 @@ class Question(NamedTuple):
     text: str
     cure: str
     of_channels: bool  #: whether it is the channels' nature, in whatever run they serve
+    deviations: tuple[float, ...]
 
 
 def _questions() -> dict[str, Question]:
@@ -43,7 +45,8 @@ def _questions() -> dict[str, Question]:
     text = Path(__file__).with_name("questions.csv").read_text(encoding="utf-8")
     for row in csv.DictReader(text.splitlines()):
         limits = tuple(float(row[level] or math.inf) for level in ("note", "warning", "error"))
-        table[row["name"]] = Question(limits, row["place"], row["text"], row["cure"], bool(row["of_channels"]))
+        more = bool(row["of_channels"]), tuple(map(float, row["deviations"].split()))
+        table[row["name"]] = Question(limits, row["place"], row["text"], row["cure"], *more)
     return table
 
 
@@ -77,13 +80,13 @@ class Reporter:
     run: Run
     findings: list[Finding] = field(default_factory=list)
     cells_doubted: bool = False  #: what they show is held against nothing any more
-    #: by channel: deviations of its gain, its axis [rad], its low corner [Hz]; of its gain in this run
-    doubted: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    #: channels, with deviations of gain, axis [rad], low corner [Hz]; by channel: of its gain in this run
+    doubted: list[tuple[str, FloatArray]] = field(default_factory=list)
     off: dict[str, float] = field(default_factory=dict)
 
     def copy(self) -> Reporter:
         """A reporter that has found the same so far."""
-        return replace(self, findings=list(self.findings), doubted=dict(self.doubted), off=dict(self.off))
+        return replace(self, findings=list(self.findings), doubted=list(self.doubted), off=dict(self.off))
 
     @property
     def keys(self) -> list[str]:
@@ -106,6 +109,9 @@ class Reporter:
         place, text = question.place.format(**words), question.text.format(**words) + hint
         key = f"{kind} {words['names']}".rstrip() + hint
         self.note(key, passed[-1], place, text, question.cure, names if question.of_channels else ())
+        # independent deviations that hold what all channels are off by alike
+        deviations = np.multiply(question.deviations, math.sqrt(len(names)) * size)
+        self.doubted += [(name, deviations) for name in names]
         return passed[-1]
 
     def note(
@@ -163,7 +169,7 @@ class Verdicts:
     shared: dict[str, list[Problem]] = field(default_factory=dict)
     doubtful: dict[str, list[Problem]] = field(default_factory=dict)
     run_gains: dict[str, list[Problem]] = field(default_factory=dict)
-    doubted: dict[str, tuple[float, ...]] = field(default_factory=dict)  #: as of `Reporter`
+    doubted: list[tuple[str, FloatArray]] = field(default_factory=list)  #: as of `Reporter`
     off: dict[tuple[str, str], float] = field(default_factory=dict)  #: the same, by run and channel
     swept: dict[tuple[str, str], float] = field(default_factory=dict)  #: m: half a probe's travel, by sweep and probe
 

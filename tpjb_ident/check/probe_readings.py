@@ -28,8 +28,6 @@ _SOFTER, _AS_DEVIATION = 2.0, 0.8
 _STEP, _LEAST_STEP, _MIN_STEPS = 9.0, 15e-6, 4
 #: Mean over the range of readings below which a probe shows no place: one that is set to zero wanders by more.
 _NO_PLACE = 0.005
-#: Low corner of inputs that are coupled by a capacitor, one deviation [Hz].
-_COUPLED = 1.0
 
 
 def _by_probe(runs: Sequence[Observation], alike: str) -> Iterator[tuple[str, list[tuple[Observation, int]]]]:
@@ -54,7 +52,6 @@ def check_positions(runs: Sequence[Observation]) -> None:
         if len(members) >= _MIN_STEPS and not is_known and np.all(np.abs(mean) < _NO_PLACE * size):
             for run, _ in members:
                 run.report.ask("no place", 1.0, name)
-                run.report.doubted[name] = (0.0, 0.0, _COUPLED)
     for name, members in _by_probe(runs, "run.point"):
         off = np.array([run.spread[1, k] for run, k in members])
         off -= np.median(off)
@@ -100,7 +97,8 @@ def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object
     if spare < _MIN_SPARE or np.ptp(usual) > _LOST:
         return np.zeros(len(sizes))
     scatter = _MANY_LINES * np.median(np.abs(sizes - usual)) * math.sqrt(len(sizes) / spare)
-    alone, change = sizes - usual, sizes - np.median(sizes)
+    # the middle of two groups as large would halve what they differ by
+    alone, change = sizes - usual, sizes - np.quantile(sizes, 0.5, method="lower")
     differs = np.abs(change) > max(_SAME_RUNOUT, scatter) + _SOFTER * (motion + np.median(motion))
     if differs.mean() >= 0.5:
         above, below = sizes - usual.min(), sizes - usual.max()

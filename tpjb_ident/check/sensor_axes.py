@@ -2,7 +2,8 @@
 
 A cell that reads (1 + g) times the truth along an axis turned by t shows W (1 + g) cos(phi - axis - t) of a load W
 towards phi: loads in two directions tell both numbers. Two probes are told by the sides of the clearance polygon, which
-stand across the pads wherever these are. Where all but one agree, that one is off; set points and pads have a say too.
+stand across the pads, two cells by the push around it. Where all but one agree, that one is off; set points and pads
+have a say too.
 """
 
 from collections.abc import Sequence
@@ -10,14 +11,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
-from rigdata.vector import directions
+from tpjb_ident.arguments import carried_bearing
 from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.set_points import set_point
 from tpjb_ident.clearance.measure import coldest_first
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
-from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.phasors.slow_samples import live_run
-from tpjb_ident.pivot.sweep_witness import SIDES, witness_of
+from tpjb_ident.pivot.sweep_witness import WITNESSES, witness_of
 
 #: Condition of the loads' directions up to which they tell cells apart, and runs.
 _TELLING, _MIN_RUNS = 30.0, 4
@@ -36,9 +38,8 @@ def check_cells(observations: Sequence[Observation]) -> None:
     for names, group in groups.items():
         axes = np.array([channel.axis or 0.0 for channel in group[0].of("force")])
         readings = np.array([observation.lines.mean[observation.pick("force")] for observation in group])
-        points = [observation.run.point for observation in group]
-        size = np.array([point.static_load for point in points])
-        loads = size[:, None] * directions([point.static_load_direction for point in points])
+        set_points = np.array([set_point(observation.run.point) for observation in group])
+        loads = np.column_stack([set_points.real, set_points.imag])
         shown = np.isfinite(readings).all(axis=1)
         loads, readings = loads[shown], readings[shown]
         usual = _is_usual(loads, readings)
@@ -77,18 +78,20 @@ def _logarithms(loads: FloatArray, readings: FloatArray, axes: FloatArray) -> Co
     return off
 
 
-def check_probes(sweeps: Sequence[Observation], dry: Sequence[Observation]) -> None:
-    """Two probes against the pads' directions, as the dry runs state them, in the coldest sweep."""
-    angles = _pad_directions(dry)
+def check_sweep(campaign: Campaign, sweeps: Sequence[Observation], dry: Sequence[Observation]) -> None:
+    """Two cells against a round push, two probes against the pads of dry runs, else of the bearing file."""
     usable = {observation.run.id: observation for observation in sweeps if not observation.report.cells_doubted}
     for run in coldest_first([observation.run for observation in usable.values()])[:1]:
+        bearing = carried_bearing(campaign, lambda text: None)
+        angles = _pad_directions(dry) or getattr(bearing, "pivot_angles", [])
         try:
             errors = witness_of(live_run(run), np.array(angles)).errors
         except RigDataError:  # said by its own check
             return
         observation = usable[run.id]
-        names = sorted(errors.keys() & observation.names("displacement"))
-        _ask([observation], names, np.array([errors[name] for name in names]), SIDES)
+        for quantity, witness in WITNESSES.items():
+            names = sorted(errors.keys() & observation.names(quantity))
+            _ask([observation], names, np.array([errors[name] for name in names]), witness)
 
 
 def _pad_directions(runs: Sequence[Observation]) -> list[float]:
@@ -100,7 +103,7 @@ def _pad_directions(runs: Sequence[Observation]) -> list[float]:
             stated[run.pad] = run.point.static_load_direction
     angles = [stated[pad] for pad in sorted(stated)]
     gaps = np.diff(np.sort(np.mod(angles, 2 * np.pi)))
-    is_whole = sorted(stated) == list(range(1, len(stated) + 1)) and np.all(gaps > np.pi / max(len(stated), 1))
+    is_whole = max(stated, default=0) == len(stated) and np.all(gaps * len(stated) > np.pi)
     return angles if is_whole else []
 
 
@@ -109,14 +112,8 @@ def _ask(observations: Sequence[Observation], names: Sequence[str], logarithms: 
     if not np.isfinite(logarithms).all():
         return
     errors = logarithms - complex(np.median([*logarithms.real, 0.0]), np.median([*logarithms.imag, 0.0]))
-    for name, gain, turn in zip(names, errors.real, errors.imag):
-        angle = float(np.degrees(turn))
+    for name, gain, angle in zip(names, errors.real, np.degrees(errors.imag)):
         for observation in observations:
             report = observation.report
-            of_gain = report.ask("sensor gain", abs(gain), name, share=float(np.expm1(gain)), witness=witness)
-            of_axis = report.ask("sensor axis", abs(angle), name, angle=angle, witness=witness)
-            if of_gain or of_axis:
-                report.doubted[name] = (
-                    CHANGE_AS_DEVIATION * abs(gain) * bool(of_gain),
-                    CHANGE_AS_DEVIATION * abs(turn) * bool(of_axis),
-                )
+            report.ask("sensor gain", abs(gain), name, share=float(np.expm1(gain)), witness=witness)
+            report.ask("sensor axis", abs(angle), name, angle=angle, witness=witness)

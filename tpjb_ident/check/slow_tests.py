@@ -25,8 +25,6 @@ _FIRM = math.radians(5.0)
 _MENDED = {"force": 8.0, "displacement": 20.0}
 #: A clearance polygon and a locus are far from round; 1 is round. A mended one is rounder than the second.
 _LEAST_DEFINITE, _MENDED_DEFINITE = 0.02, 0.15
-#: Angle [deg] by which the shaft lies aside of the load, beyond what friction does.
-_TURNED = 12.0
 #: Loads within this angle [deg] go toward one pad; toward a pad of the arrangement within the second.
 _SAME_PAD, _AT_PAD = 25.0, 12.0
 #: Numbers of pads that bearings have.
@@ -117,11 +115,9 @@ def _check_sweep(observation: Observation) -> None:
     axes = np.array([channel.axis or 0.0 for channel in observation.of("displacement")])
     turns = np.degrees(np.angle(answer * np.exp(-1j * axes)))
     common, names = np.median([*turns, 0.0]), observation.names("displacement")  # the cells have a say too
-    if abs(common) > _TURNED:
-        observation.report.ask("turned", abs(common), *names, angle=common)
-        return
-    for name, turn in zip(names, turns - common):
-        observation.report.ask("turned", abs(turn), name, angle=turn)
+    if not observation.report.ask("turned", abs(common), *names, angle=common):
+        for name, turn in zip(names, turns - common):
+            observation.report.ask("turned", abs(turn), name, angle=turn)
 
 
 def _gain(force: FloatArray, shaft: FloatArray) -> FloatArray | None:

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from tpjb_ident.identification.settings import IdentifySettings
     from tpjb_ident.results.identification import Identification
 
-#: Share of the mean direct coefficient from which a cross-coupled one is shown.
-_CROSS_COUPLED = 0.1
+_CROSS_COUPLED = 0.1  # of the mean direct coefficient: from there on a cross-coupled one is shown
 #: Columns of tables at the terminal: direct and cross-coupled coefficients, models, what tells points apart.
 DIRECT = "kxx_N_per_m kyy_N_per_m cxx_Ns_per_m cyy_Ns_per_m"
 _CROSS = "kxy_N_per_m kyx_N_per_m cxy_Ns_per_m cyx_Ns_per_m"
@@ -32,7 +31,7 @@ POINT = " ".join(POINT_COLUMNS)
 
 def identify_settings(c: Command, campaign: Campaign) -> IdentifySettings:
     """Build `IdentifySettings` from ``--method`` and ``--norm``, with the clearance for the amplitude check."""
-    from tpjb_ident.arguments import least_clearance
+    from tpjb_ident.arguments import carried_bearing
     from tpjb_ident.estimators.estimate import METHODS, NORMS
     from tpjb_ident.identification.settings import IdentifySettings
 
@@ -45,7 +44,8 @@ def identify_settings(c: Command, campaign: Campaign) -> IdentifySettings:
     if not campaign.of_kind("dynamic"):
         raise BadInputError(f"campaign {campaign.id}: has no dynamic runs. Use `tpjb pivot` or `tpjb locus`.")
     estimator = f"rlm:{norm or 'huber'}" if method == "rlm" else method
-    return IdentifySettings(method=estimator, clearance=least_clearance(campaign, c.warn))
+    bearing = carried_bearing(campaign, c.warn)
+    return IdentifySettings(method=estimator, clearance=None if bearing is None else min(bearing.clearances))
 
 
 def identified(c: Command, campaign: Campaign) -> Identification:

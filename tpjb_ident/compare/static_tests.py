@@ -18,7 +18,7 @@ from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.refusals import usable_runs
-from tpjb_ident.pivot.sweep_witness import SIDES
+from tpjb_ident.pivot.sweep_witness import WITNESSES
 from tpjb_ident.pivot.tables import Formula
 
 #: Measured stiffness over the formula's beyond which a scale is wrong: pivots are softer, a third to a tenth in places.
@@ -80,7 +80,7 @@ def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Prob
             fault = f"loads pad #{run.pad}, the bearing has {len(bearing.pads)}"
             problems.append(Problem("error", run.file, "pad", fault, "Correct pad in the manifest", run.id))
     refused = {problem.run for problem in former if problem.severity == "error"}
-    tells_gains = not any(SIDES in problem.what for problem in former)
+    said = "; ".join(problem.what for problem in former)
     for run in campaign.of_kind("clearance"):
         if run.id in refused:
             continue
@@ -90,8 +90,8 @@ def bearing_problems(campaign: Campaign, bearing: Bearing, former: Sequence[Prob
             problems += [Problem("warning", p.file, p.place, p.what, p.cure, run.id) for p in error.problems]
             continue
         for condition in polygon.status:
-            if condition == "cells-differ" or (condition in {"probe-gains-differ", "probe-turned"} and tells_gains):
-                quantity = "force" if condition == "cells-differ" else "displacement"
+            quantity = "force" if condition == "cells-differ" else "displacement"
+            if condition in {"cells-differ", "probe-gains-differ", "probe-turned"} and WITNESSES[quantity] not in said:
                 channels = f"channels {' and '.join(channel.name for channel in run.of(quantity))}"
                 cure = "Check sensitivities, axes and how they are mounted"
                 problems.append(Problem("warning", run.file, channels, condition.detail, cure, run.id))

@@ -40,7 +40,7 @@ class Sensor(Channel):
 
     corner_uncertainty: float = 0.0  #: Hz: of a low corner that nobody states, one deviation
 
-    def doubted(self, gain: float, turn: float = 0.0, corner: float = 0.0) -> Sensor:
+    def doubted(self, gain: float = 0.0, turn: float = 0.0, corner: float = 0.0) -> Sensor:
         """The sensor, its gain, axis [rad] and low corner [Hz] known no better than this."""
         uncertainty, corner = max(self.uncertainty or 0.0, gain) or None, max(self.corner_uncertainty, corner)
         turn = max(self.axis_uncertainty, turn)
@@ -108,10 +108,6 @@ class Rig(Directed):
     def spare(self) -> BoolArray:
         """Whether a sensor is one of more than two of its quantity, (m,): they tell what is wrong with one of them."""
         return np.array([len(self.pick(sensor.quantity)) > 2 for sensor in self.channels])
-
-    def doubting(self, doubted: Mapping[str, tuple[float, ...]]) -> Rig:
-        """The rig, gains, axes [rad] and corners [Hz] of some sensors, by their names, known no better than this."""
-        return replace(self, channels=tuple(s.doubted(*doubted.get(s.name, (0.0,))) for s in self.channels))
 
     def __len__(self) -> int:
         return len(self.channels)
@@ -385,10 +381,16 @@ def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
     return np.array(rows)
 
 
-def campaign_rig(campaign: Campaign, **known: Any) -> Rig:
-    """The rig of a campaign's dynamic runs as stated; `known`: what else is of it, by name."""
+def campaign_rig(campaign: Campaign, doubted: Sequence[tuple[str, FloatArray]] = (), **known: Any) -> Rig:
+    """The rig of a campaign's dynamic runs as stated; `known`: what else is of it, by name.
+
+    `doubted`: names of sensors, with deviations of gain, axis [rad] and corner [Hz] that are known no better.
+    """
+    sensors = sensors_of(campaign)
+    for name, deviations in doubted:
+        sensors = tuple(s.doubted(*deviations) if s.name == name else s for s in sensors)
     runs = tuple(run.id for run in campaign.of_kind("dynamic"))
-    return Rig(sensors_of(campaign), campaign.housing_mass, campaign.mass_uncertainty, runs=runs, **known)
+    return Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, runs=runs, **known)
 
 
 def mounted(rig: Rig, blocks: Blocks, stated: str | None, ratio: complex) -> Rig:

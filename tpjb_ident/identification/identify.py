@@ -31,6 +31,7 @@ from tpjb_ident.identification.campaign_solution import (
 )
 from tpjb_ident.identification.point import SOLVED, finished_point, point_share
 from tpjb_ident.identification.settings import IdentifySettings
+from tpjb_ident.phasors.compensation import with_references
 from tpjb_ident.phasors.whole_record import mains_frequency
 from tpjb_ident.results.frequency_model import fits_over_frequency, with_frequency_outliers
 from tpjb_ident.results.identification import BandLine, BandResult, Identification
@@ -95,6 +96,7 @@ def identify(
     2.5 kN, 25 Hz: kxx 53.07 ± 0.49 MN/m, cxx 581.6 ± 5.0 kN s/m, kyy 90.68 ± 0.81 MN/m, cyy 689.1 ± 6.1 kN s/m
     """
     chosen = settings or IdentifySettings()
+    campaign = with_references(campaign)
     runs = campaign.of_kind("dynamic")
     if not runs:
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
@@ -165,8 +167,7 @@ def assemble(
     dry = dry or DryTest()
     gathered = gather(digests)
     report("estimating", 0, len(gathered))
-    rig = campaign_rig(campaign, bare=dry.stiffness, to_set_point=settings.correct, off=checked.off)
-    rig = rig.doubting(checked.doubted)
+    rig = campaign_rig(campaign, checked.doubted, bare=dry.stiffness, to_set_point=settings.correct, off=checked.off)
     solved = solve_campaign(campaign, gathered, digests, workers, rig)
     excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
     jobs = []
@@ -225,8 +226,7 @@ def identify_bands(
         data = band_blocks(points, rig, loads, settings.clearance)
         return solve_bands(mounted(loads.doubted(rig), data.blocks, campaign.mount, loads.common), data)
 
-    rig = campaign_rig(campaign, bare=bare, to_set_point=settings.correct, off=checked.off)
-    rig = rig.doubting(checked.doubted)
+    rig = campaign_rig(campaign, checked.doubted, bare=bare, to_set_point=settings.correct, off=checked.off)
     solved = solved_with_clocks(rig, min(run.sample_rate for run in runs), solve)
     identified: list[PointResult] = []
     results, numbers = [], []

@@ -22,6 +22,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
+from rigdata.campaign import Campaign
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition, Conditions, holding, merged
@@ -189,6 +190,22 @@ def _filling_order(size: FloatArray, k: int) -> int | None:
     return order if abs(shown - order) < _AGREE * order else None
 
 
+def with_references(campaign: Campaign) -> Campaign:
+    """Temperature coefficients without a stated reference count from the mean of the dynamic runs."""
+    drifts = any(channel.temperature_coefficient for channel in campaign.channels.values())
+    shown = [run.mean_temperature() for run in campaign.of_kind("dynamic") if drifts]
+    measured = list(filter(None, shown))
+    if not measured:
+        return campaign
+    mean, runs = float(np.mean(measured)), []
+    for run in campaign.runs:
+        channels = {
+            n: replace(c, temperature_reference=c.temperature_reference or mean) for n, c in run.channels.items()
+        }
+        runs.append(replace(run, channels=channels))
+    return replace(campaign, runs=tuple(runs))
+
+
 def compensated(result: Phasors, run: Run, slower: Mapping[str, SlowerChannel], delays: Mapping[str, float]) -> Phasors:
     """The run's phasors as channels without filters, filling, delays and warmth would have given them.
 
@@ -206,8 +223,8 @@ def compensated(result: Phasors, run: Run, slower: Mapping[str, SlowerChannel], 
                 cure = "Extend filter_table, or check filter"
                 raise refuse(run.file, f"channel {channel.name}", f"{text}, or nothing comes through", cure, run.id)
             gain *= np.where(unknown, 1.0, response)  # 1 at disturbing lines that a table does not reach
-        if channel.temperature_reference is not None and not np.isnan(result.temperature):
-            warmer = result.temperature - channel.temperature_reference
+        if channel.temperature_reference is not None:
+            warmer = np.nan_to_num(result.temperature - channel.temperature_reference)
             gain *= 1 + channel.temperature_coefficient * warmer
         if channel.name in slower:
             gain *= slower[channel.name].at(frequencies)

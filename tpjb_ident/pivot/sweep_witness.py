@@ -30,7 +30,8 @@ from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.slow_samples import live_run, slow_samples
 from tpjb_ident.pivot.dry_record import DryRecord, axial_channels, probes_of
 
-SIDES = "the sides of the clearance polygon"  # what tells of probes, in words
+#: What tells of cells and of probes, in words.
+WITNESSES = {"force": "the push of the clearance sweep", "displacement": "the sides of the clearance polygon"}
 #: Standard errors from which sensors are off, and gains or axes of cells (a push may be oval by less) and of probes.
 _ERRORS, _OVAL, _UNEQUAL = 4.0, 0.03, 0.02
 _INDEPENDENT = 10.0  # readings that a push which wanders is worth
@@ -42,9 +43,8 @@ _EVIDENCE = {
     "displacement": ("the sides stand", "probe-gains-differ", "probe-turned"),
 }  #: by quantity: what shows it, and conditions of gains and of axes
 _EXCHANGED = 0.6  # [rad] from which it is no axis any more but another channel or sign: that is refused elsewhere
-_PLAUSIBLE = 0.3  # of a sensor's error, one standard deviation
 _TOUCHED = 0.99  # share of a sweep in which the shaft has not been farther out
-_STAYS = 0.1  # of a run's weight: that the zero did not move
+_PLAUSIBLE, _STAYS = 0.3, 0.1  # deviation of a sensor's error; of a run's weight: that the zero did not move
 _LEAST_LENGTH = 1e-9  # [m]: a shorter one is none
 _ELSEWHERE, _LEAST_MOVE, _SPREADS = 0.015, 1e-6, 5.0  # of the clearance, [m], robust deviations of the other runs
 

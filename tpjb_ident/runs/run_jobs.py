@@ -320,7 +320,7 @@ def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -
     reach(reports)
     result = verdicts([report for report in reports if report.run.kind == "dynamic"])
     for report in reports:
-        result.doubted.update(report.doubted)
+        result.doubted.extend(report.doubted)
         for name, deviation in report.off.items():
             result.off[report.run.id, name] = deviation
     for observation in static:
