@@ -7,6 +7,7 @@ import ast
 import doctest
 import functools
 import importlib
+import os
 from collections.abc import Iterator
 
 import numpy as np
@@ -31,24 +32,29 @@ def described() -> Iterator[tuple[str, str, str]]:
             yield path, name, text
 
 
+#: What was asked, and the answer.
+ANSWERS: dict[str, object] = {}
+
+
 @pytest.fixture(scope="module", autouse=True)
 def computed_once():
-    """What several examples ask of the demo alike (K and C, static tests, comparison, diagnosis) is computed once."""
+    """What several examples and pages ask of the demo alike (K and C, static tests, comparison) is computed once."""
     from tpjb_ident.compare import comparison, static_tests
     from tpjb_ident.diagnosis import campaign, from_python
     from tpjb_ident.identification import identify
 
-    answers: dict[str, object] = {}
+    def named(part):
+        return os.path.realpath(part.path) if hasattr(part, "path") else part
 
     def once(function):
         @functools.wraps(function)
-        def answer(*given, **named):
-            asked = [part for part in (*given, *named.values()) if part not in (None, campaign.Baseline())]
+        def answer(*given, **options):
+            asked = [part for part in (*given, *options.values()) if part not in (None, campaign.Baseline())]
             asked = [part for part in asked if not callable(part)]  # whom to tell of the progress
-            key = f"{function.__name__} {[getattr(part, 'path', part) for part in asked]}"
-            if key not in answers:
-                answers[key] = function(*given, **named)
-            return answers[key]
+            key = f"{function.__name__} {[named(part) for part in asked]}"
+            if key not in ANSWERS:
+                ANSWERS[key] = function(*given, **options)
+            return ANSWERS[key]
 
         return answer
 
