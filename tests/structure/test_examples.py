@@ -59,6 +59,7 @@ def computed_once():
         return answer
 
     with coarse_pictures(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)  # as `tests.command_line` has it
         for name, module in (("identify", identify), ("measure_static", static_tests)):
             patch.setattr(module, name, once(getattr(module, name)))
             patch.setattr(campaign, name, getattr(module, name))
