@@ -63,8 +63,7 @@ def test_a_compiled_loop_is_pickled_by_its_name():
 @pytest.mark.slow
 def test_code_on_the_disk_allocates_without_a_compiler():
     asked = (  # of a loop whose code there is already where anything has been predicted
-        "import numpy as np; from numba.core.runtime import rtsys\n"
-        "from model.film.attitudes import points_between\n"
+        "import numpy as np; from numba.core.runtime import rtsys; from model.film.attitudes import points_between\n"
         "points, warm = points_between(np.arange(1.0, 13.0).reshape(4, 3), np.ones((4, 2)))\n"
         "print(points.shape, np.allclose(warm, 1.0), rtsys._init)"
     )

@@ -22,6 +22,8 @@ from tests.structure.test_docstrings import definitions, handed_on
 WITHOUT_EXAMPLE = 0
 #: What `docs/plots.md` and the readers' own tests show.
 SHOWN_ELSEWHERE = ("tpjb_ident/report/plots/", "tpjb_ident/exports/", "rigdata/readers/formats/", "model/effects/")
+#: What was asked, and the answer.
+ANSWERS: dict[str, object] = {}
 
 
 def described() -> Iterator[tuple[str, str, str]]:
@@ -32,10 +34,6 @@ def described() -> Iterator[tuple[str, str, str]]:
             yield path, name, text
 
 
-#: What was asked, and the answer.
-ANSWERS: dict[str, object] = {}
-
-
 @pytest.fixture(scope="module", autouse=True)
 def computed_once():
     """What several examples and pages ask of the demo alike (K and C, static tests, comparison) is computed once."""
@@ -43,17 +41,15 @@ def computed_once():
     from tpjb_ident.diagnosis import campaign, from_python
     from tpjb_ident.identification import identify
 
-    def named(part):
-        return os.path.realpath(part.path) if hasattr(part, "path") else part
-
     def once(function):
         @functools.wraps(function)
-        def answer(*given, **options):
-            asked = [part for part in (*given, *options.values()) if part not in (None, campaign.Baseline())]
+        def answer(*given, **named):
+            asked = [part for part in (*given, *named.values()) if part not in (None, campaign.Baseline())]
             asked = [part for part in asked if not callable(part)]  # whom to tell of the progress
-            key = f"{function.__name__} {[named(part) for part in asked]}"
+            asked = [os.path.realpath(part.path) if hasattr(part, "path") else part for part in asked]
+            key = f"{function.__name__} {asked}"
             if key not in ANSWERS:
-                ANSWERS[key] = function(*given, **options)
+                ANSWERS[key] = function(*given, **named)
             return ANSWERS[key]
 
         return answer
