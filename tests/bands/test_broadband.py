@@ -336,7 +336,7 @@ def test_cells_a_little_late_widen_the_interval_and_say_nothing(tmp_path):
 
 @pytest.mark.slow
 def test_a_dead_cell_costs_its_run_and_an_inverted_one_the_band(tmp_path):
-    path = campaign(tmp_path, BandRig(kind="random", seconds=8.0), seed=90003, directions=(0.0, 45.0, 90.0, 135.0))
+    path = campaign(tmp_path, BandRig(kind="random", seconds=4.0), seed=90003, directions=(0.0, 45.0, 90.0, 135.0))
     with h5py.File(path, "r+") as file:
         file["runs/b-5000-1/F1"][:] = 0.25
     found = identify(load_campaign(path))
@@ -353,7 +353,7 @@ def test_a_dead_cell_costs_its_run_and_an_inverted_one_the_band(tmp_path):
 
 @pytest.mark.slow
 def test_gains_that_differ_from_run_to_run_are_in_all_intervals(tmp_path):
-    quiet = BandRig(kind="random", seconds=8.0, band=(10.0, 60.0))
+    quiet = BandRig(kind="random", seconds=4.0, band=(10.0, 60.0))
     rig = replace(quiet, run_gain=0.02)
     four = {"directions": (0.0, 45.0, 90.0, 135.0)}
     wide, narrow = (band_of(tmp_path, r, seed=21, **four).models["K-C-M"] for r in (rig, quiet))

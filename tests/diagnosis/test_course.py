@@ -96,7 +96,7 @@ def test_slopes_are_those_of_the_course():
 @pytest.mark.slow  # seconds: the bearing model itself
 def test_a_comparison_finds_its_way_past_pads_that_come_out_of_contact():
     """Upper pads leave the shaft at another clearance for every load: K and C jump on the way."""
-    setup = rocker_setup(Mesh(48, 4), accuracy=1e-5)
+    setup = rocker_setup(Mesh(48, 4, fine_solid=False), accuracy=1e-5)  # as a diagnosis has it
     layout = whole_layout(np.arange(2500.0, 8751.0, 1250.0), (10.0, 20.0, 30.0, 40.0, 50.0), sweep_first=False)
     planned = planned_observations(setup, layout)
     forward = Forward(setup, planned.layout, planned.elements)

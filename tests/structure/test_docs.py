@@ -4,14 +4,14 @@ import ast
 import json
 import re
 import shlex
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 
+from model.effects import registry
 from tests.command_line import ended
+from tests.structure.test_examples import computed_once  # noqa: F401 (for its module)
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -85,13 +85,14 @@ def test_toml_is_toml_and_the_described_campaign_is_understood():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("language", "text"), of("python"))
-def test_python_runs_as_it_stands(language, text, desk):
+def test_python_runs_as_it_stands(language, text, desk, monkeypatch, capsys):
     ast.parse(text)
     if any(word in text for word in NEEDS_FILES_OF_YOUR_OWN) or text.startswith("ti.plots."):
         return  # calls of the gallery: `tests/report` draws them
-    done = subprocess.run([sys.executable, "-W", "error", "-P", "-c", text], cwd=desk, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout
+    monkeypatch.chdir(desk)
+    monkeypatch.setattr(registry, "_registered", {})
+    exec(compile(text, "block", "exec"), {"__name__": "__main__"})
+    assert capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("language", "text"), of("sh"))

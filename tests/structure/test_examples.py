@@ -7,6 +7,7 @@ import ast
 import doctest
 import functools
 import importlib
+import os
 from collections.abc import Iterator
 
 import numpy as np
@@ -21,6 +22,8 @@ from tests.structure.test_docstrings import definitions, handed_on
 WITHOUT_EXAMPLE = 0
 #: What `docs/plots.md` and the readers' own tests show.
 SHOWN_ELSEWHERE = ("tpjb_ident/report/plots/", "tpjb_ident/exports/", "rigdata/readers/formats/", "model/effects/")
+#: What was asked, and the answer.
+ANSWERS: dict[str, object] = {}
 
 
 def described() -> Iterator[tuple[str, str, str]]:
@@ -33,26 +36,26 @@ def described() -> Iterator[tuple[str, str, str]]:
 
 @pytest.fixture(scope="module", autouse=True)
 def computed_once():
-    """What several examples ask of the demo alike (K and C, static tests, comparison, diagnosis) is computed once."""
+    """What several examples and pages ask of the demo alike (K and C, static tests, comparison) is computed once."""
     from tpjb_ident.compare import comparison, static_tests
     from tpjb_ident.diagnosis import campaign, from_python
     from tpjb_ident.identification import identify
-
-    answers: dict[str, object] = {}
 
     def once(function):
         @functools.wraps(function)
         def answer(*given, **named):
             asked = [part for part in (*given, *named.values()) if part not in (None, campaign.Baseline())]
             asked = [part for part in asked if not callable(part)]  # whom to tell of the progress
-            key = f"{function.__name__} {[getattr(part, 'path', part) for part in asked]}"
-            if key not in answers:
-                answers[key] = function(*given, **named)
-            return answers[key]
+            asked = [os.path.realpath(part.path) if hasattr(part, "path") else part for part in asked]
+            key = f"{function.__name__} {asked}"
+            if key not in ANSWERS:
+                ANSWERS[key] = function(*given, **named)
+            return ANSWERS[key]
 
         return answer
 
     with coarse_pictures(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)  # as `tests.command_line` has it
         for name, module in (("identify", identify), ("measure_static", static_tests)):
             patch.setattr(module, name, once(getattr(module, name)))
             patch.setattr(campaign, name, getattr(module, name))
