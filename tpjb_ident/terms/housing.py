@@ -205,8 +205,8 @@ class Housing(Term):
             f"behind a filter; between the {sensors} and the housing there is none. State `delay` or `filter` of the "
             "channels"
         )
-        is_early = self.rig.mount != "cells" or any(s.quantity == "force" and s.response for s in self.rig.channels)
-        is_harmless = 0 < phase * self._inertia < HARMLESS and not is_early
+        is_plain = self.rig.static and not any(s.quantity == "force" and s.response for s in self.rig.channels)
+        is_harmless = 0 < phase * self._inertia < HARMLESS and is_plain and self.rig.mount == "cells"
         return (Condition("accelerometers-doubtful" if is_harmless else OUT_OF_STEP, text),)
 
     def standing_on(self, fitted: Fitted) -> ComplexArray | None:
