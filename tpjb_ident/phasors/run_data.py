@@ -164,8 +164,6 @@ def complex_median(z: ComplexArray) -> ComplexArray:
 
 #: Lines nearer than this are one [Hz].
 _SAME_LINE = 1e-3
-#: Bins of the whole record that a line of the shaft, whose speed wanders, reaches.
-_REACH = 3.0
 
 
 @dataclass(frozen=True)
@@ -220,13 +218,10 @@ def _mean_square(rows: ComplexArray) -> float:
 
 
 def _alone(run: RunPhasors, frequency: float, name: str) -> int | None:
-    """Place of a line of the whole record that nothing else shares or reaches; None where there is none."""
+    """Place of a line of the whole record that nothing else shares; None where there is none."""
     kind = "2X-f" if name == "2X-f" else "harmonic"
-    off = np.abs(run.lines.whole_frequencies - frequency)
-    near = off * (np.ptp(run.start) + run.length) < _REACH
-    places = np.flatnonzero(near | (off < _SAME_LINE)).tolist()
-    is_there = len(places) == 1 and off[places[0]] < _SAME_LINE
-    return places[0] if is_there and run.lines.whole[places[0]].name.startswith(kind) else None
+    places = np.flatnonzero(np.abs(run.lines.whole_frequencies - frequency) < _SAME_LINE).tolist()
+    return places[0] if len(places) == 1 and run.lines.whole[places[0]].name.startswith(kind) else None
 
 
 def mains_lines(run: RunPhasors) -> tuple[ComplexArray | None, ComplexArray | None]:
