@@ -38,7 +38,7 @@ from tpjb_ident.bands.samples import (
 from tpjb_ident.conditions import Conditions, merged
 from tpjb_ident.phasors.compensation import compensated, filled_channels, unstated_filters
 from tpjb_ident.phasors.lines import Line, LineSet
-from tpjb_ident.phasors.run_data import SHORT, PhasorSettings, RunPhasors, beginning_of, device_readers
+from tpjb_ident.phasors.run_data import SHORT, PhasorSettings, RunPhasors, beginning_of
 from tpjb_ident.phasors.whole_record import local_maxima
 from tpjb_ident.runs.point_data import mean_temperatures
 
@@ -185,8 +185,6 @@ _LEFT = 0.5
 #: Share of a period's largest line, in motion, force or command, from which another one is driven; below it those of
 #: the command are, one after the other, down to a step by so much, or to so little.
 _DRIVEN, _STEP, _NOTHING = 0.1, 3.0, 1e-3
-#: Rate over another from which two devices are of one rate.
-_OF_ONE_RATE = 0.99
 #: Lines of a period are looked at up to so many times the band's upper end.
 _WIDE = 1.4
 #: Kinds that may repeat themselves, and whose records may begin and end in motion; a hammer waits for rest.
@@ -270,8 +268,7 @@ def run_spectra(
     length, width = (cut.length, LEFT_OUT) if period is None else (period, LEFT_OUT_OF_PERIOD)
     clean = without_disturbances(cut, lines, period)
     seconds, mean, motion = length / clean.rate, samples.rows.mean(axis=1), _motion(clean)
-    is_slow = min(reader.rate for reader in device_readers(run)) < _OF_ONE_RATE * clean.rate  # to which it is read
-    unstated = () if slower or is_slow else _unstated_filters(clean, band[1], period)
+    unstated = () if slower or samples.is_finer else _unstated_filters(clean, band[1], period)
 
     def transformed(record: Samples, places: IntArray) -> RunSpectra:
         z = _bins(record.rows, length, places)

@@ -58,6 +58,7 @@ class Samples(Directed):
     rows: FloatArray  #: (m, n)
     command: FloatArray | None  #: (2, n): along X and Y, in units of its own
     conditions: Conditions = ()
+    is_finer: bool = False  #: whether a slower device was read at these times, through the kernel
 
     @property
     def length(self) -> int:
@@ -98,7 +99,7 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
         described += reader.channels
     single = len(run.of("command")) == 1
     recorded = []
-    begins, lost, command = [], 0.0, np.zeros((2, n))
+    begins, lost, command, is_finer = [], 0.0, np.zeros((2, n)), False
     inside, grid = np.ones(n, dtype=bool), np.arange(float(n))
     for reader in readers:
         if highest >= HIGHEST * reader.rate:
@@ -110,6 +111,7 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
         at = grid  # the places [samples] of the first device's times
         if not is_alike:
             _refuse_unlike(run, reader, highest)
+            is_finer |= reader.rate < run.sample_rate
             at = (grid / run.sample_rate + begins[0] - begins[-1]) * reader.rate
             inside &= (at >= _TAPS) & (at <= reader.length - 1 - _TAPS)  # as far as the kernel reaches
         for channel, values in zip(reader.channels, rows):
@@ -128,7 +130,7 @@ def read_samples(run: Run, seconds: float, fast: Mapping[str, float], highest: f
     channels, readings_of = zip(*recorded)
     bridged = holding((lost > _TOLD_LOST, "samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"))
     driven = command[:, inside] if command.any() else None
-    return Samples(run.sample_rate, channels, np.array(readings_of)[:, inside], driven, bridged)
+    return Samples(run.sample_rate, channels, np.array(readings_of)[:, inside], driven, bridged, is_finer)
 
 
 def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
@@ -171,14 +173,15 @@ def without_glitches(values: FloatArray) -> FloatArray:
     values = np.array(values, dtype=float)
     limit = 0.0
     for places in _BAD * _PASSES:
+        last = places[-1]
         off = values - np.convolve(values, _CUBIC, "same")
         limit = limit or BAD_LIMIT * robust_deviation(off[np.isfinite(off)])
-        at = 4 + np.flatnonzero(np.abs(off[4:-8]) > limit)
+        at = 4 + np.flatnonzero(np.abs(off[4 : -4 - last]) > limit)
         if not len(at):
             break
-        base = np.append(_BAD_READING, np.zeros(places[-1]))
+        base = np.append(_BAD_READING, np.zeros(last))
         pattern = np.transpose([np.roll(base, place) for place in places])  # what bad readings do to `off`
-        near = off[at[:, None] + np.arange(-2, places[-1] + 3)]
+        near = off[at[:, None] + np.arange(-2, last + 3)]
         size = near @ np.linalg.pinv(pattern).T
         is_bad = np.abs(near - size @ pattern.T).max(axis=1) < limit
         values[at[is_bad, None] + places] -= size[is_bad]

@@ -109,9 +109,9 @@ class Reporter:
         place, text = question.place.format(**words), question.text.format(**words) + hint
         key = f"{kind} {words['names']}".rstrip() + hint
         self.note(key, passed[-1], place, text, question.cure, names if question.of_channels else ())
-        # independent deviations that hold what all channels are off by alike
-        deviations = np.multiply(question.deviations, math.sqrt(len(names)) * size)
-        self.doubted += [(name, deviations) for name in names]
+        if question.deviations:  # independent ones, which hold what all channels are off by alike
+            deviations = np.multiply(question.deviations, math.sqrt(len(names)) * size)
+            self.doubted += [(name, deviations) for name in names]
         return passed[-1]
 
     def note(

@@ -82,8 +82,7 @@ def check_sweep(campaign: Campaign, sweeps: Sequence[Observation], dry: Sequence
     """Two cells against a round push, two probes against the pads of dry runs, else of the bearing file."""
     usable = {observation.run.id: observation for observation in sweeps if not observation.report.cells_doubted}
     for run in coldest_first([observation.run for observation in usable.values()])[:1]:
-        bearing = carried_bearing(campaign, lambda text: None)
-        angles = _pad_directions(dry) or getattr(bearing, "pivot_angles", [])
+        angles = _pad_directions(dry) or getattr(carried_bearing(campaign, lambda text: None), "pivot_angles", [])
         try:
             errors = witness_of(live_run(run), np.array(angles)).errors
         except RigDataError:  # said by its own check

@@ -54,7 +54,7 @@ class Comparison:
         """Inclusion probability of every name, on whichever pad or direction."""
         shares: dict[str, float] = {}
         for fit in self.fits:
-            shares |= {name: self.holding(name) for name in fit.names}
+            shares |= {name: self.holding(name) for name in fit.names - shares.keys()}
         return shares
 
     def holding(self, *names: str) -> float:
