@@ -269,10 +269,11 @@ class Run(RunDescription):
         if self.temperature is not None:
             return self.temperature
         means = []
-        for channel in self.temperatures():
-            with suppress(RigDataError):  # `check` tells
-                values = self.record(channel.name).values
-                means += [np.nanmean(values)] if np.isfinite(values).any() else []
+        with suppress(RigDataError), self.opened():
+            for channel in self.temperatures():
+                with suppress(RigDataError):  # `check` tells
+                    values = self.record(channel.name).values
+                    means += [np.nanmean(values)] if np.isfinite(values).any() else []
         return float(np.mean(means)) if means else None
 
     def temperatures(self) -> tuple[Channel, ...]:

@@ -1,5 +1,6 @@
 """Readings along two or more directions, turned into X and Y."""
 
+import functools
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -27,14 +28,31 @@ def levers(channels: Sequence[Any]) -> FloatArray:
 
 def inverse_directions(channels: Sequence[Any]) -> FloatArray:
     """(2, m) matrix from readings of channels of one quantity to X and Y; NaN where they span no plane."""
-    inverse = channels_vector(channels, np.eye(len(channels))).real.T
-    return np.where(np.abs(inverse) < 1e-12, 0.0, inverse)  # cos 90 deg is not quite zero
+    return _inverse(*_places(channels))
+
+
+def _places(channels: Sequence[Any]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Angles of channels of one quantity [rad], and their distances from the mid-plane [m]."""
+    return tuple(channel.axis or 0.0 for channel in channels), tuple(levers(channels).tolist())
+
+
+@functools.lru_cache(maxsize=64)  # a campaign has a few sets of channels, and asks for each thousands of times
+def _inverse(axes: tuple[float, ...], planes: tuple[float, ...]) -> FloatArray:
+    """See `inverse_directions`."""
+    unit_readings = np.eye(len(axes), dtype=complex)
+    inverse = plane_vector(directions(axes), unit_readings, np.array(planes)).real.T
+    inverse = np.where(np.abs(inverse) < 1e-12, 0.0, inverse)  # cos 90 deg is not quite zero
+    inverse.flags.writeable = False
+    return inverse
 
 
 def channels_vector(channels: Sequence[Any], values: ComplexArray | FloatArray) -> ComplexArray:
     """X and Y (.., 2) of values (.., m) of the channels of one quantity, by least squares; NaN where they tell none."""
-    along = directions([channel.axis or 0.0 for channel in channels])
-    return plane_vector(along, np.asarray(values, complex), levers(channels))
+    axes, planes = _places(channels)
+    values = np.asarray(values, complex)
+    if axes and np.isfinite(values).all():
+        return values @ _inverse(axes, planes).T
+    return plane_vector(directions(axes), values, np.array(planes))
 
 
 def vector_rows(channels: Sequence[Channel], readings: Sequence[FloatArray]) -> FloatArray:

@@ -114,8 +114,11 @@ class RunReader(RecordFile):
 
     def _layout(self) -> Any:
         """What is sampled together; the key changes when the file does, so that no old one is served."""
-        state = self.path.stat() if self.path.is_file() else None
-        return self.cache.get((self.path, self.run, state and (state.st_size, state.st_mtime_ns)), self._read_layout)
+        try:
+            state = self.path.stat()
+        except OSError:  # whoever reads it tells
+            return self._read_layout()
+        return self.cache.get((self.path, self.run, state.st_size, state.st_mtime_ns), self._read_layout)
 
     def _read_layout(self) -> Layout:
         """What is sampled together, from the file."""

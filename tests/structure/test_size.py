@@ -18,7 +18,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (119.80, 14_290),
     "model": (75.21, 10_172),
-    "rigdata": (59.18, 8_044),
+    "rigdata": (59.34, 8_050),
     "diagnosis": (38.22, 4_707),
     "cli": (21.70, 3_007),
     "report": (22.37, 2_892),
