@@ -253,7 +253,7 @@ def test_what_tolerances_say_together_is_their_derivatives_beside_a_fit(campaign
 def stub_search(total, estimate, labels=frozenset("a")):
     """A search led by a right fit, some nats above its score."""
     leader = stub_fit(total, labels)
-    known = {"estimates": {labels: estimate}, "fits": {}, "run": None, "problem": None}
+    known = {"estimates": {labels: estimate}, "fits": {}, "begun": {}, "run": None, "problem": None}
     return search_with(_leader=lambda: leader, _log_prior=lambda faults: 0.0, **known)
 
 
@@ -304,11 +304,20 @@ def test_after_a_coarse_start_derivatives_are_asked_again_unless_they_were_refus
 
 
 @pytest.mark.parametrize(
-    ("labels", "estimate", "fitted"),
-    [("b", -25.0, True), ("bc", -25.0, False), ("bc", -9.0, True), ("b", -31.0, False)],
+    ("labels", "estimate", "risen", "past_jump", "fitted"),
+    [
+        ("b", -25.0, 20.0, False, True),
+        ("bc", -25.0, 20.0, False, False),
+        ("bc", -9.0, 20.0, False, True),
+        ("b", -31.0, 20.0, False, False),
+        ("b", -59.0, 50.0, False, False),  # so far no score is off by derivatives alone
+        ("b", -59.0, 50.0, True, True),  # oil 30 % thinner was an arc 15 % shorter: both lie past the jump
+        ("b", -61.0, 50.0, True, False),
+    ],
 )
-def test_what_a_leader_rose_by_is_allowed_to_rivals_of_as_many_faults(labels, estimate, fitted):
-    tried = stub_search(total=0.0, estimate=-20.0)
+def test_what_a_leader_rose_by_is_allowed_to_rivals_of_as_many_faults(labels, estimate, risen, past_jump, fitted):
+    tried = stub_search(total=0.0, estimate=-risen)
+    tried.begun = {frozenset("a"): 0.0} if past_jump else {}
     rival = stub_fit(0.0, frozenset(labels))
     proposal = SimpleNamespace(labels=rival.labels, faults=rival.faults, estimate=estimate, coarse=False)
     assert tried._promising(proposal, tried._leader()) == fitted

@@ -75,7 +75,7 @@ class _Search:
         self.run, self.problem, self.report = run, problem, report
         self.fits: dict[frozenset[str], Fit] = {}
         self.tried = 0
-        self.estimates: dict[frozenset[str], float] = {}
+        self.estimates: dict[frozenset[str], float] = {}  #: by the first score, or the start that led to the fit
         self.proposals: dict[frozenset[str], Start] = {}
         self.begun: dict[frozenset[str], float] = {}  #: estimates of coarse starts that were fitted
         self.paths: tuple[Path, ...] = ()
@@ -148,7 +148,9 @@ class _Search:
             return plain
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
             return proposal.estimate > total + math.log(1.0 - Deciding.included)
-        rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
+        # past a jump of K and C scores miss by whatever they miss the leader by
+        most = math.inf if leader.labels in self.begun else mistaken
+        rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, most))
         if len(proposal.faults) != len(leader.faults) and not plain:  # scored beside a fit that has risen already
             rise = 0.0
         return proposal.estimate > total - near - rise
@@ -190,7 +192,8 @@ class _Search:
         if earlier is not None and earlier.posterior.total >= fit.posterior.total:
             return
         self.fits[proposal.labels] = fit
-        self.estimates[proposal.labels] = math.inf if proposal.coarse else proposal.estimate
+        if not proposal.coarse:
+            self.estimates[proposal.labels] = proposal.estimate
         # one cause that does most of it is far behind until what stands beside it is there too
         if proposal.coarse or self._near(fit, fit.posterior.total, Deciding.near):
             self._propose_neighbours(fit)
@@ -336,6 +339,7 @@ class _Search:
     def _offer(self, proposal: Start) -> None:
         """Keep the likeliest start of every explanation that was not fitted yet, or less well than from there."""
         queued, fit = self.proposals.get(proposal.labels), self.fits.get(proposal.labels)
+        self.estimates.setdefault(proposal.labels, proposal.estimate)
         if proposal.coarse:
             better = proposal.estimate > self.begun.get(proposal.labels, -math.inf)
         else:

@@ -45,10 +45,11 @@ def judge(run: Map, comparison: Comparison) -> Judgement:
 def _of_model(comparison: Comparison, sure: frozenset[str], held: HeldOut, drift: Sequence[Drift]) -> Judgement:
     """What is said of the model that counts: the one with exactly the sure names, or the most probable one."""
     model = held.fit
-    if model.needs_more:
+    if model.needs_more(Deciding.right):
         reason = (
             f"the best explanation ({model.label}) leaves a model error of {model.posterior.scale:.2f} times the "
-            f"stated one; right ones need {Deciding.right:g} at the most"
+            f"stated one; right ones need {Deciding.right:g} at the most, unless the model is wrong by that: then "
+            "state a larger model tolerance"
         )
     elif model not in comparison.tenable:
         reason = _untenable(model)
@@ -63,7 +64,7 @@ def _of_model(comparison: Comparison, sure: frozenset[str], held: HeldOut, drift
 
 def _without_effects(held: HeldOut) -> Judgement:
     nothing = held.fit
-    if not nothing.needs_more:
+    if not nothing.needs_more(Deciding.trusted):
         reason = f"no disagreement beyond noise and stated tolerances (p = {nothing.p:.2g})"
         return Judgement("consistent", held, (reason,))
     reason = (
