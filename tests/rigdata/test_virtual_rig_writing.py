@@ -7,6 +7,7 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -107,8 +108,6 @@ def test_a_rigid_rig_has_a_truth_file_too(tmp_path):
 
 
 def test_float32_holds_16_bit_readings_exactly(campaign_of):
-    import h5py
-
     exact = rig().simulate("d-02500-25-01").readings.columns["X1A"]
     with h5py.File(campaign_of(rig())) as narrow:
         stored = narrow["runs/d-02500-25-01/X1A"]
@@ -190,8 +189,6 @@ def test_csv_has_the_shape_of_the_samples(tmp_path):
 @pytest.mark.samples
 def test_noise_is_of_the_samples_kind_and_size(tmp_path):
     """White floor, 1/f, runout and unbalance of `Noise.like_samples` against a sample campaign's locus runs."""
-    import h5py
-
     noise = replace(vr.Noise.like_samples(), bits=16)
     ours = vr.VirtualRig(TRUTH, vr.RigPlan(locus=vr.locus_points(20)), vr.Instruments.like_paper(), noise, seed=3)
     vr.write_campaign(tmp_path / "c.h5", ours)
