@@ -13,19 +13,15 @@ def noise(n=2000, seed=1):
     return np.random.default_rng(seed).standard_normal(n)
 
 
-def with_jump(length, size=1000.0, at=900, n=2000):
-    values = noise(n)
-    values[at : at + length] += size
-    return values[:, None]
-
-
 @pytest.mark.parametrize("length", [1, 2, 5, 10, 11, 12, 15, 20, 21, 22, 30])
 def test_a_disturbance_goes_whole_up_to_its_longest_and_not_at_all_from_twice_that(length):
     """Seen from any sample of it, the neighbourhood before and after must be sound for the most part.
 
     Of 2 * 10 + 1 samples on either side, eleven spoilt ones are the majority; two samples more go on either side.
     """
-    found = np.flatnonzero(~good_samples(with_jump(length), longest=10))
+    values = noise()
+    values[900 : 900 + length] += 1000.0
+    found = np.flatnonzero(~good_samples(values[:, None], longest=10))
     seen = length if length <= 11 else 22 - length
     if seen <= 0:
         assert len(found) == 0
