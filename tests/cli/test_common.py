@@ -113,8 +113,7 @@ def test_the_shell_completes_commands_options_and_values():
 
 
 @pytest.mark.parametrize(
-    ("option", "known"),
-    [("method", METHODS), ("norm", NORMS), ("rotation", ROTATIONS), ("to", FORMATS)],
+    ("option", "known"), [("method", METHODS), ("norm", NORMS), ("rotation", ROTATIONS), ("to", FORMATS)]
 )
 def test_the_table_of_options_completes_what_is_known(option, known):
     assert choices(option)

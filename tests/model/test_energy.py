@@ -19,10 +19,7 @@ MU, RHO, HEAT, CONDUCTIVITY, SURFACE, CLEARANCE = 0.03, 850.0, 2000.0, 0.13, 7.0
 TURBULENT = {"load": 2000.0, "speed": 2 * math.pi * 150.0, "options": Options(turbulence="ng-pan")}
 
 
-def full_film(
-    shape: tuple[int, int],
-    wedge: tuple[float, float] = (0.0, 0.5),
-) -> tuple[FilmGrid, FilmWork, np.ndarray]:
+def full_film(shape: tuple[int, int], wedge: tuple[float, float] = (0.0, 0.5)) -> tuple[FilmGrid, FilmWork, np.ndarray]:
     """A film that converges over its whole arc (no rupture), and its temperature for constant oil."""
     grid, work = plain_film(shape)
     solved((grid, work), wedge)
