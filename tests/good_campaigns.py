@@ -114,10 +114,7 @@ def shared_campaign(folder: Path, rig: VirtualRig, layout: str | CsvLayout = "hd
     csv = csv_layout(layout)
     place = folder / f"campaign-{content_key(rig, csv)}"
     place.mkdir(exist_ok=True)
-    return once(
-        place / (f"{name}.h5" if csv is None else name),
-        lambda path: _read_only(written(path, rig, layout)),
-    )
+    return once(place / (f"{name}.h5" if csv is None else name), lambda path: _read_only(written(path, rig, layout)))
 
 
 def _read_only(path: Path) -> None:

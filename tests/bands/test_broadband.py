@@ -12,7 +12,7 @@ from rigdata import load_campaign
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
 from tests.command_line import ended, tpjb
-from tests.phasors.phasor_cases import vector_channels
+from tests.phasors.phasor_cases import complex_normal, vector_channels
 from tests.rigs import closed_form as cf
 from tests.rigs.acquisition import Acquisition, write_campaign
 from tests.rigs.band_campaign import write_band_campaign
@@ -55,12 +55,12 @@ def bins(n: int, noise: float, seed: int, slope: float = 0.0) -> list[RunSpectra
     place = np.linspace(-1, 1, n)
     runs = []
     for along in ([1.0, 0.3], [-0.3, 1.0]):
-        command = np.array(along) * _complex(rng, n)[:, None]
+        command = np.array(along) * complex_normal(rng, n)[:, None]
         D = command @ np.array([[2e-6, 3e-7j], [1e-7, 1.4e-6]])
         F = D @ H.T + slope * place[:, None] * D * 1e7
         size = noise * np.sqrt(np.mean(np.abs(D) ** 2))
-        D = D + size * _complex(rng, (n, 2))
-        F = F + 0.2 * size * 2e8 * _complex(rng, (n, 2))
+        D = D + size * complex_normal(rng, n, 2)
+        F = F + 0.2 * size * 2e8 * complex_normal(rng, n, 2)
         runs.append(spectra(D[None], F[None], command[None]))
     return runs
 
@@ -69,10 +69,6 @@ def by_command(runs: list[RunSpectra], n: int) -> np.ndarray:
     """H of the runs' responses to their commands, one each."""
     z = np.concatenate([line_response([run], np.arange(n), "iv", ends=True).z for run in runs])
     return np.linalg.solve(z[:, :2], z[:, 2:]).T
-
-
-def _complex(rng, shape):
-    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
 
 
 def campaign(tmp_path, rig: BandRig, seed: int = 1, **plans):
@@ -157,8 +153,8 @@ def test_what_the_displacement_explains_is_h1():
 
 def test_periods_are_averaged_and_their_noise_is_what_they_show():
     rng = np.random.default_rng(5)
-    truth = 1e-6 * _complex(rng, (1, 1, 2))
-    D = truth + 1e-8 * _complex(rng, (400, 1, 2))
+    truth = 1e-6 * complex_normal(rng, 1, 1, 2)
+    D = truth + 1e-8 * complex_normal(rng, 400, 1, 2)
     response = line_response([spectra(D, D @ H.T, period=1.0)], np.array([0]), "periods", ends=True)
     assert np.abs(response.z[0, 2:] - H @ response.z[0, :2]).max() < 1e-9 * np.abs(H @ truth[0, 0]).max()
     assert np.trace(response.residual[:2, :2]).real / response.freedom == pytest.approx(2e-16, rel=0.15)
@@ -167,7 +163,7 @@ def test_periods_are_averaged_and_their_noise_is_what_they_show():
 
 def test_a_command_at_rest_is_no_source():
     rng = np.random.default_rng(6)
-    command = np.stack([_complex(rng, 30), 0.01 * _complex(rng, 30)], axis=1)
+    command = np.stack([complex_normal(rng, 30), 0.01 * complex_normal(rng, 30)], axis=1)
     D = command[:, :1] * np.array([2e-6, 3e-7])
     run = spectra(D[None], (D @ H.T)[None], command[None])
     assert line_response([run], np.arange(12), "iv", ends=True).z.shape == (1, 4)
@@ -434,17 +430,17 @@ def test_a_band_that_the_record_cannot_resolve_is_refused(tmp_path):
 
 def test_one_phase_set_is_told_from_several():
     rng = np.random.default_rng(9)
-    first = _complex(rng, (1, 60, 2))
+    first = complex_normal(rng, 1, 60, 2)
     late = np.exp(1j * 0.2 * np.arange(60))[:, None]
     same = [spectra(first * turn, first) for turn in (1.0, late, -1.0)]
     assert one_phase_set(same)
-    other = [spectra(_complex(rng, (1, 60, 2)), first) for _ in range(3)]
+    other = [spectra(complex_normal(rng, 1, 60, 2), first) for _ in range(3)]
     assert not one_phase_set(other)
 
 
 def test_lines_are_driven_where_the_command_is_or_else_what_moves():
     rng = np.random.default_rng(9)
-    D = 1e-3 * _complex(rng, (8, 60, 2))
+    D = 1e-3 * complex_normal(rng, 8, 60, 2)
     D[:, [30, 37]] += np.exp(1j * rng.uniform(0, 6, 2))[:, None] * [1.0, 0.3]
     assert np.flatnonzero(spectra(D, D, period=1.0).driven).tolist() == [30, 37]
     command = np.zeros((8, 60, 2), complex)

@@ -34,10 +34,7 @@ from tpjb_ident.phasors.run_phasors import run_phasors
 
 #: Probes of the virtual rig.
 PAIR = ("X1A", "X1B")
-PROBES = (
-    Channel("A", "displacement", axis=math.radians(45)),
-    Channel("B", "displacement", axis=math.radians(135)),
-)
+PROBES = (Channel("A", "displacement", axis=math.radians(45)), Channel("B", "displacement", axis=math.radians(135)))
 
 
 def run_of(name="a", kind="dynamic"):

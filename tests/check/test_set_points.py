@@ -136,11 +136,7 @@ def test_a_probe_whose_range_changed_is_told_by_what_turns_with_the_shaft(freque
 @pytest.mark.parametrize(
     ("sizes", "motion", "off"),
     [
-        (
-            (1.0, 0.97, 0.88),
-            0.0,
-            (0.128, 0.097, 0.128),
-        ),  # a gain that falls with the gap: any load may have the right one
+        ((1.0, 0.97, 0.88), 0.0, (0.128, 0.097, 0.128)),  # it falls with the gap: any load may have the right one
         ((1.0, 1.0, 0.95), 0.0, (0.0, 0.0, 0.051)),
         ((1.0, 1.07), 0.0, (0.068, 0.068)),
         ((1.0, 1.04), 0.0, (0.039, 0.039)),  # also where both loads are off their middle by less than counts

@@ -1,14 +1,15 @@
 """The commands as a user calls them: results, messages, exit codes."""
 
 import csv
+import hashlib
 import json
 import os
 import re
 import shlex
 import shutil
-import subprocess
 from collections import Counter
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -35,9 +36,8 @@ def test_version():
 
 @pytest.mark.slow
 def test_check_writes_its_findings(small_campaign, tmp_path):
-    result = tpjb("check", small_campaign, "--out", tmp_path / "out")
+    ended(0, "check", small_campaign, "--out", tmp_path / "out")
     found = json.loads((tmp_path / "out" / "check.json").read_text(encoding="utf-8"))
-    assert result.exit_code == 0, result.output
     assert found["ok"] is True
     assert found["runs"] == {"dynamic": 6, "dry_pivot": 0, "locus": 3, "clearance": 1, "baseline": 0}
     assert found["counts"]["error"] == 0
@@ -45,18 +45,15 @@ def test_check_writes_its_findings(small_campaign, tmp_path):
 
 @pytest.mark.slow
 def test_check_lists_every_error_and_exits_2(small_campaign, tmp_path):
-    import h5py
-
     broken = tmp_path / "broken.h5"
     shutil.copy(small_campaign, broken)
     with h5py.File(broken, "r+") as file:
         del file["runs/d-02500-25-01/X1A"]
         del file["runs/d-05000-25-02/L1H"]
         file.attrs["bearing"] = file.attrs["bearing"].replace("\nlength", "\nlenght", 1)
-    result = tpjb("check", broken, "--out", tmp_path / "out")
+    result = ended(2, "check", broken, "--out", tmp_path / "out")
     problems = json.loads((tmp_path / "out" / "check.json").read_text(encoding="utf-8"))["problems"]
     errors = {(p["run"], p["severity"]) for p in problems}
-    assert result.exit_code == 2
     assert {("d-02500-25-01", "error"), ("d-05000-25-02", "error")} <= errors
     assert "X1A" in result.stdout
     assert "L1H" in result.stdout
@@ -80,15 +77,12 @@ def test_identify_finds_what_was_put_in(identified):
 def test_identify_leaves_a_record_of_what_it_did(identified, small_campaign):
     entry = json.loads((identified / "run.json").read_text(encoding="utf-8"))["commands"]["identify"]
     assert entry["settings"]["method"] == "mm-eiv"
-    digest = subprocess.run(["sha256sum", small_campaign], capture_output=True, text=True, check=False).stdout.split()
-    assert not digest or digest[0] in entry["inputs_sha256"].values()
+    assert hashlib.sha256(small_campaign.read_bytes()).hexdigest() in entry["inputs_sha256"].values()
     tables = ("coefficients", "estimators", "windows", "frequency_fits", "budget")
     assert set(entry["outputs"]) == {f"{table}.{end}" for table in tables for end in ("csv", "parquet")}
 
 
 def test_one_direction_is_no_answer_and_exits_3(small_campaign, tmp_path):
-    import h5py
-
     narrow = tmp_path / "narrow.h5"
     shutil.copy(small_campaign, narrow)
     with h5py.File(narrow, "r+") as file:
@@ -137,9 +131,8 @@ def test_an_effect_that_the_bearing_cannot_have_is_refused_with_its_file(
 def test_predict_takes_an_effects_file(rocker_file, tmp_path):
     effects = tmp_path / "e.toml"
     effects.write_text('[[effects]]\nname = "probe_gain"\nfactor = 1.25\n')
-    plain = tpjb("predict", rocker_file, "--thermal", "isothermal", "--out", tmp_path / "a")
-    wrong = tpjb("predict", rocker_file, "--thermal", "isothermal", "--effects", effects, "--out", tmp_path / "b")
-    assert (plain.exit_code, wrong.exit_code) == (0, 0)
+    for name, more in (("a", ()), ("b", ("--effects", effects))):
+        ended(0, "predict", rocker_file, "--thermal", "isothermal", *more, "--out", tmp_path / name)
     a, b = (pd.read_csv(tmp_path / name / "prediction.csv")["kyy_N_per_m"][0] for name in "ab")
     assert b == pytest.approx(a / 1.25, rel=1e-9)
 

@@ -17,8 +17,6 @@ DISTURBED = "d-05000-25-02"
 @pytest.fixture(scope="module")
 def disturbed(tmp_path_factory):
     """One load at three frequencies; at 25 Hz a probe glitches in the last window of all runs, in three more of one."""
-    import h5py
-
     folder = tmp_path_factory.mktemp("disturbed")
     write_campaign(folder / "campaign.h5", rig([(5000.0, 20.0), (5000.0, 25.0), (5000.0, 31.0)], seed=5))
     with h5py.File(folder / "campaign.h5", "r+") as file:

@@ -7,11 +7,13 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
+from rigdata.problem import Problem, gathered
 from tests.command_line import ended
 from tpjb_ident.cli import terminal
 from tpjb_ident.cli.identification import cross_coupling_matters
 from tpjb_ident.cli.terminal import MOST_ROWS, Terminal, cell_len, table_lines, with_half, wrapped
 from tpjb_ident.columns import Column, words
+from tpjb_ident.report.diagnosis_page import next_command
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 COLUMNS = ["load kN", "dir. deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "quality"]
@@ -79,8 +81,6 @@ def test_cross_coupling_is_shown_when_it_is_beyond_doubt(half, matters):
 
 
 def test_notes_of_one_sort_are_counted():
-    from rigdata.problem import Problem, gathered
-
     alike = [Problem("note", f"run{i}.csv", "time", f"the clock has {i} steps", "none", f"r{i}") for i in range(39)]
     error = [Problem("error", f"run{i}.csv", "time", "is empty", "mend it", f"r{i}") for i in range(5)]
     sentences = list(gathered([*error, *alike]))
@@ -89,8 +89,6 @@ def test_notes_of_one_sort_are_counted():
 
 
 def test_a_verdict_leads_to_a_command():
-    from tpjb_ident.report.diagnosis_page import next_command
-
     named = SimpleNamespace(effects=("x",), verdict="named")
     consistent = SimpleNamespace(effects=(), verdict="consistent")
     folder, terminal = Path("my rig/o"), Terminal(silent=True)

@@ -1,12 +1,17 @@
 """The estimators and their parts: exact answers, invariances, named conditions, refusals, published values."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
+from statsmodels.robust import norms
+from statsmodels.robust.robust_linear_model import RLM
 from statsmodels.robust.scale import HuberScale
 
 from tests.phasors.phasor_cases import FILM_H as H
 from tests.phasors.phasor_cases import OMEGA, complex_normal
 from tests.phasors.phasor_cases import H as H_UNIT
+from tests.rigs import estimator_cases
 from tpjb_ident.estimate.scatter import mixed_dof
 from tpjb_ident.estimate.statistics import (
     bisquare_weight,
@@ -169,9 +174,6 @@ def test_pint_quantities_are_converted_and_wrong_ones_named():
 
 @pytest.mark.parametrize("norm", sorted(set(NORMS) - {"bisquare"}))
 def test_rlm_is_what_statsmodels_says(norm: str):
-    from statsmodels.robust import norms
-    from statsmodels.robust.robust_linear_model import RLM
-
     D, F, label, _ = sample(14, noise=0.05, bad=0.05)
     est = estimate_dynamic_stiffness(D, F, OMEGA, label, method="rlm", norm=norm)
     d, f = np.median(np.linalg.norm(D, axis=1)), np.median(np.linalg.norm(F, axis=1))
@@ -189,9 +191,6 @@ def test_rlm_is_what_statsmodels_says(norm: str):
 
 @pytest.mark.parametrize(("norm", "name"), [("huber", "HuberT"), ("tukey", "TukeyBiweight")])
 def test_without_statsmodels_it_is_statsmodels_to_the_last_bit(norm: str, name: str):
-    from statsmodels.robust import norms
-    from statsmodels.robust.robust_linear_model import RLM
-
     rng = np.random.default_rng(4)
     for n, noise, bad in ((6, 1e-3, 0.0), (40, 0.1, 0.1), (161, 1.0, 0.2)):
         design = rng.standard_normal((n, 4))
@@ -215,21 +214,16 @@ def test_rlm_traps_are_guarded():
 @pytest.mark.slow
 def test_thousands_of_windows_start_from_a_share_of_them():
     """Two robust answers from 2400 windows, 30 % of them bad: within 0.3 %, and memory for hundreds, not thousands."""
-    import tracemalloc
-
-    from tests.rigs.estimator_cases import H_TRUE, Case, draw
-    from tests.rigs.estimator_cases import OMEGA as STUDY_OMEGA
-
-    sample = draw(Case("lev", 0.3, windows=300), 4, 1)
+    sample = estimator_cases.draw(estimator_cases.Case("lev", 0.3, windows=300), 4, 1)
     for method in ("mm-eiv", "iv"):
         reference = sample.command if method == "iv" else None
         tracemalloc.start()
-        est = estimate_dynamic_stiffness(
-            sample.D, sample.F, STUDY_OMEGA, sample.direction, method=method, reference=reference
-        )
+        given = sample.D, sample.F, estimator_cases.OMEGA, sample.direction
+        est = estimate_dynamic_stiffness(*given, method=method, reference=reference)
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-        assert np.linalg.norm(est.h - H_TRUE) < 3e-3 * np.linalg.norm(H_TRUE)
+        true = estimator_cases.H_TRUE
+        assert np.linalg.norm(est.h - true) < 3e-3 * np.linalg.norm(true)
         assert peak < 35e6
 
 

@@ -8,14 +8,7 @@ from tests.phasors.phasor_cases import H, complex_normal
 from tests.seeds import first_quick
 from tpjb_ident.estimate.statistics import bisquare_weight, efficiency_constant
 from tpjb_ident.estimators import least_trimmed
-from tpjb_ident.estimators.least_trimmed import (
-    MANY_WINDOWS,
-    Regression,
-    distance2,
-    evenly_chosen,
-    mm_fit,
-    robust_start,
-)
+from tpjb_ident.estimators.least_trimmed import MANY_WINDOWS, Regression, distance2, evenly_chosen, mm_fit, robust_start
 
 
 def windows(seed, n=60, g=6, noise=0.1, bad=10):

@@ -10,15 +10,7 @@ import numpy as np
 import pytest
 
 from model.pad import store
-from tests.command_line import tpjb
-
-
-@pytest.fixture
-def jumping(monkeypatch):
-    """A clock of the day that is somewhere else at every look; that which counts on alone goes steadily."""
-    jumps = itertools.cycle((0.0, 3.6e3, -8.64e4, 1e9, -time.time() + 1.0))
-    now = time.time
-    monkeypatch.setattr(time, "time", lambda: now() + next(jumps))
+from tests.command_line import ended
 
 
 def test_solutions_stored_while_the_clock_was_ahead_do_not_push_out_new_ones(tmp_path, monkeypatch):
@@ -36,16 +28,18 @@ def test_solutions_stored_while_the_clock_was_ahead_do_not_push_out_new_ones(tmp
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("jumping")
-def test_a_command_under_a_clock_that_jumps_gives_the_same_and_may_be_verified(small_campaign, tmp_path):
+def test_a_command_under_a_clock_that_jumps_gives_the_same_and_may_be_verified(small_campaign, tmp_path, monkeypatch):
+    """The clock of the day is somewhere else at every look; that which counts on alone goes steadily."""
+    now, jumps = time.time, itertools.cycle((0.0, 3.6e3, -8.64e4, 1e9, -time.time() + 1.0))
+    monkeypatch.setattr(time, "time", lambda: now() + next(jumps))
     path = shutil.copy(small_campaign, tmp_path / "campaign.h5")
     tables = []
     for name, year in (("a", 1971), ("b", 2100)):
         os.utime(path, (365.25 * 86400 * (year - 1970),) * 2)
         out = tmp_path / name
-        assert tpjb("locus", path, "--out", out).exit_code == 0
-        assert tpjb("locus", path, "--out", out).exit_code == 0  # over results of another time
-        assert tpjb("verify", out).exit_code == 0
+        ended(0, "locus", path, "--out", out)
+        ended(0, "locus", path, "--out", out)  # over results of another time
+        ended(0, "verify", out)
         assert list(json.loads((out / "run.json").read_text(encoding="utf-8"))["commands"]) == ["locus"]
         tables.append((out / "locus.csv").read_bytes())
     assert tables[0] == tables[1]

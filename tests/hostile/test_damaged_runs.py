@@ -15,8 +15,6 @@ from tests.good_campaigns import SMALL_PLAN, rocker_rig
 pytestmark = pytest.mark.slow
 
 RUN = "d-05000-25-02"
-
-
 EVERY_KIND = replace(SMALL_PLAN, dynamic=operating_points([(2500.0, 25.0), (5000.0, 25.0)]))
 DYNAMIC_ALONE = replace(EVERY_KIND, locus=(), dry=(), clearance=())
 
@@ -96,11 +94,6 @@ def spoilt(campaign_of, tmp_path):
     return make
 
 
-def error_of(out, truth_row):
-    row = pd.read_csv(out / "coefficients.csv").set_index("static_load_N").loc[truth_row]
-    return max(abs(row["kxx_N_per_m"] / 1e8 - 1), abs(row["kyy_N_per_m"] / 2e8 - 1), abs(row["cxx_Ns_per_m"] / 5e5 - 1))
-
-
 @pytest.mark.parametrize("name", [*DAMAGE, "accelerometer zero"])
 def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, name):
     path = spoilt(name, RUN)
@@ -110,10 +103,10 @@ def test_identify_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path, n
     assert list(table.index) == [2500.0, 5000.0]
     assert "left-out" in table["quality"][5000.0] or "run-without-data" in table["quality"][5000.0]
     assert "left-out" not in table["quality"][2500.0]
-    assert error_of(tmp_path / "out", 5000.0) < 0.02
+    found = table.loc[5000.0, ["kxx_N_per_m", "kyy_N_per_m", "cxx_Ns_per_m"]].to_numpy(float)
+    np.testing.assert_allclose(found, [1e8, 2e8, 5e5], rtol=0.02)
 
 
-@pytest.mark.slow
 def test_compare_goes_on_without_a_damaged_run_and_names_it(spoilt, tmp_path):
     told = ended(0, "compare", spoilt("garbage", RUN), "--pivots", "rigid", "--out", tmp_path / "out")
     assert f"1 of 6 dynamic runs take no part: {RUN}" in " ".join(told.stdout.split())

@@ -105,19 +105,15 @@ def test_what_a_library_prints_is_no_part_of_the_answer(tmp_path, monkeypatch):
     assert back.values.tolist() == [0.0, 1.0, 2.0]
 
 
-def test_a_child_that_dies_is_told(tmp_path):
-    path = tmp_path / "a.mf4"
-    path.write_bytes(b"x")
-    with pytest.raises(RigDataError, match="crash"):
-        sandbox.read_sandboxed("no_such_reader", path)
-
-
-def test_a_child_that_does_not_end_is_ended(tmp_path, monkeypatch):
-    path = tmp_path / "a.mf4"
-    path.write_bytes(b"x")
-    monkeypatch.setattr(sandbox, "SECONDS", 0.001)  # ten times that: less than Python takes to start
-    with pytest.raises(RigDataError, match="took longer than 0 s"):
-        sandbox.read_sandboxed("mdf_in_sandbox", path)
+@pytest.mark.parametrize(
+    ("reader", "seconds", "says"),  # ten times the second's: less than Python takes to start
+    [("no_such_reader", sandbox.SECONDS, "crash"), ("mdf_in_sandbox", 0.001, "took longer than 0 s")],
+)
+def test_a_child_that_dies_is_told_and_one_that_does_not_end_is_ended(tmp_path, monkeypatch, reader, seconds, says):
+    (tmp_path / "a.mf4").write_bytes(b"x")
+    monkeypatch.setattr(sandbox, "SECONDS", seconds)
+    with pytest.raises(RigDataError, match=says):
+        sandbox.read_sandboxed(reader, tmp_path / "a.mf4")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell script stands for the child")

@@ -1,6 +1,5 @@
 """Names and descriptions from a stranger: no page runs them, no spreadsheet computes them, no terminal obeys them."""
 
-import math
 import re
 import shutil
 
@@ -69,7 +68,8 @@ def test_no_result_of_a_hostile_campaign_runs_anything(hostile, tmp_path, comman
 
 def _number(cell):
     try:
-        return math.isfinite(float(cell)) or True
+        float(cell)
+        return True
     except ValueError:
         return False
 

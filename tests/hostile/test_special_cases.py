@@ -35,12 +35,6 @@ def folder_run(folder, record, name="X1A"):
     return rigdata.load_campaign(write_files(folder, text_of(name=name), {"c-1.csv": record})).run("c-1")
 
 
-def hdf5_run(path, fill):
-    with h5py.File(write_hdf5(path, text_of(), {}, 100.0), "r+") as file:
-        fill(file["runs/c-1"])
-    return rigdata.load_campaign(path).run("c-1")
-
-
 @contextmanager
 def refused_at_once(error, match, seconds=5.0, kilobytes=2**17):
     """Refuse, in that much processor time and memory at most."""
@@ -75,11 +69,10 @@ def test_a_manifest_of_more_runs_than_any_campaign_has():
 
 
 def test_a_group_linked_into_itself_is_walked_once(tmp_path):
-    def fill(group):
-        group.create_dataset("X1A", data=np.arange(20.0))
-        group["again"] = group  # a hard link: /runs/c-1/again/again/...
-
-    run = hdf5_run(tmp_path / "a.h5", fill)
+    path = write_hdf5(tmp_path / "a.h5", text_of(), {"X1A": np.arange(20.0)}, 100.0)
+    with h5py.File(path, "r+") as file:
+        file["runs/c-1/again"] = file["runs/c-1"]  # a hard link: /runs/c-1/again/again/...
+    run = rigdata.load_campaign(path).run("c-1")
     assert len(run.record("X1A").values) == 20
     assert run.reader.problems()
 

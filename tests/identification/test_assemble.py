@@ -1,5 +1,6 @@
 """From the phasors of all runs to a campaign's coefficients: a campaign made by hand, whole and with lost channels."""
 
+import itertools
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -43,21 +44,17 @@ def run_at(name, direction, load, turn, rng, noise):
     return run_phasors(name, direction, load, D, F, load * np.array([np.sin(turn), -np.cos(turn)]), CHANNELS)
 
 
-def finished(runs, left_out=()):
-    """Finished runs."""
-    warm = (replace(run, temperatures={1: 300.0 + k * k / 100, 2: 310.0}) for k, run in enumerate(runs))
-    return FinishedRuns((*map(digest, warm), *left_out))
+def five_directions(miss):
+    """Five directions at either load; their loads miss their direction by this much, one standard deviation [rad]."""
+    rng, made = np.random.default_rng(1), []
+    for load, k in itertools.product(LOADS, range(5)):
+        made.append(run_at(f"{load:g}-{k}", k * math.pi / 5, load, miss * rng.standard_normal(), rng, noise=0.1))
+    return made
 
 
 @pytest.fixture(scope="module")
 def runs():
-    """Five directions at either load; load and direction miss their set points by a little."""
-    rng = np.random.default_rng(1)
-    return [
-        run_at(f"{load:g}-{k}", k * math.pi / 5, load, 0.003 * rng.standard_normal(), rng, noise=0.1)
-        for load in LOADS
-        for k in range(5)
-    ]
+    return five_directions(0.003)
 
 
 def found(runs, left_out=(), channels=CHANNELS, progress=None, **settings):
@@ -66,7 +63,9 @@ def found(runs, left_out=(), channels=CHANNELS, progress=None, **settings):
         id="c", channels=named, of_kind=lambda kind: [], housing_mass=3.0, mass_uncertainty=0.0, mount=None
     )
     chosen = IdentifySettings(**{"methods": ("ols",)} | settings)
-    return assemble(campaign, finished(runs, left_out), chosen, progress or (lambda text, done, total: None))
+    warm = (replace(run, temperatures={1: 300.0 + k * k / 100, 2: 310.0}) for k, run in enumerate(runs))
+    finished = FinishedRuns((*map(digest, warm), *left_out))
+    return assemble(campaign, finished, chosen, progress or (lambda text, done, total: None))
 
 
 @pytest.fixture(scope="module")
@@ -187,19 +186,12 @@ def test_a_point_gathers_what_its_runs_say(runs):
     assert p.clearance == 1e-3
 
 
-def without_cells(run):
-    return replace(run, z=np.where(np.arange(4) > 1, np.nan, run.z))
-
-
-@pytest.fixture(scope="module")
-def complete_runs():
-    rng = np.random.default_rng(1)
-    return [run_at(f"{load:g}-{k}", k * math.pi / 5, load, 0.0, rng, noise=0.1) for load in LOADS for k in range(5)]
-
-
 @pytest.mark.parametrize("lost", [range(10), range(5, 10), range(1)], ids=["all", "those of a point", "one"])
-def test_runs_without_cells_cost_themselves_only(complete_runs, lost):
-    made = found([without_cells(run) if k in lost else run for k, run in enumerate(complete_runs)])
+def test_runs_without_cells_cost_themselves_only(lost):
+    runs, cells = five_directions(0.0), np.arange(4) > 1
+    for k in lost:
+        runs[k] = replace(runs[k], z=np.where(cells, np.nan, runs[k].z))
+    made = found(runs)
     for k, point in enumerate(made.points):
         gone = len(set(lost) & set(range(5 * k, 5 * k + 5)))
         assert ("run-without-data" in point.quality) is (gone > 0)

@@ -150,12 +150,7 @@ CASES = {
     "third probe": Case(
         noise=1e-5, probes=3, gains={"D1": 0.02}, stated={"D1": {"uncertainty": 0.05}, "D2": {"uncertainty": 1e-5}}
     ),
-    "late": Case(
-        noise=1e-5,
-        hertz=(30.0, 90.0),
-        late={"force": 3e-4},
-        stated={"force": {"delay_uncertainty": 3e-4}},
-    ),
+    "late": Case(noise=1e-5, hertz=(30.0, 90.0), late={"force": 3e-4}, stated={"force": {"delay_uncertainty": 3e-4}}),
 }
 
 

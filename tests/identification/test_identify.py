@@ -1,5 +1,8 @@
 """A campaign's records to its table: corrections, flags, columns, and what happens to bad windows."""
 
+import pickle
+import tracemalloc
+from concurrent.futures import Executor, Future
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +19,7 @@ from tpjb_ident.phasors.frequency import speeds_from_runout
 from tpjb_ident.phasors.lines import RecordTooShortError, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.phasors.run_phasors import extract, run_phasors
+from tpjb_ident.runtime.executors import PoolWorkers
 
 
 def stiffness(point):
@@ -34,8 +38,7 @@ def rig(points, seed: int, noise: Noise | None = None, **plan) -> VirtualRig:
 
 
 def true_vector(point) -> np.ndarray:
-    h = stiffness(point)
-    return np.concatenate([h.real.ravel(), h.imag.ravel()])
+    return cf.vector(stiffness(point))
 
 
 @pytest.fixture(scope="module")
@@ -194,10 +197,6 @@ def test_a_noisy_tachometer_is_no_drift():
 
 @pytest.mark.slow
 def test_workers_change_no_number_even_when_jobs_are_lost(campaign):
-    from concurrent.futures import Executor, Future
-
-    from tpjb_ident.runtime.executors import PoolWorkers
-
     class Pool(Executor):
         """Runs jobs at once in this process, and loses every third with its worker."""
 
@@ -222,15 +221,11 @@ def test_workers_change_no_number_even_when_jobs_are_lost(campaign):
 
 
 def test_a_refusal_travels_whole_between_processes():
-    import pickle
-
     assert str(pickle.loads(pickle.dumps(RecordTooShortError("run a: takes 3 s")))) == "run a: takes 3 s"
 
 
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_record():
-    import tracemalloc
-
     class Stream(HeldReader):
         """Makes its samples when they are asked for."""
 

@@ -1,7 +1,9 @@
 """What records give away of their instruments: clocks, slower channels, accelerometers, cells that were not tared."""
 
+import h5py
 import numpy as np
 import pytest
+import statsmodels.api as sm
 from scipy.interpolate import CubicSpline
 from scipy.signal import chirp, lfilter
 
@@ -134,9 +136,6 @@ def test_clocks_slower_cells_and_late_channels_are_named(tmp_path):
 
 @pytest.mark.slow
 def test_plain_is_statsmodels_on_the_r_matrix(quick, tmp_path):
-    import h5py
-    import statsmodels.api as sm
-
     points = plain_points(quick, PlainSettings(0.5))
     write_r_matrices(tmp_path / "r.h5", points)
     with h5py.File(tmp_path / "r.h5") as file:

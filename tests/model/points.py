@@ -8,6 +8,7 @@ import numpy as np
 
 from model.bearing import Bearing
 from model.effects import Effect
+from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.reynolds import FilmForces, solve_film
 from model.predict import predict
@@ -51,6 +52,11 @@ def plain_film(
     work = film_work(grid, 40.0)
     work.viscosity[:], work.density[:] = oil
     return grid, work
+
+
+def conserving(filling: float = 1.0, flow: float = np.inf) -> Callable[..., FilmForces]:
+    """Solver that conserves mass, by the share of the gap that is fed and the flow that there is [kg/(s m)]."""
+    return lambda *given: solve_film_jfo(*given, (filling, flow))
 
 
 def solved(

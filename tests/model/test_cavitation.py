@@ -11,7 +11,6 @@ from scipy.optimize import brentq
 
 from model.bearing import Bearing
 from model.effects import Effect
-from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces
 from model.options import CAVITATION, Options
@@ -19,7 +18,7 @@ from model.prediction import Prediction
 from tests.fillings import fluid_fraction
 from tests.model import points
 from tests.model.balance import Balance
-from tests.model.points import LOAD, close, plain_film, slopes, solved
+from tests.model.points import LOAD, close, conserving, plain_film, slopes, solved
 
 MU, RHO, SPEED, RADIUS, CLEARANCE = 0.03, 850.0, 7.0, 0.05, 1e-4
 ARC = (-0.5, 0.5)
@@ -31,7 +30,7 @@ def lengths(wedge: tuple[float, float]) -> tuple[float, float, float]:
 
 
 def solve(one: tuple[FilmGrid, FilmWork], wedge: tuple[float, float], sharp: bool = True, filling: float = 1.0):
-    return solved(one, wedge, sharp, lambda *given: solve_film_jfo(*given, (filling, np.inf)))
+    return solved(one, wedge, sharp, conserving(filling))
 
 
 def wavy(amplitude: float) -> Profile:
@@ -245,7 +244,7 @@ def test_random_films_settle_from_anywhere():
         found = []
         for start in (np.zeros_like(work.ruptured), rng.random(work.ruptured.shape) < 0.5):
             work.ruptured[:] = start
-            forces = solve_film_jfo(*one, lengths(wedge), SPEED, False, (0.9, np.inf))
+            forces = conserving(0.9)(*one, lengths(wedge), SPEED, False)
             found.append(forces.force)
             assert forces.steps != -2
         solved += forces.steps > 0

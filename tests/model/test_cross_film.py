@@ -22,6 +22,7 @@ from model.predict import predict_setup
 from model.setup import Mesh, Setup
 from model.statics.pad_film import oil_constants
 from tests.model.points import DOWN, LOAD, SPEED, close, plain_film, run, slopes, solved
+from tests.rigs.bearings import changed_oil
 from tests.studies.random_bearings import heat_lost
 
 OIL = Oil(0.04, 0.034, 860.0, 0.0, 2000.0, 0.13, 40.0)
@@ -134,7 +135,7 @@ def test_a_well_mixed_film_between_insulated_walls_is_the_adiabatic_one():
 
 @pytest.mark.slow
 def test_oil_that_takes_up_any_heat_is_isothermal(rocker):
-    cool = replace(rocker, oil=replace(rocker.oil, specific_heat=1e12))
+    cool = changed_oil(rocker, specific_heat=1e12)
     p = run(cool, thermal="thd", options=FROZEN)
     assert max(abs(t - 40.0).max() for t in p.temperature) < 1e-6
     close(p.h, run(cool, Effect("pad_bending", compliance_factor=1.0), thermal="isothermal").h, 1e-5)

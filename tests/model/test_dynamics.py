@@ -2,7 +2,6 @@
 rest the slope of the static locus."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from model.effects import Effect
 from model.options import Options
 from model.prediction import Prediction
 from tests.model.points import DOWN, LOAD, SPEED, close, run, slopes
-from tests.rigs.bearings import changed_pads
+from tests.rigs.bearings import changed_oil, changed_pads
 
 
 def dense(p: Prediction, omega: float) -> np.ndarray:
@@ -128,8 +127,8 @@ CASES = {
 
 @pytest.fixture
 def bearings(rocker, spherical) -> dict[str, Bearing]:
-    thin = replace(rocker, oil=replace(rocker.oil, viscosity_40=0.02 * rocker.oil.viscosity_40))
-    fed = replace(rocker, oil=replace(rocker.oil, supply_flow=18.0 / 60e3))
+    thin = changed_oil(rocker, viscosity_40=0.02 * rocker.oil.viscosity_40)
+    fed = changed_oil(rocker, supply_flow=18.0 / 60e3)
     return {"rocker": rocker, "spherical": spherical, "thin": thin, "fed": fed}
 
 

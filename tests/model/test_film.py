@@ -9,17 +9,11 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 
-from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, solve_film
-from tests.model.points import close, plain_film, slopes, solved
+from tests.model.points import close, conserving, plain_film, slopes, solved
 
 MU, SPEED, RADIUS, CLEARANCE = 0.03, 7.0, 0.05, 1e-4
-
-
-def solve_flooded_film(*args: Any) -> FilmForces:
-    """Mass conserved, as much oil supplied as the gap takes."""
-    return solve_film_jfo(*args, (1.0, np.inf))
 
 
 def solve(
@@ -155,7 +149,7 @@ def test_half_speed_whirl_takes_the_pressure_away(wedge):
     ],
 )
 def test_forces_and_coefficients_converge_with_second_order(wedge, filling, least):
-    solver = solve_film if filling is None else lambda *given: solve_film_jfo(*given, (filling, np.inf))
+    solver = solve_film if filling is None else conserving(filling)
     fine = solve((320, 24), wedge, True, solver)[2]
     errors = []
     for scale in (1, 2, 4):
@@ -169,7 +163,7 @@ def test_forces_and_coefficients_converge_with_second_order(wedge, filling, leas
 
 
 @pytest.mark.parametrize(
-    ("solver", "wedge", "share"), [(solve_film, (0.6, 0.3), 1e-10), (solve_flooded_film, (-1.0, 0.1), 1e-9)]
+    ("solver", "wedge", "share"), [(solve_film, (0.6, 0.3), 1e-10), (conserving(), (-1.0, 0.1), 1e-9)]
 )
 def test_half_width_is_the_mirrored_whole(solver, wedge, share):
     half = solve((60, 4), wedge, sharp=True, solver=solver)[2]
@@ -186,7 +180,7 @@ def test_active_set_settles_on_fine_meshes():
     assert work.ruptured[:, 0].mean() == pytest.approx(coarse.ruptured[:, 0].mean(), abs=0.02)
 
 
-@pytest.mark.parametrize("solver", [solve_film, solve_flooded_film])
+@pytest.mark.parametrize("solver", [solve_film, conserving()])
 def test_touching_film_is_reported(solver):
     forces = solver(*plain_film((40, 4)), (CLEARANCE, 1.2 * CLEARANCE, 0.0), SPEED, False)
     assert forces.steps == -1

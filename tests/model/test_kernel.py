@@ -43,11 +43,7 @@ def test_stamp_follows_every_source(tmp_path, monkeypatch):
 
 
 def test_cached_code_carries_the_stamp():
-    for function in (
-        model.film.reynolds.solve_film,
-        model.film.energy.march,
-        model.statics.compiled.iteration.iterate,
-    ):
+    for function in (model.film.reynolds.solve_film, model.film.energy.march, model.statics.compiled.iteration.iterate):
         assert function.dispatcher._cache._cache_file._source_stamp == compilation.stamp()
 
 

@@ -1,7 +1,6 @@
 """Turbulent film of Ng and Pan: laminar limit, published factors, a slider by quadrature, derivatives, heat, mesh."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,13 +18,14 @@ from model.prediction import Prediction
 from model.setup import Mesh
 from tests.model import points
 from tests.model.points import close, plain_film, slopes, solved
+from tests.rigs.bearings import changed_oil
 
 FAST, CLEARANCE = 2 * math.pi * 150.0, 1.2e-4
 TURBULENT = Options(turbulence="ng-pan")
 
 
 def thin(bearing: Bearing, share: float = 0.02) -> Bearing:
-    return replace(bearing, oil=replace(bearing.oil, viscosity_40=share * bearing.oil.viscosity_40))
+    return changed_oil(bearing, viscosity_40=share * bearing.oil.viscosity_40)
 
 
 def run(bearing: Bearing, thermal: str = "isothermal", options: Options = TURBULENT, **more: Any) -> Prediction:

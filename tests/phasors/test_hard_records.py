@@ -108,9 +108,7 @@ def test_a_drive_that_grows_or_wanders_is_no_second_line():
 
 def test_a_shaft_at_twice_the_excitation_is_the_shafts():
     point = replace(POINT, shaft_speed=2 * np.pi * 50.1)
-    data = record(shaft=50.1)
-    run = run_of(HeldReader(data, RATE), channels(QUANTITIES), point)
-    result = run_phasors(run)
+    result = phasors_of(record(shaft=50.1), point)
     assert [line.name for line in result.lines.nuisance].count("harmonic 2") == 0
     assert error(result) < 1e-3
 
@@ -151,8 +149,7 @@ def test_cells_at_a_rate_of_their_own_are_fitted_at_their_own_times(rate, stampe
     rng = np.random.default_rng(2)
     times = np.arange(round(rate * SECONDS)) / rate + (0.0013 if stamped else 0.0)
     data = {n: reading(n, times if n[0] == "F" else TIME, rng) for n in ALL}
-    run = run_of(ApartReader(data, times if stamped else None, rate), channels(QUANTITIES))
-    result = run_phasors(run)
+    result = run_phasors(run_of(ApartReader(data, times if stamped else None, rate), channels(QUANTITIES)))
     assert result.device == ("", "", "B", "B", "", "")
     assert error(result) < 2e-3
     # 25 Hz again and again, error of a probes' phasor: 1e-4, of the cells at 150 Hz 1e-3
@@ -275,9 +272,7 @@ def test_a_filter_that_nobody_states_is_told_by_the_noise(name):
     said = [phasors_of(with_noise(FILTERS[name], seed, "F")).conditions for seed in range(6)]
     assert sum("filter-unstated" in conditions for conditions in said) >= 4
     assert "the noise of FX, FY falls" in next(c.detail for cs in said for c in cs if c == "filter-unstated")
-    assert not any(
-        "filter-unstated" in phasors_of(with_noise(FILTERS[name], 7, kinds)).conditions for kinds in ("DFA",)
-    )
+    assert "filter-unstated" not in phasors_of(with_noise(FILTERS[name], 7, "DFA")).conditions
 
 
 def test_a_filter_that_is_stated_or_far_above_is_no_error():
@@ -406,7 +401,6 @@ def test_a_kept_file_serves_many_requests_and_lets_go(run):
 @pytest.mark.slow
 def test_a_long_run_is_read_once_and_says_the_same():
     """Beyond SHORT samples lines are looked for in the beginning; the shaft is off its set point here."""
-
     point = replace(POINT, shaft_speed=2 * np.pi * 22.01)
     long = held_run(5, 10_000.0, 40.0, point)
     assert long.length > 2 * SHORT

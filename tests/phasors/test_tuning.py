@@ -1,7 +1,8 @@
 """Lines of a run looked at once more: frequency errors, shafts that drift, lines that nobody mentioned."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,6 +29,8 @@ SPAN = WINDOWS * LENGTH
 LINES = known_lines((25.0,), 22.0, RATE)
 NAMES = ["excitation", *(line.name for line in LINES.nuisance)]
 POINT = OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22.0, 2 * math.pi * 25.0)
+#: What is asked of a run.
+ASKED = SimpleNamespace(sample_rate=RATE, length=round(SPAN * RATE))
 
 
 def block(turns, size=1.0):
@@ -105,44 +108,36 @@ def test_phasors_are_turned_to_other_frequencies_as_a_new_fit_would():
 
 
 def test_a_run_that_fits_needs_no_second_look():
-    assert tuned(_Rate(), run_of(), (25.0,), PhasorSettings()) is None
+    assert tuned(ASKED, run_of(), (25.0,), PhasorSettings()) is None
     # a slip of a hundredth of a turn over the whole run is borne, and five hundredths of the shaft's
     turning = {"excitation": 0.99 * MAX_SLIP / SPAN * START, "1X": 4.9 * MAX_SLIP / SPAN * START}
     calm = run_of(turning, turning)
-    assert tuned(_Rate(), calm, (25.0,), PhasorSettings()) is None
-
-
-@dataclass
-class _Rate:
-    """What is asked of a run."""
-
-    sample_rate: float = RATE
-    length: int = round(SPAN * RATE)
+    assert tuned(ASKED, calm, (25.0,), PhasorSettings()) is None
 
 
 def test_a_second_fit_takes_the_frequencies_that_the_phases_show():
     slip = 1.05 * MAX_SLIP / SPAN
     turning = {"excitation": slip * START}
-    found = tuned(_Rate(), run_of(turning, turning), (25.0,), PhasorSettings())
+    found = tuned(ASKED, run_of(turning, turning), (25.0,), PhasorSettings())
     assert found.lines.excitation[0].frequency == pytest.approx(25.0 + slip, abs=1e-9)
     assert found.lines.speed == 22.0
     assert found.follow is None
     assert found.conditions == ("excitation off set point",)
     assert "excitation found at 25.002 Hz, set point 25 Hz" in found.conditions[0].detail
     turning_shaft = {"1X": -5.1 * MAX_SLIP / SPAN * START}
-    shaft = tuned(_Rate(), run_of(turning_shaft, turning_shaft), (25.0,), PhasorSettings())
+    shaft = tuned(ASKED, run_of(turning_shaft, turning_shaft), (25.0,), PhasorSettings())
     assert shaft.lines.speed == pytest.approx(22.0 - 5.1 * MAX_SLIP / SPAN, abs=1e-9)
     assert shaft.lines.excitation[0].frequency == 25.0
     assert shaft.conditions == ()
     # what an earlier round has put right stays so
     later = replace(run_of(turning_shaft, turning_shaft), lines=known_lines((25.0,), 22.05, RATE))
-    speed = tuned(_Rate(), later, (25.0,), PhasorSettings()).lines.speed
+    speed = tuned(ASKED, later, (25.0,), PhasorSettings()).lines.speed
     assert speed == pytest.approx(22.05 - 5.1 * MAX_SLIP / SPAN, abs=1e-9)
     # lines that were found before are fitted along again
     extra = known_lines((25.0,), 22.0, RATE, extra=(71.5,))
     wide = run_of(turning, turning)
     more = np.pad(wide.z, ((0, 0), (0, 1), (0, 0)))
-    again = tuned(_Rate(), replace(wide, lines=extra, z=more), (25.0,), PhasorSettings())
+    again = tuned(ASKED, replace(wide, lines=extra, z=more), (25.0,), PhasorSettings())
     assert [line.frequency for line in again.lines.nuisance if line.name == "found"] == [71.5]
 
 
@@ -180,7 +175,7 @@ def test_where_there_is_no_runout_line_nothing_is_followed():
     short = run_of()
     short.z[2:] = np.nan
     assert speeds_from_runout(short) is None
-    assert tuned(_Rate(), few, (22.0,), PhasorSettings()) is None
+    assert tuned(ASKED, few, (22.0,), PhasorSettings()) is None
 
 
 @pytest.mark.parametrize(("share", "followed"), [(0.95, False), (1.05, True)])
@@ -191,7 +186,7 @@ def test_a_drift_counts_once_it_turns_a_window_or_is_clear_of_the_noise(share, f
     assert (limit > MAX_WINDOW_SLIP / LENGTH) is (noise > 0.1)
     rate = share * 2 * limit / (START[-2] - START[0])  # the ends are half a window short on either side
     given = run_of({}, {"1X": bent(rate)}, noise=noise)
-    found = tuned(_Rate(), given, (25.0,), PhasorSettings())
+    found = tuned(ASKED, given, (25.0,), PhasorSettings())
     assert (found is not None and found.follow is not None) is followed
     assert not followed or "shaft speed between 2" in found.conditions[-1].detail
 

@@ -215,6 +215,3 @@ def test_where_some_records_have_holds_ramps_are_not_asked():
     bent = pooled_noise(sphere, True)
     assert bent.white == pytest.approx(base.white, rel=0.1)
     assert max(bent.flicker, base.flicker) < 0.07 * 1e-16
-
-
-RATE, N = 500.0, 3000

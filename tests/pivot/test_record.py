@@ -1,10 +1,16 @@
-"""From a dry record to blocks: glitches, pieces and branches whose number and place can be counted."""
+"""From a dry record to blocks: glitches, pieces and branches whose number and place can be counted; projection on a
+pad's axes, and directions with their standard errors against draws."""
+
+import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from tests.pivot.test_assemble import on_pad, vectors
 from tpjb_ident.phasors.slow_samples import good_samples
 from tpjb_ident.pivot.blocks import MOST_BLOCKS, Hold, cut_blocks, find_holds
+from tpjb_ident.pivot.dry_record import PadDirection, displacement_direction, load_direction
 
 RATE = 500.0
 
@@ -13,19 +19,15 @@ def noise(n=2000, seed=1):
     return np.random.default_rng(seed).standard_normal(n)
 
 
-def with_jump(length, size=1000.0, at=900, n=2000):
-    values = noise(n)
-    values[at : at + length] += size
-    return values[:, None]
-
-
 @pytest.mark.parametrize("length", [1, 2, 5, 10, 11, 12, 15, 20, 21, 22, 30])
 def test_a_disturbance_goes_whole_up_to_its_longest_and_not_at_all_from_twice_that(length):
     """Seen from any sample of it, the neighbourhood before and after must be sound for the most part.
 
     Of 2 * 10 + 1 samples on either side, eleven spoilt ones are the majority; two samples more go on either side.
     """
-    found = np.flatnonzero(~good_samples(with_jump(length), longest=10))
+    values = noise()
+    values[900 : 900 + length] += 1000.0
+    found = np.flatnonzero(~good_samples(values[:, None], longest=10))
     seen = length if length <= 11 else 22 - length
     if seen <= 0:
         assert len(found) == 0
@@ -343,3 +345,46 @@ def test_jitter_and_a_gap_in_time_do_no_harm():
     keep = (time < 5.0) | (time > 5.4)
     time, load = (time + rng.uniform(-2e-4, 2e-4, len(time)))[keep], load[keep]
     assert len(find_holds(np.sort(time), load)) in (10, 11)  # the gap may split the hold it falls into
+
+
+LOADS = np.linspace(100.0, 3000.0, 24)
+HOLDS = np.repeat(np.arange(8), 3)
+
+
+def projected(load, displacement, hold=HOLDS, angle=0.0):
+    return on_pad(angle, load, displacement, hold, np.ones(len(load)))
+
+
+def white(scale):
+    return SimpleNamespace(covariance=lambda time, duration: scale**2 * np.eye(len(time)))
+
+
+def test_without_motion_there_is_no_direction():
+    some = projected(vectors(0.0, LOADS), np.zeros((len(LOADS), 2)))
+    assert displacement_direction(some, white(1e-7)) == PadDirection(0.0, math.inf)
+
+
+def test_the_stated_error_is_that_of_the_draws():
+    scale, drawn = 2e-7, []
+    for seed in range(300):
+        noise = scale * np.random.default_rng(seed).standard_normal((len(LOADS), 2))
+        some = projected(vectors(0.3, LOADS), vectors(0.35, 2e-9 * LOADS) + noise, angle=0.3)
+        drawn.append(displacement_direction(some, white(scale)))
+    angles, errors = np.array([[d.angle, d.se] for d in drawn]).T
+    assert np.mean(angles) == pytest.approx(0.05, abs=4 * np.std(angles) / math.sqrt(300))
+    # by hand: the slope across scatters by scale / (root of the sum of squares of the loads about their mean)
+    by_hand = scale / math.sqrt(np.sum((LOADS - LOADS.mean()) ** 2)) / 2e-9
+    assert np.std(angles) == pytest.approx(by_hand, rel=0.15)
+    assert np.sqrt(np.mean(errors**2)) == pytest.approx(by_hand, rel=0.1)
+
+
+def test_blocks_of_one_hold_count_as_one():
+    rng = np.random.default_rng(4)
+    scattered = vectors(0.0, LOADS) + rng.standard_normal((len(LOADS), 2))
+    displacement = np.zeros((len(LOADS), 2))
+    alone = projected(scattered, displacement, np.arange(len(LOADS)))
+    shared = projected(scattered, displacement, HOLDS)
+    between = projected(scattered, displacement, np.full(len(LOADS), -1))
+    errors = [load_direction(b).se for b in (alone, shared, between)]
+    assert errors[1] / errors[0] == pytest.approx(math.sqrt(3.0))
+    assert errors[2] / errors[0] == pytest.approx(math.sqrt(len(LOADS) / 3.0))

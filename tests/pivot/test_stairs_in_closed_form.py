@@ -29,7 +29,6 @@ class Stairs:
     held: bool = True
     friction: float = 0.0  #: share of the load that the pivot's seat holds back
     unloads: bool = False  #: a second run of every pad, down from the top
-    stiffer: float = 1.0  #: the second run against the first
     unit: str = ""  #: that the file states for the probes
     rate: float = 500.0  #: [Hz]
     walk: float = 0.0  #: of a probe's zero [m/sqrt(s)]
@@ -76,7 +75,7 @@ def write(path, stairs: Stairs, seed: int) -> None:
         for (pad, angle), way in runs:
             load = course(stairs, rng)[::way]
             travelled = np.minimum(load / 40.0, 1.0) if angle in UPPER else 1.0
-            moved = deflection(pad, reaching(load, stairs.friction)) / (stairs.stiffer if way < 0 else 1.0)
+            moved = deflection(pad, reaching(load, stairs.friction))
             place = CLEARANCE + moved - stairs.way * (1 - travelled)
             toward = np.radians(angle + rng.standard_normal())
             unit = np.array([[np.cos(toward)], [np.sin(toward)]])

@@ -33,10 +33,6 @@ GROUPS = (TIME, {"X1A": ("V", X), "L1H": ("kN", F)}), (SLOW, {"T1": ("degC", T)}
 ALL = {"t": TIME, "X1A": X, "L1H": F, "T1": np.interp(TIME, SLOW, T)}
 
 
-def write_tdms(path: Path) -> None:
-    write_groups(path, GROUPS[0], (SLOW, GROUPS[1][1] | {"remark": ("", ["a text"])}))
-
-
 def write_catman(path: Path) -> None:
     """Two clocks, the slow part padded with blanks, below a title."""
     columns = {"Zeit  1 - Standardrate [s]": TIME, "X1A [V]": X, "L1H [kN]": F}
@@ -45,7 +41,7 @@ def write_catman(path: Path) -> None:
 
 
 WRITERS = {
-    "one.tdms": write_tdms,
+    "one.tdms": lambda path: write_groups(path, GROUPS[0], (SLOW, GROUPS[1][1] | {"remark": ("", ["a text"])})),
     "one.unv": lambda path: write_groups(path, *GROUPS),
     "one.mf4": lambda path: write_groups(path, *GROUPS),
     "one.mat": lambda path: write_columns(path, ALL | {"note": "text"}),

@@ -117,15 +117,6 @@ def test_a_rate_that_no_times_can_be_counted_from_is_refused(tmp_path, rate):
     refused(tmp_path / "a.h5", "sample rate: is 1e", "sample_rate in the manifest")
 
 
-def external_link(group):
-    group["X1A"] = h5py.ExternalLink("other.h5", "/runs/c-1/X1A")
-
-
-def soft_link_through_an_external_one(group):
-    group.file["outside"] = h5py.ExternalLink("other.h5", "/")
-    group["X1A"] = h5py.SoftLink("/outside/runs/c-1/X1A")
-
-
 def external_storage(group):
     group.create_dataset("X1A", shape=(N,), dtype="f8", external=[("raw.bin", 0, N * 8)])
 
@@ -147,29 +138,29 @@ def stored(data):
     return lambda group: group.create_dataset("X1A", data=data)
 
 
-def linked(target):
+def linked(target, **others):
+    """A record that is a link, and what else is at the top of the file."""
+
     def link(group):
-        group["loop"] = h5py.SoftLink("X1A")
-        group["X1A"] = h5py.SoftLink(target)
+        for name, content in others.items():
+            group.file[name] = content
+        group["X1A"] = h5py.SoftLink(target) if isinstance(target, str) else target
 
     return link
 
 
 def chain(length):
     """A soft link to a soft link, and so on, to a record."""
-
-    def link(group):
-        group.file["link0"] = np.full(N, 7.0)
-        for i in range(1, length + 1):
-            group.file[f"link{i}"] = h5py.SoftLink(f"/link{i - 1}")
-        group["X1A"] = h5py.SoftLink(f"/link{length}")
-
-    return link
+    links = {f"link{i}": h5py.SoftLink(f"/link{i - 1}") for i in range(1, length + 1)}
+    return linked(f"/link{length}", link0=np.full(N, 7.0), **links)
 
 
 NO_RECORDS = {
-    "external link": (external_link, ("link out of the file", "other.h5")),
-    "soft link through an external one": (soft_link_through_an_external_one, ("link out of the file",)),
+    "external link": (linked(h5py.ExternalLink("other.h5", "/runs/c-1/X1A")), ("link out of the file", "other.h5")),
+    "soft link through an external one": (
+        linked("/outside/runs/c-1/X1A", outside=h5py.ExternalLink("other.h5", "/")),
+        ("link out of the file",),
+    ),
     "external storage": (external_storage, ("another file",)),
     "virtual": (virtual_dataset, ("another file",)),
     "foreign filter": (foreign_filter, ("filter 32015",)),
@@ -179,7 +170,7 @@ NO_RECORDS = {
     "complex": (stored(np.zeros(3, dtype="c8")), ("X1A", "not 1-D numbers")),
     "dangling": (linked("/nowhere"), ("X1A",)),
     "link to itself": (linked("/runs/c-1/X1A"), ("X1A",)),
-    "circle of links": (linked("loop"), ("X1A",)),
+    "circle of links": (linked("/loop", loop=h5py.SoftLink("/runs/c-1/X1A")), ("X1A",)),
     "long chain of links": (chain(62), ("circle of links, or too deep",)),
     "longer chain of links": (chain(200), ("circle of links, or too deep",)),
 }

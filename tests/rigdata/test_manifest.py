@@ -33,7 +33,6 @@ GOOD = manifest(
     csv={"delimiter": ";", "decimal": ",", "encoding": "cp1252", "header_line": 7, "units_line": 8},
 )
 
-
 #: Stands for the line on which the replacement was made.
 LINE = "the line"
 
@@ -46,21 +45,16 @@ def problems_of(text: str) -> list[str]:
 
 def test_the_example_of_the_format():
     manifest = parse_manifest(GOOD)
-    assert (manifest.id, manifest.bearing_name, manifest.housing_mass, manifest.sample_rate) == (
-        "rocker-A",
-        "rocker.toml",
-        30.0,
-        2000.0,
-    )
+    assert (manifest.id, manifest.bearing_name) == ("rocker-A", "rocker.toml")
+    assert (manifest.housing_mass, manifest.sample_rate) == (30.0, 2000.0)
     assert (manifest.csv.delimiter, manifest.csv.decimal, manifest.csv.header_line) == (";", ",", 7)
     probe = manifest.channels["X1A"]
     assert (probe.axis, probe.polarity, probe.uncertainty) == (pytest.approx(math.pi / 4), -1, pytest.approx(0.01))
     thermometer = manifest.channels["T1"]
     assert (thermometer.pad, thermometer.position, thermometer.zero) == (1, 0.75, pytest.approx(273.15))
     dynamic, dry = manifest.runs
-    assert dynamic.point.static_load == 5000.0
-    assert dynamic.point.shaft_speed_hz == 22.0
-    assert dynamic.point.excitation_hz == 25.0
+    point = dynamic.point
+    assert (point.static_load, point.shaft_speed_hz, point.excitation_hz) == (5000.0, 22.0, 25.0)
     assert dynamic.excitation_direction == pytest.approx(math.radians(54))
     assert (dry.pad, dry.branch, dry.sample_rate) == (1, "up", 500.0)
     assert manifest.notes == ()

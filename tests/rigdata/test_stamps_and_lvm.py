@@ -17,11 +17,11 @@ X = np.sin(2 * np.pi * 25 * TIME) - 0.3
 RUN = {"id": "one", "file": "one.csv", "kind": "locus", **SET_POINT}
 
 
-def campaign(folder, clock, rows, delimiter=","):
-    """A campaign of one file: a clock and a probe."""
-    text = manifest({clock: {"quantity": "time", "unit": "s"}, "X1A": PROBE | {"axis": "45 deg"}}, RUN)
-    table = "\n".join([f"{clock}{delimiter}X1A", *rows]) + "\n"
-    return load_campaign(write_files(folder, text, {"one.csv": table}))
+def exported(folder: Path, head: str, rows: list[str], clock: str = "", **tables: Table) -> Run:
+    """The one run of a campaign with a CSV file of these lines; which column is the clock, and more tables."""
+    channels = {"X1A": PROBE, **({clock: {"quantity": "time", "unit": "s"}} if clock else {})}
+    text = manifest(channels, RUN, **tables)
+    return load_campaign(write_files(folder, text, {"one.csv": "\n".join([head, *rows, ""])})).run("one")
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def campaign(folder, clock, rows, delimiter=","):
 )
 def test_stamps_of_several_countries_are_seconds_from_the_first(tmp_path, stamp, delimiter, decimal, name):
     rows = [delimiter.join([stamp(t), f"{x:.9f}".replace(".", decimal)]) for t, x in zip(TIME, X)]
-    record = campaign(tmp_path, name, rows, delimiter).run("one").record("X1A")
+    record = exported(tmp_path, f"{name}{delimiter}X1A", rows, name).record("X1A")
     assert record.rate == pytest.approx(RATE, rel=1e-6)
     np.testing.assert_allclose(record.time, TIME, atol=1e-7)
     np.testing.assert_allclose(record.values, 1e-6 * X, atol=1e-14)
@@ -70,7 +70,7 @@ def test_a_cell_that_is_no_stamp_is_named_by_its_line(tmp_path):
     rows = [f"2019-07-22T11:31:{22 + t:09.6f},{x:.9f}" for t, x in zip(TIME, X)]
     rows[300] = "yesterday,0.1"
     with pytest.raises(RigDataError, match=r"line 302, column 1 \(timestamp\): 'yesterday' is not a time stamp"):
-        campaign(tmp_path, "timestamp", rows).run("one").record("X1A")
+        exported(tmp_path, "timestamp,X1A", rows, "timestamp").record("X1A")
 
 
 #: Two channels at 1 kHz and one at 100 Hz.
@@ -123,15 +123,6 @@ def test_what_cannot_be_read_says_why(tmp_path, content, says):
         read_series(tmp_path / "a.lvm", "a.lvm")
 
 
-CLOCK = {"Zeit": {"quantity": "time", "unit": "s"}}
-
-
-def exported(folder: Path, head: str, rows: list[str], clock: Table | None = None, **tables: Table) -> Run:
-    """The one run of a campaign with a CSV file of these lines; what describes its clock, and more tables."""
-    text = manifest({"X1A": PROBE, **(clock or {})}, RUN, **tables)
-    return load_campaign(write_files(folder, text, {"one.csv": "\n".join([head, *rows, ""])})).run("one")
-
-
 def counted(number: int, step: float) -> list[str]:
     """Rows of times, `step` apart, and readings."""
     return [f"{step * i:.12f},{i}" for i in range(number)]
@@ -163,13 +154,13 @@ def test_times_that_miss_the_stated_rate_by_another_unit_are_refused(tmp_path, f
     with pytest.raises(
         RigDataError, match=r"one.csv, column Zeit: its times, taken for seconds.*1000 Hz\. State their"
     ):
-        _ = exported(tmp_path, "Zeit,X1A", counted(500, 0.001 * factor), CLOCK, **stated).sample_rate
+        _ = exported(tmp_path, "Zeit,X1A", counted(500, 0.001 * factor), "Zeit", **stated).sample_rate
     # half of the campaign's rate is a run's own
-    assert exported(tmp_path, "Zeit,X1A", counted(500, 0.002), CLOCK, **stated).sample_rate == pytest.approx(500.0)
+    assert exported(tmp_path, "Zeit,X1A", counted(500, 0.002), "Zeit", **stated).sample_rate == pytest.approx(500.0)
 
 
 def test_lines_of_statistics_at_the_end_are_no_samples(tmp_path):
-    run = exported(tmp_path, "Zeit,X1A", [*counted(50, 0.001), ",24.5", ",49"], CLOCK)
+    run = exported(tmp_path, "Zeit,X1A", [*counted(50, 0.001), ",24.5", ",49"], "Zeit")
     assert run.length == 50
     (problem,) = (p for p in run.reader.problems() if p.severity == "warning")
     assert problem.place == "line 52 and on"

@@ -177,8 +177,7 @@ def test_loads_in_names_of_files_have_any_unit_of_force(stem, newtons, text, sou
 
 
 @pytest.mark.parametrize(
-    ("label", "unit"),
-    [("µm", "um"), ("U/min", "rpm"), ("Volts", "V"), ("Newtons", "N"), ("mils", "mil"), ("g/no", "")],
+    ("label", "unit"), [("µm", "um"), ("U/min", "rpm"), ("Volts", "V"), ("Newtons", "N"), ("mils", "mil"), ("g/no", "")]
 )
 def test_units_are_spelt_as_a_manifest_spells_them(label, unit):
     assert usable_unit(label) == unit

@@ -38,14 +38,8 @@ CHANNEL_FAULTS = {
     "dead": (("X1A", 1.5), lambda v: {"X1A": np.full(2000, 1.5)}),
     "stuck": (("X1A", None, 1.0), lambda v: {"X1A": np.where(np.arange(2000) < 1000, v["X1A"], v["X1A"][1000])}),
     "inverted": (("X1A",), lambda v: {"X1A": 16.0 - v["X1A"]}),
-    "nan_gap": (
-        ("X1A", None, 0.5, 0.1),
-        lambda v: {"X1A": np.where(np.arange(2000) // 100 == 5, np.nan, v["X1A"])},
-    ),
-    "glitch": (
-        ("X1A", 1e-5, 1.9, 0.05),
-        lambda v: {"X1A": v["X1A"] - 7780.0 * 1e-5 * (np.arange(2000) // 50 == 38)},
-    ),
+    "nan_gap": (("X1A", None, 0.5, 0.1), lambda v: {"X1A": np.where(np.arange(2000) // 100 == 5, np.nan, v["X1A"])}),
+    "glitch": (("X1A", 1e-5, 1.9, 0.05), lambda v: {"X1A": v["X1A"] - 7780.0 * 1e-5 * (np.arange(2000) // 50 == 38)}),
     "swapped": (("X1A", None, 0.0, np.inf, "X1B"), lambda v: {"X1A": v["X1B"], "X1B": v["X1A"]}),
     "scaled": (("L1V", 1.1), lambda v: {"L1V": 1.1 * v["L1V"]}),
     "offset": (("A1H", 0.5), lambda v: {"A1H": v["A1H"] + 0.5 * 0.01 / 9.80665}),

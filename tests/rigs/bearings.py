@@ -16,6 +16,11 @@ def changed_pads(bearing: Bearing, **changes: Any) -> Bearing:
     return bearing.with_pads(tuple(replace(pad, **changes) for pad in bearing.pads))
 
 
+def changed_oil(bearing: Bearing, **changes: Any) -> Bearing:
+    """Copy of a bearing with another oil."""
+    return replace(bearing, oil=replace(bearing.oil, **changes))
+
+
 def ring(
     angles: Iterable[float],
     size: tuple[float, float],

@@ -80,10 +80,7 @@ class Rig:
     mass: float = 30.0
     stated_mass: float = 0.0  #: where it is another one
     springs: tuple[float, float] = (4e8, 6e8)
-    foundation: tuple[float, float] = (
-        0.0,
-        np.inf,
-    )  #: mass [kg] and springs [N/m] under the cells or a shaft's bearings
+    foundation: tuple[float, float] = (0.0, np.inf)  #: mass [kg], springs [N/m] under cells or a shaft's bearings
     beside: tuple[float, float] = (0.0, 0.0)  #: springs beside the film, which dry runs of the plan tell [N/m]
     shaft_mass: float = 0.0
     shaft_compliance: float = 0.0  #: of a floating stator's shaft [m/N]

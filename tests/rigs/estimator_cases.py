@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tests.phasors.phasor_cases import complex_normal
 from tests.rigs.closed_form import vector
 from tpjb_ident.estimators.estimate import estimate_dynamic_stiffness
 
@@ -56,8 +57,8 @@ def draw(case: Case, seed: int, replicate: int) -> Sample:
     rms = np.sqrt(np.mean(np.abs(displacement) ** 2))
     direction = np.repeat(np.arange(case.directions), case.windows)
     n = len(direction)
-    F = force[direction] + FORCE_NOISE * FORCE / np.sqrt(2) * _circular(rng, (n, 2))
-    D = displacement[direction] + case.relx * rms * _circular(rng, (n, 2))
+    F = force[direction] + FORCE_NOISE * FORCE / np.sqrt(2) * complex_normal(rng, n, 2)
+    D = displacement[direction] + case.relx * rms * complex_normal(rng, n, 2)
     bad = rng.random(n) < case.share
     if case.kind == "force":
         F[bad] += _fault(rng, int(bad.sum()), FORCE)
@@ -70,10 +71,6 @@ def draw(case: Case, seed: int, replicate: int) -> Sample:
     elif case.kind:
         raise ValueError(f"unknown kind of fault {case.kind!r}")
     return Sample(D, F, direction, command[direction])
-
-
-def _circular(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
-    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
 
 
 def _fault(rng: np.random.Generator, n: int, unit: float) -> np.ndarray:

@@ -273,7 +273,7 @@ def test_each_states_its_version_and_none_is_forgotten():
             assert re.search(r'"?schema"?\s*[:=]\s*"tpjb-[a-z]+/[0-9]+"', path.read_text(encoding="utf-8")), path.name
 
 
-def test_a_folder_of_the_first_version_is_still_one(tmp_path):
+def test_a_folder_of_the_first_version_is_still_one():
     assert set(former_runs(OLDER)) == {"locus"}
     assert schema("tpjb-run") == "tpjb-run/2"
     result = ended(2, "verify", OLDER)

@@ -9,6 +9,7 @@ ROOT = Path(__file__).parents[2]
 OURS = ("rigdata", "model", "tpjb_ident")
 SOURCES = sorted(p for top in OURS for p in (ROOT / top).rglob("*.py"))
 Spoken = ast.Import | ast.ImportFrom | ast.Call
+Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def relative(path: Path) -> str:
@@ -29,6 +30,13 @@ parsed = functools.cache(ast.parse)  # by text: what one test has parsed, the ot
 def trees() -> dict[str, ast.Module]:
     """Every source of the three packages, parsed, by its path."""
     return {path: parsed(text) for path, text in texts().items()}
+
+
+def docstrings(text: str) -> Iterator[ast.stmt]:
+    """Every docstring of a source."""
+    for node in ast.walk(parsed(text)):
+        if isinstance(node, Documented) and ast.get_docstring(node, clean=False) is not None:
+            yield node.body[0]
 
 
 @functools.cache

@@ -7,14 +7,13 @@ import ast
 
 import pytest
 
-from tests.structure.sources import parsed, texts
+from tests.structure.sources import docstrings, parsed, texts
 
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 MOST_LINES = 2
 #: Of a thousand lines of code; this may only fall.
 MOST_OF_A_THOUSAND = 49.2
 Comprehension = ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp
-Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def comprehensions(text: str) -> list[Comprehension]:
@@ -34,14 +33,11 @@ def density(node: Comprehension) -> str:
 
 def code_lines(text: str) -> int:
     """Lines of a source without docstrings, comments and blank lines."""
-    docstrings: set[int] = set()
-    for node in ast.walk(parsed(text)):
-        if isinstance(node, Documented) and ast.get_docstring(node, clean=False) is not None:
-            docstrings.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
-    count = 0
-    for number, line in enumerate(text.splitlines(), start=1):
-        count += number not in docstrings and bool(line.partition("#")[0].strip())
-    return count
+    told: set[int] = set()
+    for node in docstrings(text):
+        told.update(range(node.lineno, (node.end_lineno or 0) + 1))
+    lines = enumerate(text.splitlines(), start=1)
+    return sum(number not in told and bool(line.partition("#")[0].strip()) for number, line in lines)
 
 
 @pytest.mark.parametrize(

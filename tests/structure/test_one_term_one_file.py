@@ -25,9 +25,7 @@ CLASSES = {
     "tpjb_ident/terms/load.py": {"LoadTurn"},
 }
 #: What differs from run to run is of the random part.
-NAMES = {
-    "tpjb_ident/identification/campaign_solution.py": {"load direction", "load miss"},
-}
+NAMES = {"tpjb_ident/identification/campaign_solution.py": {"load direction", "load miss"}}
 #: Columns of the blocks that have the name of a term.
 COLUMNS = {field.name for field in dataclasses.fields(Blocks)}
 

@@ -12,7 +12,7 @@ from collections import Counter
 
 import pytest
 
-from tests.structure.sources import parsed, texts
+from tests.structure.sources import docstrings, parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
@@ -41,7 +41,6 @@ NO_NOUNS = {
 }  # fmt: skip
 MOST_NO_NOUNS = 9.0
 COUNTED = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
-Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def room(path: str) -> str:
@@ -56,15 +55,9 @@ def room(path: str) -> str:
 
 def tokens(text: str) -> int:
     """Count the tokens of a source without its docstrings, comments and layout."""
-    docstrings = set()
-    for node in ast.walk(parsed(text)):
-        if isinstance(node, Documented) and ast.get_docstring(node, clean=False) is not None:
-            docstrings.add((node.body[0].lineno, node.body[0].col_offset))
-    count = 0
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type in COUNTED and not (token.type == tokenize.STRING and token.start in docstrings):
-            count += 1
-    return count
+    told = {(node.lineno, node.col_offset) for node in docstrings(text)}
+    found = tokenize.generate_tokens(io.StringIO(text).readline)
+    return sum(token.type in COUNTED and token.start not in told for token in found)
 
 
 def test_docstrings_and_comments_are_no_tokens():

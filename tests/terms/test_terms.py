@@ -33,14 +33,6 @@ def answered(case, seed=0):
     return solved(rig, blocks, truth), truth
 
 
-def stated(**by_sensor):
-    return {"stated": by_sensor}
-
-
-def of(solution, name):
-    return solution.fitted[name]
-
-
 def held(solution, truth, limit=4.0):
     """H is within `limit` of its own standard deviations everywhere."""
     return np.abs(away(solution, truth)).max() < limit
@@ -53,11 +45,10 @@ def told(fitted, true, limit=4.0):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_gains_of_two_probes_are_considered_and_stand_in_the_interval(seed):
-    case = Case(
-        gains={"D1": 0.012, "F2": -0.004}, **stated(displacement={"uncertainty": 0.01}, force={"uncertainty": 0.005})
-    )
+    known = {"displacement": {"uncertainty": 0.01}, "force": {"uncertainty": 0.005}}
+    case = Case(gains={"D1": 0.012, "F2": -0.004}, stated=known)
     solution, truth = answered(case, seed)
-    gains = of(solution, "calibration")
+    gains = solution.fitted["calibration"]
     assert not gains.estimated.any()
     np.testing.assert_array_equal(gains.value, 0.0)
     assert held(solution, truth)
@@ -68,28 +59,28 @@ def test_gains_of_two_probes_are_considered_and_stand_in_the_interval(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_third_probe_tells_the_differences_of_gains(seed):
-    case = Case(probes=3, gains={"D1": 0.05}, **stated(displacement={"uncertainty": 0.02}))
+    case = Case(probes=3, gains={"D1": 0.05}, stated={"displacement": {"uncertainty": 0.02}})
     solution, truth = answered(case, seed)
-    gains = of(solution, "calibration")
+    gains = solution.fitted["calibration"]
     difference = gains.value[0] - gains.value[1:3].mean()
     assert difference == pytest.approx(0.05, abs=0.004)
     assert held(solution, truth)
     alone = made(replace(case, gains={}), seed)
-    assert solution.terms[0].conditions(of(solved(*alone), "calibration")) == ()
+    assert solution.terms[0].conditions(solved(*alone).fitted["calibration"]) == ()
 
 
 def test_a_probe_far_beyond_what_is_stated_is_named():
-    case = Case(probes=3, gains={"D1": 0.05}, **stated(displacement={"uncertainty": 0.005}))
+    case = Case(probes=3, gains={"D1": 0.05}, stated={"displacement": {"uncertainty": 0.005}})
     rig, blocks, truth = made(case)
     solution = solved(learnt_rig(rig, solved(rig, blocks, truth)), blocks, truth)
-    (found,) = solution.terms[0].conditions(of(solution, "calibration"))
+    (found,) = solution.terms[0].conditions(solution.fitted["calibration"])
     assert found == "probe-gains-differ"
     assert "D1" in found.detail
     assert held(solution, truth)
 
 
 def test_two_calibrations_of_one_probe_have_a_gain_each():
-    case = Case(probes=3, noise=1e-4, **stated(displacement={"uncertainty": 0.01}))
+    case = Case(probes=3, noise=1e-4, stated={"displacement": {"uncertainty": 0.01}})
     rig, blocks, truth = made(case)
     later = blocks.point == 2
     calibration, z = blocks.calibration.copy(), blocks.z.copy()
@@ -98,7 +89,7 @@ def test_two_calibrations_of_one_probe_have_a_gain_each():
     solution = solved(rig, replace(blocks, calibration=calibration, z=z), truth)
     (gain,) = [term for term in solution.terms if term.name == "calibration"]
     assert [p.name for p in gain.parameters][:2] == ["D1, calibration 1", "D1, calibration 2"]
-    first, second = of(solution, "calibration").value[:2]
+    first, second = solution.fitted["calibration"].value[:2]
     assert second - first == pytest.approx(np.log(1.03), abs=2e-3)
     assert held(solution, truth)
 
@@ -108,11 +99,11 @@ def test_two_calibrations_of_one_probe_have_a_gain_each():
 def test_a_delay_is_told_by_the_housing_s_equations(mount, seed):
     """Standing: cells against accelerometers. Floating: probes against accelerometers."""
     late = {"cells": "force", "floating": "acceleration"}[mount]
-    case = Case(mount=mount, late={late: 3e-4}, **{"stated": {late: {"delay_uncertainty": 3e-4}}})
+    case = Case(mount=mount, late={late: 3e-4}, stated={late: {"delay_uncertainty": 3e-4}})
     case = replace(case, hertz=(30.0, 90.0), loads=(5000.0,))
     rig, blocks, truth = made(case, seed)
     solution = solved(rig, blocks, truth)
-    delay = of(solution, "delay")
+    delay = solution.fitted["delay"]
     assert told(delay, 0.3)
     assert delay.deviation[0] < 0.15
     assert held(solution, truth)
@@ -142,11 +133,11 @@ def test_two_frequencies_tell_the_corner_by_the_housing_s_equations(seed, corner
     case = Case(corner=corner, hertz=(10.0, 60.0), noise=3e-4)
     rig, blocks, truth = made(case, seed)
     solution = solved(rig, blocks, truth)
-    assert told(of(solution, "corner"), corner)
-    assert of(solution, "corner").deviation[0] < 0.1
+    assert told(solution.fitted["corner"], corner)
+    assert solution.fitted["corner"].deviation[0] < 0.1
     assert held(solution, truth)
     term = next(t for t in terms_of(rig, blocks) if t.name == "corner")
-    assert "low corner" in term.words(of(solution, "corner"))[0]
+    assert "low corner" in term.words(solution.fitted["corner"])[0]
 
 
 @pytest.mark.slow
@@ -164,7 +155,7 @@ def test_accelerometers_that_lead_have_a_corner_or_the_cells_come_late(seed, her
     assert held(solution, truth)
     assert (_LATE in solution.conditions()) == bool(late)
     if len(hertz) > 1:
-        assert of(solution, "corner").value[0] == pytest.approx(corner, abs=0.3)
+        assert solution.fitted["corner"].value[0] == pytest.approx(corner, abs=0.3)
 
 
 @pytest.mark.slow
@@ -214,8 +205,8 @@ def test_wrong_accelerometers_stay_wrong_where_something_leads(seed, wrong, lead
 
 #: What no records tell, the term that it is of, and the share by which it has H off.
 CONSIDERED = {
-    "late": (Case(late={"displacement": 1e-4}, **stated(displacement={"delay_uncertainty": 1e-4})), "delay", 0.01),
-    "turned": (Case(turned={"D1": 0.01}, **stated(displacement={"axis_uncertainty": 0.01})), "axis", 0.003),
+    "late": (Case(late={"displacement": 1e-4}, stated={"displacement": {"delay_uncertainty": 1e-4}}), "delay", 0.01),
+    "turned": (Case(turned={"D1": 0.01}, stated={"displacement": {"axis_uncertainty": 0.01}}), "axis", 0.003),
     "heavier": (Case(hertz=(90.0,), mass_error=0.02, mass_uncertainty=0.02), "mass", 0.0),
     "no accelerometers": (Case(accelerometers=0), "housing", 0.0),
     "no accelerometers, no mount": (Case(accelerometers=0, mount="unknown"), "housing", 0.0),
@@ -226,7 +217,7 @@ CONSIDERED = {
 def test_what_is_not_told_is_considered_and_stands_in_the_interval(name):
     case, term, off = CONSIDERED[name]
     solution, truth = answered(case)
-    assert not of(solution, term).estimated.any()
+    assert not solution.fitted[term].estimated.any()
     assert held(solution, truth)
     assert np.abs(solution.h - truth).max() > off * np.abs(truth).max()
     assert solution.shares[term][0, 0, 0] > 0
@@ -237,14 +228,10 @@ def test_what_is_not_told_is_considered_and_stands_in_the_interval(name):
 def test_a_clock_s_rate_is_told_by_how_phases_turn_within_the_records(rate, seed):
     case = Case(
         rates={"force": rate, "acceleration": rate},
-        stated={
-            "force": {"clock": "second"},
-            "acceleration": {"clock": "second"},
-            "displacement": {"clock": "first"},
-        },
+        stated={"force": {"clock": "second"}, "acceleration": {"clock": "second"}, "displacement": {"clock": "first"}},
     )
     solution, truth = answered(case, seed)
-    clock = of(solution, "clock")
+    clock = solution.fitted["clock"]
     assert told(clock, 1e4 * rate)
     assert clock.deviation[0] < 0.05
     assert held(solution, truth)
@@ -258,13 +245,13 @@ def test_clocks_that_agree_are_not_named():
     case = Case(stated={"force": {"clock": "b"}, "acceleration": {"clock": "b"}, "displacement": {"clock": "a"}})
     solution = solved(*made(case))
     (term,) = [t for t in solution.terms if t.name == "clock"]
-    assert term.conditions(of(solution, "clock")) == ()
+    assert term.conditions(solution.fitted["clock"]) == ()
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_springs_under_the_housing_are_told(seed):
     solution = solved(*made(Case(), seed))
-    housing = of(solution, "housing")
+    housing = solution.fitted["housing"]
     c = 1e9 * COMPLIANCE.real
     assert told(housing, [c[0, 0], c[1, 1], c[0, 1], 0.01, 0.01])
     assert solution.terms[0].conditions(housing) == ()
@@ -287,7 +274,7 @@ def test_accelerometers_that_no_housing_on_springs_has_are_named(turn, named):
     z[:, rig.pick("acceleration")] = turn(z[:, rig.pick("acceleration")])
     solution = solved(rig, replace(blocks, z=z), truth)
     (term,) = [t for t in solution.terms if t.name == "housing"]
-    assert term.conditions(of(solution, "housing")) == (named,)
+    assert term.conditions(solution.fitted["housing"]) == (named,)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -296,7 +283,7 @@ def test_how_h_turns_with_the_load_s_direction_is_learnt_from_the_runs_own_misse
     case = Case(directions=6, noise=2e-4, miss=(0.004, 0.01), turning=turning)
     rig, blocks, truth = made(case, seed)
     solution = solved(rig, blocks, truth)
-    turn = of(solution, "load direction")
+    turn = solution.fitted["load direction"]
     assert (np.abs(turn.value - turning) < 4 * turn.deviation).all()
     assert held(solution, truth)
     without = solved(rig, blocks, truth, without=(LoadTurn,))
@@ -316,7 +303,7 @@ def test_a_miss_that_all_loads_share_is_considered():
         common = 0.02 / np.sqrt(12) * complex(*rng.standard_normal(2))
         rig, blocks, truth = made(Case(miss=(0.02, 0.02), common_miss=common, noise=2e-4), seed)
         solution = solved(rig, blocks, truth)
-        assert not of(solution, "load miss").estimated.any()
+        assert not solution.fitted["load miss"].estimated.any()
         outside.append(np.abs(away(solution, truth)[:, [0, 3, 4, 7]]) > 1.96)
     assert np.mean(outside) < 0.12
 
@@ -338,7 +325,7 @@ def test_several_amplitudes_give_the_stiffness_at_none(seed):
     rig, blocks, truth = made(case, seed)
     solution = solved(rig, blocks, truth)
     assert held(solution, truth)
-    assert of(solution, "amplitude").estimated.any()
+    assert solution.fitted["amplitude"].estimated.any()
     without = solved(rig, blocks, truth, without=(Amplitude,))
     diagonal = np.s_[:, [0, 1], [0, 1]]
     assert np.abs(without.h / truth - 1)[diagonal].max() > 0.03
@@ -350,7 +337,7 @@ def test_what_one_amplitude_does_not_tell_stands_in_the_interval(seed):
     """Runs of other directions move otherwise; that is the film's direction, and no evidence on amplitude."""
     rig, blocks, truth = made(Case(bent=0.04, bent_told=0.05), seed)
     solution = solved(rig, blocks, truth)
-    assert not of(solution, "amplitude").estimated.any()
+    assert not solution.fitted["amplitude"].estimated.any()
     assert held(solution, truth)
     blind = solved(rig, blocks, truth, without=(Amplitude,))
     assert not held(blind, truth)
@@ -359,10 +346,10 @@ def test_what_one_amplitude_does_not_tell_stands_in_the_interval(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_probe_s_drift_is_told_by_runs_at_several_temperatures(seed):
-    case = Case(drift={"D1": 5e-4}, kelvins=15.0, **stated(D1={"temperature_coefficient_uncertainty": 5e-4}))
+    case = Case(drift={"D1": 5e-4}, kelvins=15.0, stated={"D1": {"temperature_coefficient_uncertainty": 5e-4}})
     rig, blocks, truth = made(case, seed)
     solution = solved(rig, blocks, truth)
-    drift = of(solution, "temperature")
+    drift = solution.fitted["temperature"]
     assert told(drift, 0.5)
     assert held(solution, truth)
     without = solved(rig, blocks, truth, without=(Temperature,))
@@ -382,7 +369,7 @@ def test_a_floating_stator_s_accelerometers_are_held_against_the_probes(late, sh
     z[:, rig.pick("acceleration")] *= share * np.exp(-1j * blocks.omega * late)[:, None]
     solution = solved(rig, replace(blocks, z=z), truth)
     (term,) = [t for t in solution.terms if t.name == "housing"]
-    assert term.conditions(of(solution, "housing")) == named
+    assert term.conditions(solution.fitted["housing"]) == named
 
 
 @pytest.mark.slow
@@ -413,7 +400,7 @@ def test_a_floating_stator_tells_wrong_probes_from_a_shaft_that_gives(changes, s
     assert not solution.conditions()
     assert held(solution, truth)
     if not changes:
-        assert of(solution, "housing").value[4:6] == pytest.approx(1e9 * gives, abs=0.2)
+        assert solution.fitted["housing"].value[4:6] == pytest.approx(1e9 * gives, abs=0.2)
 
 
 @pytest.mark.parametrize(
@@ -422,8 +409,7 @@ def test_a_floating_stator_tells_wrong_probes_from_a_shaft_that_gives(changes, s
 def test_springs_that_lose_much_matter_as_far_as_inertia_does(loss, mass, named, monkeypatch):
     monkeypatch.setattr(block_cases, "COMPLIANCE", COMPLIANCE.real * (1 - 1j * loss))
     monkeypatch.setattr(block_cases, "MASS", mass * block_cases.MASS)
-    rig, blocks, truth = made(Case(noise=2e-4))
-    solution = solved(rig, blocks, truth)
+    solution, truth = answered(Case(noise=2e-4))
     assert solution.conditions() == ((named,) if named else ())
     assert held(solution, truth)
 
@@ -445,11 +431,10 @@ def test_springs_much_stiffer_than_usual_and_accelerometers_that_read_rounding_d
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_shaft_that_gives_more_than_the_film_is_no_fault_of_accelerometers(seed):
-    rig, blocks, truth = made(Case(mount="floating", hertz=(25.0, 45.0), noise=2e-4, shaft_gives=1.2e-8), seed)
-    solution = solved(rig, blocks, truth)
+    solution, truth = answered(Case(mount="floating", hertz=(25.0, 45.0), noise=2e-4, shaft_gives=1.2e-8), seed)
     assert not solution.conditions()
     assert held(solution, truth)
-    assert of(solution, "housing").value[4:6] == pytest.approx(12.0, rel=0.05)
+    assert solution.fitted["housing"].value[4:6] == pytest.approx(12.0, rel=0.05)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -458,8 +443,8 @@ def test_a_tilt_between_two_planes_of_sensors_does_no_harm(quantity, mount, seed
     """Of the shaft in three probes, of a housing that pitches in four accelerometers."""
     planes = [0.03, 0.03, -0.03] if quantity == "displacement" else [0.05, 0.05, -0.03, -0.03]
     names = [f"{quantity[0].upper()}{k + 1}" for k in range(len(planes))]
-    described = stated(**{name: {"plane": plane} for name, plane in zip(names, planes)})
-    rig, blocks, truth = made(Case(probes=3, accelerometers=4, mount=mount, **described), seed)
+    described = {name: {"plane": plane} for name, plane in zip(names, planes)}
+    rig, blocks, truth = made(Case(probes=3, accelerometers=4, mount=mount, stated=described), seed)
     rng, z, places = np.random.default_rng(seed), blocks.z.copy(), rig.pick(quantity)
     size = np.linalg.norm(z[:, places[:2]], axis=1)[:, None]
     tilt = 2.0 * size * (rng.standard_normal((len(z), 2)) + 1j * rng.standard_normal((len(z), 2)))
@@ -473,7 +458,7 @@ def test_a_tilt_between_two_planes_of_sensors_does_no_harm(quantity, mount, seed
 
 def test_a_tilt_that_goes_with_the_motion_is_no_contradiction_of_probes():
     planes = dict(zip(("D1", "D2", "D3", "D4"), (0.04, 0.04, -0.025, -0.025), strict=True))
-    rig, blocks, truth = made(Case(probes=4, **stated(**{name: {"plane": plane} for name, plane in planes.items()})))
+    rig, blocks, truth = made(Case(probes=4, stated={name: {"plane": plane} for name, plane in planes.items()}))
     z = blocks.z.copy()
     for j, plane in enumerate(planes.values()):
         z[:, j] *= 1.0 + 5.0 * np.exp(0.4j) * plane
@@ -506,7 +491,7 @@ def test_directions_on_oil_of_two_temperatures_stand_in_the_interval_and_are_tol
 def test_runs_of_one_direction_that_differ_in_temperature_tell_what_it_does(seed):
     case = Case(directions=4, sizes=(1.0, 1.0), warmer=(-2.0, 2.0, -2.0, 2.0, 2.0, -2.0, 2.0, -2.0), thinner=-0.018)
     solution, truth = answered(case, seed)
-    fitted = of(solution, "film temperature")
+    fitted = solution.fitted["film temperature"]
     told_here = fitted.estimated[:8]
     assert told_here[[0, 3, 4, 7]].all()
     assert fitted.value[[0, 3]] == pytest.approx(-0.018, abs=0.003)

@@ -99,8 +99,7 @@ def soft(monkeypatch):
 def doubted(case, seed=0):
     """Rig, its blocks, the truth, and the rig as its frequencies show it."""
     rig, blocks, truth = made(case, seed)
-    solution = solved(rig, blocks, truth)
-    return blocks, truth, learnt_rig(rig, solution)
+    return blocks, truth, learnt_rig(rig, solved(rig, blocks, truth))
 
 
 @pytest.mark.parametrize("seed", seeds(3))

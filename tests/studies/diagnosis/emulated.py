@@ -56,11 +56,7 @@ _WHOLE: dict[str, Axis] = {
     "carryover": (_UP, 0.98),
 }
 #: The same, of every pad; and what all pads do together, beyond that.
-_OF_A_PAD: dict[str, Axis] = {
-    "offset": (_BOTH, 30e-6),
-    "pivot": (_BOTH, 1.6),
-    "bore": (_BOTH, 40e-6),
-}
+_OF_A_PAD: dict[str, Axis] = {"offset": (_BOTH, 30e-6), "pivot": (_BOTH, 1.6), "bore": (_BOTH, 40e-6)}
 #: Beyond this multiple of its range a number has no equilibrium, as in the model something would give out.
 REACH = 1.5
 
