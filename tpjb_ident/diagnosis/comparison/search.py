@@ -17,7 +17,7 @@ from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
 from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
-from tpjb_ident.diagnosis.comparison.scores import Score, scores
+from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
@@ -79,6 +79,7 @@ class _Search:
         self.proposals: dict[frozenset[str], Start] = {}
         self.begun: dict[frozenset[str], float] = {}  #: estimates of coarse starts that were fitted
         self.paths: tuple[Path, ...] = ()
+        self.followed: set[frozenset[str]] = set()  #: leaders beside which all that ended before a jump was fitted anew
         self.moved: set[frozenset[str]] = set()  #: single faults beside which paths were asked
         self.whole = True  #: whether paths are known as far as jumps of K and C ask for
         self.clear = -math.inf  #: coarse estimate from which a start comes before all others [nats]
@@ -102,7 +103,8 @@ class _Search:
             return None
         if not (self._passed or any(map(self._comes_first, self.proposals.values()))):
             self._ask_further_paths()
-        if promising := self._waiting():
+        promising = self._waiting() or (self._begin_again() and self._waiting())
+        if promising:
             return self.proposals.pop(max(promising, key=lambda p: (self._comes_first(p), p.estimate)).labels)
         return None
 
@@ -138,6 +140,27 @@ class _Search:
                 self._lengthen([end * float(path.fault.width[0]) for path in self.paths])
             self._propose_alone()
 
+    def _begin_again(self) -> bool:
+        """Fit what ended before a jump of K and C anew, with the tolerances of a leader that is past it."""
+        leader = self._leader()
+        if leader is None or leader.posterior.scale > Deciding.right or leader.labels in self.followed:
+            return False
+        self.followed.add(leader.labels)
+        for fit in list(self.fits.values()):
+            if len(fit.faults) == len(leader.faults) and fit.posterior.scale > Deciding.right:
+                place, jacobian = fit.linear.theta.copy(), fit.linear.jacobian.copy()
+                both = [
+                    i
+                    for i in leader.unknowns.tolerances - leader.unknowns.amplitudes
+                    if i + fit.unknowns.amplitudes in fit.unknowns.tolerances
+                ]
+                here, there = np.add(both, fit.unknowns.amplitudes), np.add(both, leader.unknowns.amplitudes)
+                place[fit.unknowns.tolerances] = 0.0
+                place[here] = leader.linear.theta[there]
+                jacobian[:, here] = leader.linear.jacobian[:, there]
+                self._fit(Start(fit.faults, place, jacobian, estimate=self._log_probability(fit)))
+        return True
+
     def _promising(self, proposal: Start, leader: Fit) -> bool:
         """Whether a proposal may change the answer: as a rival of a leader, or by a fault beside a right one."""
         total, near, mistaken = self._log_probability(leader), Deciding.near, Deciding.mistaken
@@ -146,12 +169,17 @@ class _Search:
         plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
         if proposal.coarse:
             return plain
+        simpler = [
+            self._log_probability(f) for f in self.fits.values() if f.labels < proposal.labels and self._is_tenable(f)
+        ]
+        if proposal.estimate < max(simpler, default=-math.inf) + math.log(1.0 - Deciding.included):
+            return False
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
             return proposal.estimate > total + math.log(1.0 - Deciding.included)
         # past a jump of K and C scores miss by whatever they miss the leader by
         most = math.inf if leader.labels in self.begun else mistaken
         rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, most))
-        if len(proposal.faults) != len(leader.faults) and not plain:  # scored beside a fit that has risen already
+        if proposal.risen or (len(proposal.faults) != len(leader.faults) and not plain):
             rise = 0.0
         return proposal.estimate > total - near - rise
 
@@ -183,11 +211,12 @@ class _Search:
         if fit is None:
             return
         promised = max(fit.posterior.promised, proposal.estimate - self._log_prior(fit.faults))
-        stopped = promised > fit.posterior.total + Deciding.mistaken and self._near(fit, promised, 0.0)
-        if stopped and fit.faults and proposal.labels not in self.begun:
+        stopped = promised > fit.posterior.total + Deciding.mistaken and self._near(fit, promised, Deciding.near)
+        if stopped and fit.faults and proposal.labels not in self.begun:  # its end lies astray
             self.begun[proposal.labels] = -math.inf
-            coarse = self._reached(replace(proposal, coarse=True))  # its end lies astray
-            fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
+            stated = np.where(np.isin(np.arange(len(proposal.place)), fit.unknowns.tolerances), 0.0, proposal.place)
+            again = replace(proposal, coarse=True), replace(proposal, place=stated)
+            fit = max((fit, *filter(None, map(self._reached, again))), key=lambda f: f.posterior.total)
         earlier = self.fits.get(proposal.labels)
         if earlier is not None and earlier.posterior.total >= fit.posterior.total:
             return
@@ -260,7 +289,7 @@ class _Search:
         """Scores of every fault beside the baseline as stated; coarse: every element off by itself, tolerances held."""
         errors, linear = self.problem.errors, self._stated
         if coarse:
-            errors, linear = errors.coarse, replace(linear, width=Deciding.held * linear.width)
+            errors, linear = errors.coarse(), replace(linear, width=Deciding.held * linear.width)
         return scores(errors, linear, self.paths, self.fits[frozenset()].strain)
 
     def _propose_alone(self) -> float:
@@ -278,13 +307,35 @@ class _Search:
         return scale
 
     def _propose_neighbours(self, fit: Fit, paths: Sequence[Path] = ()) -> None:
-        """One fault more, by paths from where it is if these are known, and one less."""
+        """One fault more, by paths from where it is if these are known, one less, and another in one's place."""
         if len(fit.faults) < len(Deciding.prior) - 1:
             further = [self._beside(path, fit) for path in paths or self.paths if path.fault.label not in fit.labels]
-            for score in scores(self.problem.errors, fit.linear, further, fit.strain):
-                self._propose(replace(score, total=score.total - fit.posterior.refused), fit.faults, fit.linear)
+            self._propose_scored(fit, further, fit.strain, (fit.faults, fit.linear))
+        # what tolerances say: what looks alike lies past the same jumps of K and C, with tolerances where they are
+        rivals = [
+            path for path in self.paths if path.fault.label not in fit.labels and self.problem.said_by(path.fault)
+        ]
         for fault in fit.faults:
-            self._propose_without(fit, fault)
+            faults, linear = self._without(fit, fault)
+            state = posterior(self.problem.errors, linear)
+            estimate = state.promised - fit.posterior.refused + self._log_prior(faults)
+            self._offer(Start(faults, state.mean, linear.jacobian, estimate=estimate))
+            if rivals:
+                rows = fit.strain.rows if fault.own >= 0 else np.delete(fit.strain.rows, fit.place_of(fault), axis=1)
+                local = [self._beside(path, fit) for path in rivals]
+                self._propose_scored(fit, local, replace(fit.strain, rows=rows), (faults, linear), risen=True)
+
+    def _propose_scored(
+        self,
+        fit: Fit,
+        paths: Sequence[Path],
+        strain: Strain,
+        model: tuple[tuple[Fault, ...], Linear],
+        risen: bool = False,
+    ) -> None:
+        """Score one fault more beside a model that a fit led to; what that one promised and did not keep counts not."""
+        for score in scores(self.problem.errors, model[1], paths, strain):
+            self._propose(replace(score, total=score.total - fit.posterior.refused), *model, risen=risen)
 
     def _beside(self, path: Path, fit: Fit) -> Path:
         """A path beside a fit: what tolerances say has their derivatives there, which large faults change."""
@@ -294,10 +345,12 @@ class _Search:
         columns = fit.linear.jacobian[:, fit.unknowns.amplitudes :]
         return Path(path.fault, np.sum([share * columns[:, i] for i, share in members.items()], axis=0)[:, None])
 
-    def _propose(self, score: Score, faults: tuple[Fault, ...], linear: Linear, coarse: bool = False) -> None:
+    def _propose(
+        self, score: Score, faults: tuple[Fault, ...], linear: Linear, coarse: bool = False, risen: bool = False
+    ) -> None:
         """Add a fault to a model."""
         if np.any(score.amplitudes):
-            self._offer(self._with(score, faults, linear, coarse))
+            self._offer(replace(self._with(score, faults, linear, coarse), risen=risen))
 
     def _with(self, score: Score, faults: tuple[Fault, ...], linear: Linear, coarse: bool = False) -> Start:
         """A model with one fault more."""
@@ -319,20 +372,13 @@ class _Search:
         wanted[at] = score.amplitudes  # counted from where nothing happens: what its tolerance had found is in it
         return Start(faults, wanted, jacobian, coarse, estimate)
 
-    def _propose_without(self, fit: Fit, fault: Fault) -> None:
-        """Take a fault from a model."""
-        faults, linear = self._without(fit, fault)
-        state = posterior(self.problem.errors, linear)
-        estimate = state.promised - fit.posterior.refused + self._log_prior(faults)
-        self._offer(Start(faults, state.mean, linear.jacobian, estimate=estimate))
-
     def _without(self, fit: Fit, fault: Fault) -> tuple[tuple[Fault, ...], Linear]:
-        """A model without one of its faults, whose tolerance has its stated prior again and stays where it is."""
+        """A model without one of its faults, whose tolerance has its stated prior again, and is as stated."""
         faults = tuple(f for f in fit.faults if f is not fault)
-        linear, at = fit.linear, fit.unknowns.slices[fit.faults.index(fault)]
-        residual, theta, jacobian = linear.residual, linear.theta, linear.jacobian
+        linear, at = fit.linear, fit.place_of(fault)
+        theta, jacobian = linear.theta.copy(), linear.jacobian
+        residual, theta[at] = linear.residual + jacobian[:, at] @ theta[at], 0.0
         if fault.own < 0:
-            residual = residual + jacobian[:, at] @ theta[at]
             theta, jacobian = np.delete(theta, at), np.delete(jacobian, at, axis=1)
         return faults, Linear(residual, theta, jacobian, Unknowns(self.problem, faults).width)
 
