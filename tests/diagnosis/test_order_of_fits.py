@@ -374,20 +374,3 @@ def test_another_fault_is_tried_in_the_place_of_one_with_the_tolerances_where_th
     residual = wide.residual + linear.jacobian[:, 2] * 6.0
     model = Linear(residual, np.append(at_leader.theta, 0.0), both, np.append(linear.width, rival.fault.width))
     assert score.total == pytest.approx(posterior(errors, model).promised, abs=1e-6)
-
-
-def test_what_ended_before_a_jump_begins_again_with_the_tolerances_of_a_leader_that_is_past_it():
-    tried = stub_search(total=0.0, estimate=0.0)
-    stuck, begun = stub_fit(-90.0, frozenset("b")), []
-    for fit, theta, scale in ((tried._leader(), [9.0, 1.0, 2.0, 3.0], 0.1), (stuck, [0.4, 0.5, 5.0, 0.6], 1.2)):
-        fit.posterior.scale, fit.linear = scale, SimpleNamespace(theta=np.array(theta), jacobian=np.outer([1.0], theta))
-    # the leader's own number comes before all tolerances, that of the other one is the second of them
-    tried._leader().unknowns = SimpleNamespace(amplitudes=1, tolerances=np.array([1, 2, 3]))
-    stuck.linear.theta, stuck.linear.jacobian = stuck.linear.theta[1:], stuck.linear.jacobian[:, 1:]
-    stuck.unknowns = SimpleNamespace(amplitudes=0, tolerances=np.array([0, 2]))
-    tried.fits, tried.followed, tried._fit = {stuck.labels: stuck}, set(), begun.append
-    assert tried._begin_again()
-    assert not tried._begin_again()  # once for every leader
-    (start,) = begun
-    np.testing.assert_array_equal(start.place, [1.0, 5.0, 3.0])
-    np.testing.assert_array_equal(start.jacobian, [[1.0, 5.0, 3.0]])

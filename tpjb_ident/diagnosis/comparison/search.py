@@ -79,7 +79,6 @@ class _Search:
         self.proposals: dict[frozenset[str], Start] = {}
         self.begun: dict[frozenset[str], float] = {}  #: estimates of coarse starts that were fitted
         self.paths: tuple[Path, ...] = ()
-        self.followed: set[frozenset[str]] = set()  #: leaders beside which all that ended before a jump was fitted anew
         self.moved: set[frozenset[str]] = set()  #: single faults beside which paths were asked
         self.whole = True  #: whether paths are known as far as jumps of K and C ask for
         self.clear = -math.inf  #: coarse estimate from which a start comes before all others [nats]
@@ -103,8 +102,7 @@ class _Search:
             return None
         if not (self._passed or any(map(self._comes_first, self.proposals.values()))):
             self._ask_further_paths()
-        promising = self._waiting() or (self._begin_again() and self._waiting())
-        if promising:
+        if promising := self._waiting():
             return self.proposals.pop(max(promising, key=lambda p: (self._comes_first(p), p.estimate)).labels)
         return None
 
@@ -139,27 +137,6 @@ class _Search:
             for end in (-1.0, 1.0):
                 self._lengthen([end * float(path.fault.width[0]) for path in self.paths])
             self._propose_alone()
-
-    def _begin_again(self) -> bool:
-        """Fit what ended before a jump of K and C anew, with the tolerances of a leader that is past it."""
-        leader = self._leader()
-        if leader is None or leader.posterior.scale > Deciding.right or leader.labels in self.followed:
-            return False
-        self.followed.add(leader.labels)
-        for fit in list(self.fits.values()):
-            if len(fit.faults) == len(leader.faults) and fit.posterior.scale > Deciding.right:
-                place, jacobian = fit.linear.theta.copy(), fit.linear.jacobian.copy()
-                both = [
-                    i
-                    for i in leader.unknowns.tolerances - leader.unknowns.amplitudes
-                    if i + fit.unknowns.amplitudes in fit.unknowns.tolerances
-                ]
-                here, there = np.add(both, fit.unknowns.amplitudes), np.add(both, leader.unknowns.amplitudes)
-                place[fit.unknowns.tolerances] = 0.0
-                place[here] = leader.linear.theta[there]
-                jacobian[:, here] = leader.linear.jacobian[:, there]
-                self._fit(Start(fit.faults, place, jacobian, estimate=self._log_probability(fit)))
-        return True
 
     def _promising(self, proposal: Start, leader: Fit) -> bool:
         """Whether a proposal may change the answer: as a rival of a leader, or by a fault beside a right one."""
@@ -214,9 +191,8 @@ class _Search:
         stopped = promised > fit.posterior.total + Deciding.mistaken and self._near(fit, promised, Deciding.near)
         if stopped and fit.faults and proposal.labels not in self.begun:  # its end lies astray
             self.begun[proposal.labels] = -math.inf
-            stated = np.where(np.isin(np.arange(len(proposal.place)), fit.unknowns.tolerances), 0.0, proposal.place)
-            again = replace(proposal, coarse=True), replace(proposal, place=stated)
-            fit = max((fit, *filter(None, map(self._reached, again))), key=lambda f: f.posterior.total)
+            coarse = self._reached(replace(proposal, coarse=True))
+            fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
         earlier = self.fits.get(proposal.labels)
         if earlier is not None and earlier.posterior.total >= fit.posterior.total:
             return
