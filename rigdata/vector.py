@@ -49,10 +49,10 @@ def _inverse(axes: tuple[float, ...], planes: tuple[float, ...]) -> FloatArray:
 def channels_vector(channels: Sequence[Any], values: ComplexArray | FloatArray) -> ComplexArray:
     """X and Y (.., 2) of values (.., m) of the channels of one quantity, by least squares; NaN where they tell none."""
     axes, planes = _places(channels)
-    values = np.asarray(values, complex)
-    if axes and np.isfinite(values).all():
-        return values @ _inverse(axes, planes).T
-    return plane_vector(directions(axes), values, np.array(planes))
+    readings: ComplexArray = np.asarray(values, complex)
+    if axes and np.isfinite(readings).all():
+        return readings @ _inverse(axes, planes).T
+    return plane_vector(directions(axes), readings, np.array(planes))
 
 
 def vector_rows(channels: Sequence[Channel], readings: Sequence[FloatArray]) -> FloatArray:

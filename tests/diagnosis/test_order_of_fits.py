@@ -184,7 +184,7 @@ def test_what_a_refused_step_promised_counts_for_no_explanation_beside(monkeypat
     state = posterior(errors, linear)
     assert state.refused == state.promised - state.total > 0.0
     totals = []
-    monkeypatch.setattr(search._Search, "_propose", lambda self, score, *_: totals.append(score.total))
+    monkeypatch.setattr(search._Search, "_propose", lambda self, score, *_, **words: totals.append(score.total))
     for refused in (0.0, 7.0):
         problem = SimpleNamespace(errors=errors, said_by=lambda fault: {})
         fit = SimpleNamespace(
@@ -205,7 +205,7 @@ def test_no_fault_at_all_is_proposed_from_where_a_single_one_leads(monkeypatch):
     tried._propose_neighbours(
         SimpleNamespace(
             labels=frozenset({"own"}), faults=(fault,), linear=linear, strain=None,
-            unknowns=SimpleNamespace(slices=[slice(2, 3)]), posterior=posterior(errors, linear),
+            place_of=lambda fault: slice(2, 3), posterior=posterior(errors, linear),
         )
     )  # fmt: skip
     (nothing,) = proposals
@@ -319,7 +319,7 @@ def test_what_a_leader_rose_by_is_allowed_to_rivals_of_as_many_faults(labels, es
     tried = stub_search(total=0.0, estimate=-risen)
     tried.begun = {frozenset("a"): 0.0} if past_jump else {}
     rival = stub_fit(0.0, frozenset(labels))
-    proposal = SimpleNamespace(labels=rival.labels, faults=rival.faults, estimate=estimate, coarse=False)
+    proposal = SimpleNamespace(labels=rival.labels, faults=rival.faults, estimate=estimate, coarse=False, risen=False)
     assert tried._promising(proposal, tried._leader()) == fitted
 
 
@@ -338,3 +338,39 @@ def test_a_start_that_would_lead_takes_the_place_of_a_coarse_one_though_nothing_
     tried.proposals, tried.begun = {labels: coarse}, {}
     tried._offer(plain)
     assert tried.proposals[labels] is {"plain": plain, "coarse": coarse}[kept]
+
+
+@pytest.mark.parametrize(("estimate", "fitted"), [(-3.5, True), (-4.5, False)])
+def test_what_cannot_take_the_certainty_of_a_simpler_fit_is_not_fitted(estimate, fitted):
+    # beside one of two that lead alike as little as beside the other
+    tried = stub_search(total=0.0, estimate=0.0)
+    tried._is_tenable = lambda fit: True
+    tried.fits = {frozenset("b"): stub_fit(-1.0, frozenset("b"))}
+    rival = stub_fit(0.0, frozenset("bc"))
+    proposal = SimpleNamespace(labels=rival.labels, faults=rival.faults, estimate=estimate, coarse=False, risen=False)
+    assert tried._promising(proposal, tried._leader()) == fitted
+
+
+def test_another_fault_is_tried_in_the_place_of_one_with_the_tolerances_where_they_are(monkeypatch):
+    # oil and inlet look alike past a jump of K and C, where neither's path from the baseline leads
+    errors, linear, _ = linear_case([0.3])
+    leader, rival = SimpleNamespace(label="inlet", own=2), straight(np.zeros(40), "oil")
+    wide = Linear(linear.residual, np.array([0.1, 0.0, 6.0, 0.2, 0.0]), linear.jacobian, linear.width * [1, 1, 9, 1, 1])
+    monkeypatch.setattr(search, "Unknowns", lambda problem, faults: SimpleNamespace(width=linear.width))
+    offered = []
+    monkeypatch.setattr(search._Search, "_propose", lambda self, *score, **words: offered.append((*score, words)))
+    problem = SimpleNamespace(errors=errors, said_by=lambda fault: {3: 1.0})
+    tried = search_with(paths=(rival,), problem=problem, _offer=lambda start: None, _log_prior=lambda faults: 0.0)
+    fit = SimpleNamespace(
+        labels=frozenset({"inlet"}), faults=(leader,), linear=wide, strain=Strain(np.zeros((0, 5)), np.zeros(0)),
+        place_of=lambda fault: slice(2, 3), posterior=SimpleNamespace(refused=0.0),
+        unknowns=SimpleNamespace(amplitudes=0),
+    )  # fmt: skip
+    tried._propose_neighbours(fit)
+    (score, faults, at_leader, words) = offered[-1]
+    assert (score.path.fault.label, faults, words) == ("oil", (), {"risen": True})
+    np.testing.assert_array_equal(at_leader.theta, [0.1, 0.0, 0.0, 0.2, 0.0])
+    both = np.column_stack([linear.jacobian, linear.jacobian[:, 3]])
+    residual = wide.residual + linear.jacobian[:, 2] * 6.0
+    model = Linear(residual, np.append(at_leader.theta, 0.0), both, np.append(linear.width, rival.fault.width))
+    assert score.total == pytest.approx(posterior(errors, model).promised, abs=1e-6)

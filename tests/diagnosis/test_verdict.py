@@ -253,9 +253,17 @@ def test_a_group_of_look_alikes_begins_with_the_effect_that_is_listed():
     # the most probable model need not hold the likeliest name: others stand beside that
     held = held_out(2.0)
     held.fit.names, held.fit.has_terms = frozenset({"oil_viscosity"}), False
-    judgement = look_alikes(held, ("supply_temperature", "oil_viscosity", "viscosity_law"))
+    judgement = look_alikes(held, ("supply_temperature", "oil_viscosity", "viscosity_law"), {})
     assert judgement.name == "ambiguous"
     assert judgement.family == ("oil_viscosity", "supply_temperature", "viscosity_law")
+
+
+def test_where_no_group_can_be_named_the_likeliest_names_are_said():
+    # pads 8 deviations too short are as well oil, inlet, arc: several effects close the gap, and no name is due
+    shares = {"pad_arc_error": 0.3, "oil_viscosity": 0.4, "pad_length_error": 0.2}
+    judgement = look_alikes(held_out(2.0), (), shares)
+    assert judgement.name == "unexplained"
+    assert judgement.reasons[0].endswith("(likeliest: oil_viscosity, pad_arc_error, pad_length_error)")
 
 
 @pytest.mark.parametrize(

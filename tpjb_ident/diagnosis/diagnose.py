@@ -96,7 +96,8 @@ def _next_test(run: Map, decision: Decision, comparison: Comparison, setup: Setu
         return "none needed"
     if not verdict.effects:
         worst = verdict.disagreement[0]
-        return f"repeat {worst.observable} at {worst.where}, where the unknown shows most, with another sensor set"
+        where = f"at {worst.where}, where the unknown shows most," if worst.where != "everywhere" else "everywhere"
+        return f"repeat {worst.observable} {where} with another sensor set"
     rivals = _rivals(comparison, model)
     if not rivals:
         return ""

@@ -60,7 +60,6 @@ def verdict_sentences(
             name=name,
             verdict=verdict,
             deviations=deviations,
-            worst=max(deviations, key=lambda c: abs(deviations[c][0])) if deviations else "",
             direct=DIRECT,
             rivals=list(itertools.chain(*(group[1:] for group in verdict.indistinguishable))),
             checks=dict.fromkeys(word.check for word in words if word),
@@ -137,7 +136,7 @@ def next_command(source: Sequence[object], verdict: Verdict, folder: Path) -> li
         return ["compare", *source, "--effects", folder / "updated.effects.toml"]
     if verdict.verdict == "consistent":
         return ["export", folder, "--to", "ross"]
-    return ["compare", *source, "--pivots", "measured"]
+    return ["compare", *source]
 
 
 def parameter_rows(verdict: Verdict) -> list[list[str]]:

@@ -73,6 +73,10 @@ class Fit:
         """The effects at their fitted sizes."""
         return self.unknowns.effects(self.linear.theta)
 
+    def place_of(self, fault: Fault) -> slice:
+        """Where the numbers of one of its faults are."""
+        return self.unknowns.slices[self.faults.index(fault)]
+
     @property
     def amplitudes(self) -> tuple[FloatArray, ...]:
         """Posterior means of every fault's amplitudes, within their bounds."""
@@ -112,10 +116,11 @@ class Fit:
                 labels.append(fault.label)
         return tuple(labels)
 
-    def needs_more(self, scale: float) -> bool:
-        """Whether the data speak for a larger model error than this: more than its prior does."""
+    @property
+    def needs_more(self) -> bool:
+        """Whether the data speak for a larger model error than is stated: more than its prior does."""
         errors = self.problem.errors
-        wrong = errors.scales > scale
+        wrong = errors.scales > Deciding.trusted
         return float(self.posterior.weights[wrong].sum()) > float(np.exp(errors.log_weights[wrong]).sum())
 
     @functools.cached_property
@@ -176,6 +181,7 @@ class Start:
     jacobian: FloatArray = field(repr=False)
     coarse: bool = False  #: past jumps of K and C first: every element off by itself, tolerances held
     estimate: float = 0.0  #: log p(y, model) to first order [nats]
+    risen: bool = False  #: scored in the place of a fault whose fit has risen already
 
     @property
     def labels(self) -> frozenset[str]:
@@ -207,12 +213,14 @@ def _solved(run: Map, unknowns: Unknowns, start: Start) -> Linear | None:
 
 def _past_jumps(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
     """A coarse start: every element off by itself, tolerances held at first."""
-    held, coarse = unknowns.width.copy(), unknowns.problem.errors.coarse
+    held, errors = unknowns.width.copy(), unknowns.problem.errors
     held[unknowns.tolerances] = Deciding.held
     # those from before the jump say nothing behind it; of tolerances that are held little is asked
     linear = _renewed(run, unknowns, linear, unknowns.of_faults)
-    linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
-    return _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
+    linear = replace(_stepped(run, unknowns, replace(linear, width=held), errors.coarse()), width=unknowns.width)
+    for size in (1.0, 0.3, 0.1):
+        linear = _stepped(run, unknowns, linear, errors.coarse(size))
+    return linear
 
 
 def refined(run: Map, fit: Fit) -> Fit:

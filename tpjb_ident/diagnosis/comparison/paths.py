@@ -66,9 +66,8 @@ class Path:
         `pull` (c,) and `square` (c, c): columns' products with the residual and with each other.
         """
         _, width, low, high = self.fault.prior
-        low, high = np.maximum(low, -width), np.minimum(high, width)
         if self.nodes is not None:
-            return np.linspace(low, high, _POINTS)
+            return np.linspace(np.maximum(low, -width), np.minimum(high, width), _POINTS)
         return np.clip(np.linalg.solve(square + np.diag(1.0 / width**2), pull), low, high)[None, :]
 
 

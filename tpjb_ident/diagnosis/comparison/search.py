@@ -17,7 +17,7 @@ from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
 from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
-from tpjb_ident.diagnosis.comparison.scores import Score, scores
+from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
@@ -146,12 +146,17 @@ class _Search:
         plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
         if proposal.coarse:
             return plain
+        simpler = [
+            self._log_probability(f) for f in self.fits.values() if f.labels < proposal.labels and self._is_tenable(f)
+        ]
+        if proposal.estimate < max(simpler, default=-math.inf) + math.log(1.0 - Deciding.included):
+            return False
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
             return proposal.estimate > total + math.log(1.0 - Deciding.included)
         # past a jump of K and C scores miss by whatever they miss the leader by
         most = math.inf if leader.labels in self.begun else mistaken
         rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, most))
-        if len(proposal.faults) != len(leader.faults) and not plain:  # scored beside a fit that has risen already
+        if proposal.risen or (len(proposal.faults) != len(leader.faults) and not plain):
             rise = 0.0
         return proposal.estimate > total - near - rise
 
@@ -183,10 +188,10 @@ class _Search:
         if fit is None:
             return
         promised = max(fit.posterior.promised, proposal.estimate - self._log_prior(fit.faults))
-        stopped = promised > fit.posterior.total + Deciding.mistaken and self._near(fit, promised, 0.0)
-        if stopped and fit.faults and proposal.labels not in self.begun:
+        stopped = promised > fit.posterior.total + Deciding.mistaken and self._near(fit, promised, Deciding.near)
+        if stopped and fit.faults and proposal.labels not in self.begun:  # its end lies astray
             self.begun[proposal.labels] = -math.inf
-            coarse = self._reached(replace(proposal, coarse=True))  # its end lies astray
+            coarse = self._reached(replace(proposal, coarse=True))
             fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
         earlier = self.fits.get(proposal.labels)
         if earlier is not None and earlier.posterior.total >= fit.posterior.total:
@@ -260,7 +265,7 @@ class _Search:
         """Scores of every fault beside the baseline as stated; coarse: every element off by itself, tolerances held."""
         errors, linear = self.problem.errors, self._stated
         if coarse:
-            errors, linear = errors.coarse, replace(linear, width=Deciding.held * linear.width)
+            errors, linear = errors.coarse(), replace(linear, width=Deciding.held * linear.width)
         return scores(errors, linear, self.paths, self.fits[frozenset()].strain)
 
     def _propose_alone(self) -> float:
@@ -278,13 +283,35 @@ class _Search:
         return scale
 
     def _propose_neighbours(self, fit: Fit, paths: Sequence[Path] = ()) -> None:
-        """One fault more, by paths from where it is if these are known, and one less."""
+        """One fault more, by paths from where it is if these are known, one less, and another in one's place."""
         if len(fit.faults) < len(Deciding.prior) - 1:
             further = [self._beside(path, fit) for path in paths or self.paths if path.fault.label not in fit.labels]
-            for score in scores(self.problem.errors, fit.linear, further, fit.strain):
-                self._propose(replace(score, total=score.total - fit.posterior.refused), fit.faults, fit.linear)
+            self._propose_scored(fit, further, fit.strain, (fit.faults, fit.linear))
+        # what tolerances say: what looks alike lies past the same jumps of K and C, with tolerances where they are
+        rivals = [
+            path for path in self.paths if path.fault.label not in fit.labels and self.problem.said_by(path.fault)
+        ]
         for fault in fit.faults:
-            self._propose_without(fit, fault)
+            faults, linear = self._without(fit, fault)
+            state = posterior(self.problem.errors, linear)
+            estimate = state.promised - fit.posterior.refused + self._log_prior(faults)
+            self._offer(Start(faults, state.mean, linear.jacobian, estimate=estimate))
+            if rivals:
+                rows = fit.strain.rows if fault.own >= 0 else np.delete(fit.strain.rows, fit.place_of(fault), axis=1)
+                local = [self._beside(path, fit) for path in rivals]
+                self._propose_scored(fit, local, replace(fit.strain, rows=rows), (faults, linear), risen=True)
+
+    def _propose_scored(
+        self,
+        fit: Fit,
+        paths: Sequence[Path],
+        strain: Strain,
+        model: tuple[tuple[Fault, ...], Linear],
+        risen: bool = False,
+    ) -> None:
+        """Score one fault more beside a model that a fit led to; what that one promised and did not keep counts not."""
+        for score in scores(self.problem.errors, model[1], paths, strain):
+            self._propose(replace(score, total=score.total - fit.posterior.refused), *model, risen=risen)
 
     def _beside(self, path: Path, fit: Fit) -> Path:
         """A path beside a fit: what tolerances say has their derivatives there, which large faults change."""
@@ -294,10 +321,12 @@ class _Search:
         columns = fit.linear.jacobian[:, fit.unknowns.amplitudes :]
         return Path(path.fault, np.sum([share * columns[:, i] for i, share in members.items()], axis=0)[:, None])
 
-    def _propose(self, score: Score, faults: tuple[Fault, ...], linear: Linear, coarse: bool = False) -> None:
+    def _propose(
+        self, score: Score, faults: tuple[Fault, ...], linear: Linear, coarse: bool = False, risen: bool = False
+    ) -> None:
         """Add a fault to a model."""
         if np.any(score.amplitudes):
-            self._offer(self._with(score, faults, linear, coarse))
+            self._offer(replace(self._with(score, faults, linear, coarse), risen=risen))
 
     def _with(self, score: Score, faults: tuple[Fault, ...], linear: Linear, coarse: bool = False) -> Start:
         """A model with one fault more."""
@@ -319,20 +348,13 @@ class _Search:
         wanted[at] = score.amplitudes  # counted from where nothing happens: what its tolerance had found is in it
         return Start(faults, wanted, jacobian, coarse, estimate)
 
-    def _propose_without(self, fit: Fit, fault: Fault) -> None:
-        """Take a fault from a model."""
-        faults, linear = self._without(fit, fault)
-        state = posterior(self.problem.errors, linear)
-        estimate = state.promised - fit.posterior.refused + self._log_prior(faults)
-        self._offer(Start(faults, state.mean, linear.jacobian, estimate=estimate))
-
     def _without(self, fit: Fit, fault: Fault) -> tuple[tuple[Fault, ...], Linear]:
-        """A model without one of its faults, whose tolerance has its stated prior again and stays where it is."""
+        """A model without one of its faults, whose tolerance has its stated prior again, and is as stated."""
         faults = tuple(f for f in fit.faults if f is not fault)
-        linear, at = fit.linear, fit.unknowns.slices[fit.faults.index(fault)]
-        residual, theta, jacobian = linear.residual, linear.theta, linear.jacobian
+        linear, at = fit.linear, fit.place_of(fault)
+        theta, jacobian = linear.theta.copy(), linear.jacobian
+        residual, theta[at] = linear.residual + jacobian[:, at] @ theta[at], 0.0
         if fault.own < 0:
-            residual = residual + jacobian[:, at] @ theta[at]
             theta, jacobian = np.delete(theta, at), np.delete(jacobian, at, axis=1)
         return faults, Linear(residual, theta, jacobian, Unknowns(self.problem, faults).width)
 

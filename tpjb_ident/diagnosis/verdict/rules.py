@@ -1,7 +1,7 @@
 """Rules: what a comparison says, in their order. Constants and what set them: `Deciding`."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from tpjb_ident.diagnosis.comparison.fit import Fit
@@ -11,6 +11,9 @@ from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.verdict.behaviour import Drift, drifts
 from tpjb_ident.diagnosis.verdict.held_out import HeldOut, held_out_gap
 from tpjb_ident.diagnosis.verdict.verdict import VerdictName
+
+#: Names that are said to be the likeliest where none can be named.
+_LISTED = 5
 
 
 @dataclass(frozen=True)
@@ -45,16 +48,13 @@ def judge(run: Map, comparison: Comparison) -> Judgement:
 def _of_model(comparison: Comparison, sure: frozenset[str], held: HeldOut, drift: Sequence[Drift]) -> Judgement:
     """What is said of the model that counts: the one with exactly the sure names, or the most probable one."""
     model = held.fit
-    if model.needs_more(Deciding.right):
-        reason = (
-            f"the best explanation ({model.label}) leaves a model error of {model.posterior.scale:.2f} times the "
-            f"stated one; right ones need {Deciding.right:g} at the most, unless the model is wrong by that: then "
-            "state a larger model tolerance"
-        )
+    if model.needs_more:
+        size = f"a model error of {model.posterior.scale:.2f} times the stated one"
+        reason = f"the best explanation ({model.label}) leaves {size}, more than the model is trusted to"
     elif model not in comparison.tenable:
         reason = _untenable(model)
     elif model.names != sure:
-        return look_alikes(held, _family(comparison, sure))
+        return look_alikes(held, _family(comparison, sure), comparison.shares)
     elif model.faults and all(fault.is_term for fault in model.faults):
         reason = "what describes it is a term that no effect of the library stands for"
     else:
@@ -64,7 +64,7 @@ def _of_model(comparison: Comparison, sure: frozenset[str], held: HeldOut, drift
 
 def _without_effects(held: HeldOut) -> Judgement:
     nothing = held.fit
-    if not nothing.needs_more(Deciding.trusted):
+    if not nothing.needs_more:
         reason = f"no disagreement beyond noise and stated tolerances (p = {nothing.p:.2g})"
         return Judgement("consistent", held, (reason,))
     reason = (
@@ -107,10 +107,11 @@ def _places(comparison: Comparison, model: Fit) -> tuple[str, ...]:
     return tuple(label for label in listed if label not in shared)[: Deciding.family]
 
 
-def look_alikes(held: HeldOut, family: tuple[str, ...]) -> Judgement:
+def look_alikes(held: HeldOut, family: tuple[str, ...], shares: Mapping[str, float]) -> Judgement:
     """The most probable model with what a campaign cannot tell from it, which sentences count from the second on."""
     if not family or held.fit.has_terms:
-        reason = "no effect, and no group of three, reaches the probability that a name takes"
+        likeliest = ", ".join(sorted(shares, key=lambda name: -shares[name])[:_LISTED])
+        reason = f"no effect, and no group of three, reaches the probability that a name takes (likeliest: {likeliest})"
         return Judgement("unexplained", held, (reason,))
     listed_first = tuple(sorted(family, key=lambda name: name not in held.fit.names))
     return Judgement("ambiguous", held, (_shrunk(held),), listed_first)
