@@ -96,11 +96,13 @@ def measured(one: Bench, hidden: Sequence[Effect], size: FloatArray, growth: flo
     return value
 
 
-def noise(observations: Observations, value: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Noise of identification, and a smooth difference of the models."""
+def noise(
+    observations: Observations, value: FloatArray, rng: np.random.Generator, shares: Sequence[float] = SMOOTH
+) -> FloatArray:
+    """Noise of identification, and a smooth difference of the models between two shares of a coefficient."""
     scale = direct_scale(observations.elements, value)
     smooth = np.zeros(len(value))
-    size = rng.uniform(*SMOOTH)
+    size = rng.uniform(*shares)
     for name in dict.fromkeys(e.observable for e in observations.elements if e.family == "h"):
         mine = np.array([e.observable == name for e in observations.elements])
         a, b = rng.standard_normal(2)

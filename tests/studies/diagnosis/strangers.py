@@ -1,6 +1,7 @@
 """Strangers: bearings, plans and faults by a generator that nothing of the decision was made for.
 
-    python -m tests.studies.diagnosis.strangers [--bearings 8] [--count 30] [--seed 0] [--rows FILE] [--write]
+    python -m tests.studies.diagnosis.strangers [--first 0] [--bearings 8] [--count 30] [--seed 0] [--rows FILE]
+        [--least 0.0005] [--most 0.002] [--write]
 
 Every bearing is drawn: 3 to 6 pads, load on or between them, central or offset pivots, journals of 60 to 250 mm, five
 oils. Every plan is drawn: 2 to 12 operating points, one or two speeds, with or without locus, polygon, dry tests and
@@ -8,7 +9,8 @@ thermometers. What is stated scatters as stated, uncut. Kinds: ``scatter``; ``on
 ``channel`` (one probe, cell or thermometer, one pad's bore); ``file`` (pivots elsewhere along the arc, the next oil
 grade); a third lies ``outside`` (an effect taken out of the library, a cross-coupled stiffness, growth in proportion to
 the load), some with an effect of the library ``beside``. Truth and fits share one emulator of the model (additive in
-the logarithms of K and C), so that the decision is tested and not the model.
+the logarithms of K and C), so that the decision is tested and not the model; the model is wrong smoothly by a share of
+K and C between ``--least`` and ``--most``.
 """
 
 from __future__ import annotations
@@ -27,7 +29,18 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
-from tests.studies.diagnosis.bench import SKIPPED, Bench, Drawn, hidden, measured, noise, said, seen_sizes, solve
+from tests.studies.diagnosis.bench import (
+    SKIPPED,
+    SMOOTH,
+    Bench,
+    Drawn,
+    hidden,
+    measured,
+    noise,
+    said,
+    seen_sizes,
+    solve,
+)
 from tests.studies.diagnosis.emulated import emulate
 from tests.studies.diagnosis.tables import tables
 from tests.studies.results import Rows, report, study_parser
@@ -218,7 +231,7 @@ def _sized(able: Sequence[Candidate], rng: np.random.Generator) -> Effect:
     return Effect(one.name, **parameters)
 
 
-def draw(one: Stranger, kind: str, rng: np.random.Generator) -> Drawn | None:
+def draw(one: Stranger, kind: str, rng: np.random.Generator, smooth: Sequence[float] = SMOOTH) -> Drawn | None:
     """Draw a campaign; None where it has no equilibrium, or a fault of the library that nothing could see."""
     bench, problem = one.bench, one.bench.problem
     truth = faults(one, kind, rng)
@@ -249,17 +262,19 @@ def draw(one: Stranger, kind: str, rng: np.random.Generator) -> Drawn | None:
     seen = [float(np.linalg.norm(np.linalg.solve(factor, change))) for change in changes]
     if min(seen, default=ASKED) < ASKED:
         return None
-    observations = replace(problem.observations, value=value + noise(problem.observations, value, rng))
+    observations = replace(problem.observations, value=value + noise(problem.observations, value, rng, smooth))
     return Drawn(
         tuple(truth), outside, replace(problem, observations=observations, pool=pool), tuple(s**2 for s in seen), size,
         tuple(everything), growth,
     )  # fmt: skip
 
 
-def run(one: Stranger, number: int, seed: int, settings: DiagnoseSettings) -> dict[str, Any] | None:
+def run(
+    one: Stranger, number: int, seed: int, settings: DiagnoseSettings, smooth: Sequence[float] = SMOOTH
+) -> dict[str, Any] | None:
     """Draw and diagnose one campaign; a flat row with what came out."""
     rng, kind = np.random.default_rng([seed, number, 140]), KINDS[seed % len(KINDS)]
-    drawn = next((d for d in (draw(one, kind, rng) for _ in range(12)) if d is not None), None)
+    drawn = next((d for d in (draw(one, kind, rng, smooth) for _ in range(12)) if d is not None), None)
     if drawn is None:
         return None
     began = time.process_time()
@@ -276,14 +291,16 @@ def run(one: Stranger, number: int, seed: int, settings: DiagnoseSettings) -> di
 
 def main() -> None:
     """Draw, diagnose, and print the tables; rows that are there are not drawn again."""
-    options = {"bearings": 8, "count": 30, "seed": 0, "rows": Path("strangers.jsonl")}
+    low, high = SMOOTH
+    rows = Path("strangers.jsonl")
+    options = {"first": 0, "bearings": 8, "count": 30, "seed": 0, "rows": rows, "least": low, "most": high}
     asked = study_parser(__doc__, **options).parse_args()
     settings, stored = DiagnoseSettings(workers=1, skip=SKIPPED), Rows(asked.rows, "bearing", "seed")
-    for number in range(asked.bearings):
+    for number in range(asked.first, asked.first + asked.bearings):
         missing = [seed for seed in range(asked.seed, asked.seed + asked.count) if (number, seed) not in stored.known]
         one = stranger(number, asked.rows.parent) if missing else None
         for seed in missing:
-            row = None if one is None else run(one, number, seed, settings)
+            row = None if one is None else run(one, number, seed, settings, (asked.least, asked.most))
             if row is not None:
                 stored.add(row)
     report(asked, "strangers", tables([*stored.known.values()]))
