@@ -10,10 +10,8 @@ with open_workers(count=4) as workers:   # or open_workers(scheduler="tcp://host
 ```
 """
 
-import collections
 import functools
 import gc
-import itertools
 import multiprocessing
 import os
 import pickle
@@ -24,7 +22,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,20 +82,6 @@ def _with_shared(task: Task, shared: Any) -> Task:
     return task if shared is None else functools.partial(task, shared)
 
 
-@dataclass
-class _Entry:
-    """A job whose value is still to be given, and where it runs."""
-
-    job: Job
-    future: Future[Outcome] | None = None
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether its worker is gone: what the job itself raises comes as a value."""
-        future = self.future
-        return future is not None and (future.cancelled() or (future.done() and future.exception() is not None))
-
-
 class PoolWorkers(Workers):
     """Jobs spread by any `concurrent.futures.Executor`; one that breaks is replaced and its jobs are run again."""
 
@@ -113,13 +97,14 @@ class PoolWorkers(Workers):
     def map(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[Any]:
         """See `Workers`; raises `LostJobsError`."""
         packed = pickle.dumps(_with_shared(task, shared), protocol=5)
-        entries = collections.deque(_Entry(job) for job in jobs)
-        losses = 0
-        while entries:
+        futures: dict[int, Future[Outcome]] = {}  # by number of the job
+        first = losses = 0
+        while first < len(jobs):
             try:
-                for entry in itertools.islice(entries, _AHEAD * self.count):
-                    entry.future = entry.future or self.submit(_attempt, packed, entry.job)
-                ended = wait([entries[0].future], timeout=_STALLED).done  # type: ignore[list-item]
+                for number in range(first, min(first + _AHEAD * self.count, len(jobs))):
+                    if number not in futures:
+                        futures[number] = self.submit(_attempt, packed, jobs[number])
+                ended = wait([futures[first]], timeout=_STALLED).done
                 outcomes = [future.result() for future in ended]
             except Exception as error:  # every executor has its own way to say that a worker is gone
                 losses += 1
@@ -130,14 +115,17 @@ class PoolWorkers(Workers):
                     ) from error
                 broken = isinstance(error, BrokenExecutor)  # takes all of its jobs with it
                 self.executor = self._opened() if broken else self.executor
-                for entry in entries:
-                    entry.future = None if broken or entry.is_lost else entry.future
+                for number, future in list(futures.items()):
+                    # of a lost worker: what the job itself raises comes as a value
+                    if broken or future.cancelled() or (future.done() and future.exception() is not None):
+                        del futures[number]
                 continue
             if not outcomes and not self._alive():
                 raise LostJobsError("all workers are gone, and none came back. Start some again")
             for outcome in outcomes:
                 losses = 0
-                entries.popleft()
+                del futures[first]
+                first += 1
                 yield outcome.get()
 
 
@@ -193,18 +181,10 @@ def cores() -> int:
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
-def _context(start: str | None = None) -> Any:
-    """What processes begin with: as copies of this one, which need not import anything again, where that can be."""
-    return multiprocessing.get_context(start or ("fork" if forks() else "spawn"))
-
-
 @contextmanager
-def local_workers(count: int, start: str | None = None) -> Iterator[Workers]:
-    """Open processes on this machine, which end with the block; one alone is this process itself."""
-    if count <= 1:
-        yield Workers()
-        return
-    context = _context(start)
+def _processes(count: int, start: str | None = None) -> Iterator[PoolWorkers]:
+    """Open processes as copies of this one, which need not import anything again, where that can be."""
+    context: Any = multiprocessing.get_context(start or ("fork" if forks() else "spawn"))
     gc.freeze()  # copies share the memory of this process as long as no collector walks through it
     pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker), count)
     try:
@@ -219,6 +199,11 @@ def local_workers(count: int, start: str | None = None) -> Iterator[Workers]:
         pool.executor.shutdown(cancel_futures=True)
 
 
+def local_workers(count: int, start: str | None = None) -> AbstractContextManager[Workers]:
+    """Open processes on this machine, which end with the block; one alone is this process itself."""
+    return _processes(count, start) if count > 1 else nullcontext(Workers())
+
+
 @contextmanager
 def background_job(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
     """Run one job in a process of its own while the block goes on, and end that process with the block.
@@ -229,33 +214,18 @@ def background_job(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
     if cores() < 2:
         yield lambda: None
         return
-    context = _context()
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_send_outcome, args=(sender, pickle.dumps(task), job))
-    try:
-        with interrupts_held():
-            process.start()
-        sender.close()
-        yield functools.cache(lambda: _received_value(receiver))
-    finally:
-        if process.pid is not None:
-            process.kill()
-            process.join()
-        receiver.close()
+    with _processes(1) as pool:
+        future = pool.submit(_attempt, pickle.dumps(task), job)
 
+        @functools.cache  # what it warns of is told once
+        def value() -> Any | None:
+            try:
+                outcome = future.result()
+            except Exception:  # its process was lost, or the value cannot travel
+                return None
+            return outcome.get() if outcome.error is None else None
 
-def _send_outcome(sender: Any, packed: bytes, job: Job) -> None:
-    _begin_worker()
-    with suppress(ConnectionError):  # nobody waits for it any more
-        sender.send(_attempt(packed, job))
-
-
-def _received_value(receiver: Any) -> Any | None:
-    try:
-        outcome = receiver.recv()
-    except (EOFError, ConnectionError):
-        return None
-    return outcome.get() if outcome.error is None else None
+        yield value
 
 
 def open_workers(
