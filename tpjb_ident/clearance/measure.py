@@ -264,11 +264,11 @@ def _polygon(run: Run, contact: ContactIntervals, fit: SideFit, angles: FloatArr
 def coldest_first(runs: Sequence[Run]) -> list[Run]:
     """Sweeps in order of speed, the cold ones of a speed before the warm ones, and those by their push."""
     temperature = {run.id: run.mean_temperature() or np.nan for run in runs}
-    speeds = {run.id: run.point.shaft_speed for run in runs}
-    slowest = [t for run, t in temperature.items() if speeds[run] == min(speeds.values()) and np.isfinite(t)]
-    warm = min(slowest, default=np.nan) + _SAME_TEMPERATURE
+    slowest = min((run.point.shaft_speed for run in runs), default=0.0)
+    cold = [temperature[run.id] for run in runs if run.point.shaft_speed == slowest]
+    warm = np.fmin.reduce(cold, initial=np.nan) + _SAME_TEMPERATURE
     # a temperature that nobody measured does not rule a sweep out
-    return sorted(runs, key=lambda run: (speeds[run.id], temperature[run.id] > warm, run.point.static_load))
+    return sorted(runs, key=lambda run: (run.point.shaft_speed, temperature[run.id] > warm, run.point.static_load))
 
 
 def _of_pads(numbers: Sequence[int]) -> str:
