@@ -15,7 +15,7 @@ from scipy import ndimage
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
-from rigdata.vector import directions, wrapped, zero_uncertainty
+from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Conditions, holding, sentences
 from tpjb_ident.estimate.statistics import student_widening
@@ -44,7 +44,6 @@ _MEASURED = (
 _BLOCK = 0.1  # [s], for learning the noise
 _NOISE_RUNS = 8  # that noise is learnt from, spread over the test
 _SAME_DIRECTION = math.radians(1.0)
-_UP = 0.5 * math.pi - 1e-9
 _LOAD_MISS = 0.05  # relative, between set point and measured load
 _DIRECTION_MISS = math.radians(5.0)
 _STEADY = 3.0  # standard deviations of what a shaft that stands changes within a record, and at least
@@ -178,8 +177,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     off = np.zeros(2) if polygon is None else _off_centre(points, polygon)
     # nothing tells whether the zero moved before the sweep, after it or within: the interval holds the way
     points = [replace(p, covariance=p.covariance + np.outer(off, off)) for p in points]
-    # as a locus is swept: from straight down on
-    points.sort(key=lambda p: (p.point.static_load, p.point.spin, wrapped(p.point.static_load_direction - _UP)))
+    points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
     if off.any():
         on_its_way.append(f"positions go around a place {1e6 * math.hypot(*off):.2g} µm from the polygon's centre")
     status = (*_status(points, polygon, repeats, listed(on_its_way, 4)), *refused_runs(problems))
@@ -196,6 +194,11 @@ class _Record:
     direction: float  #: [rad]
     span: float  #: [s]
     blocks: tuple[NoiseSeries, NoiseSeries]  #: of either component
+
+
+def _from_down(direction: float) -> float:
+    """Angle from straight down, 0 to 2 pi: the order in which a locus is swept."""
+    return (direction + math.pi / 2 + 1e-9) % (2 * math.pi)
 
 
 def _read(run: Run, channels: Channels) -> _Record:
@@ -281,10 +284,10 @@ def _repeats(
     of its change away from it, give or take a half of either. What two repeats or more leave beyond that and the noise
     is scatter; with few of them it is as much larger as Student's interval is wider than the normal one.
     """
-    points = [record.run.point for record in records]
-    load, spin, towards = np.array([(p.static_load, p.spin, p.static_load_direction) for p in points]).T[..., None]
-    alike = (load == load.T) & (spin == spin.T) & (np.abs(wrapped(towards - towards.T)) < _SAME_DIRECTION)
-    firsts = np.argmax(alike, axis=0)
+    numbers = []
+    for b in records:
+        numbers.append(np.argmax([_same_set_point(a.run.point, b.run.point) for a in records]))
+    firsts = np.array(numbers)
     count = len(records) - len(np.unique(firsts))
     if count == 0:
         return 0, np.full(2, np.nan), 0.0, 0.0
@@ -308,12 +311,18 @@ def _repeats(
     return count, weight @ places, weight**2 @ (variance + scatter), scatter
 
 
+def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
+    turn = abs(math.remainder(first.static_load_direction - second.static_load_direction, 2 * math.pi))
+    same = first.static_load == second.static_load and first.spin == second.spin
+    return same and turn < _SAME_DIRECTION
+
+
 def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, repeats: int, moved: str) -> Conditions:
     """Named conditions of a locus; `moved`: of shafts that do not stand, and a zero that did not."""
     missed, behind = [], []
     for p in points:
         load_miss = abs(p.load - p.point.static_load) / max(p.point.static_load, 1.0)
-        turn = abs(wrapped(p.load_direction - p.point.static_load_direction))
+        turn = abs(math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi))
         if load_miss > _LOAD_MISS or turn > _DIRECTION_MISS:
             missed.append(p.run)
         # behind a pad's unloaded face by more than any pivot deflects

@@ -263,9 +263,13 @@ def possible_variants(
     if bearing.pivot.kind == "rigid":
         formula = "The bearing file says rigid pivots: there is no printed formula to compare."
         refused |= {"kirk": formula, "kirk-secant": formula}
-    names = [name for name in variants if name not in refused] or ["rigid"]
-    remarks = dict.fromkeys(refused[name] for name in variants if name in refused)
-    return names, list(remarks)
+    names, remarks = [], []
+    for name in variants:
+        if name in refused:
+            remarks.append(refused[name])
+        else:
+            names.append(name)
+    return names or ["rigid"], list(dict.fromkeys(remarks))
 
 
 def _remarks(settings: CompareSettings, static: StaticTests, bearing: Bearing) -> tuple[str, ...]:
