@@ -22,7 +22,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -181,10 +181,18 @@ def cores() -> int:
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
+def _context(start: str | None = None) -> Any:
+    """What processes begin with: as copies of this one, which need not import anything again, where that can be."""
+    return multiprocessing.get_context(start or ("fork" if forks() else "spawn"))
+
+
 @contextmanager
-def _processes(count: int, start: str | None = None) -> Iterator[PoolWorkers]:
-    """Open processes as copies of this one, which need not import anything again, where that can be."""
-    context: Any = multiprocessing.get_context(start or ("fork" if forks() else "spawn"))
+def local_workers(count: int, start: str | None = None) -> Iterator[Workers]:
+    """Open processes on this machine, which end with the block; one alone is this process itself."""
+    if count <= 1:
+        yield Workers()
+        return
+    context = _context(start)
     gc.freeze()  # copies share the memory of this process as long as no collector walks through it
     pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker), count)
     try:
@@ -199,33 +207,44 @@ def _processes(count: int, start: str | None = None) -> Iterator[PoolWorkers]:
         pool.executor.shutdown(cancel_futures=True)
 
 
-def local_workers(count: int, start: str | None = None) -> AbstractContextManager[Workers]:
-    """Open processes on this machine, which end with the block; one alone is this process itself."""
-    return _processes(count, start) if count > 1 else nullcontext(Workers())
-
-
 @contextmanager
 def background_job(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
     """Run one job in a process of its own while the block goes on, and end that process with the block.
 
     Gives what waits for the job's value. None where there is no second core, the job had an error, or its process was
-    lost: whoever needs the value computes it again, and finds what was wrong.
+    lost: whoever needs the value computes it again, and finds what was wrong. No executor: its thread would be there
+    where the block makes copies of this process.
     """
     if cores() < 2:
         yield lambda: None
         return
-    with _processes(1) as pool:
-        future = pool.submit(_attempt, pickle.dumps(task), job)
+    context = _context()
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_send_outcome, args=(sender, pickle.dumps(task), job))
+    try:
+        with interrupts_held():
+            process.start()
+        sender.close()
+        yield functools.cache(lambda: _received_value(receiver))
+    finally:
+        if process.pid is not None:
+            process.kill()
+            process.join()
+        receiver.close()
 
-        @functools.cache  # what it warns of is told once
-        def value() -> Any | None:
-            try:
-                outcome = future.result()
-            except Exception:  # its process was lost, or the value cannot travel
-                return None
-            return outcome.get() if outcome.error is None else None
 
-        yield value
+def _send_outcome(sender: Any, packed: bytes, job: Job) -> None:
+    _begin_worker()
+    with suppress(ConnectionError):  # nobody waits for it any more
+        sender.send(_attempt(packed, job))
+
+
+def _received_value(receiver: Any) -> Any | None:
+    try:
+        outcome = receiver.recv()
+    except (EOFError, ConnectionError):
+        return None
+    return outcome.get() if outcome.error is None else None
 
 
 def open_workers(
