@@ -281,11 +281,7 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
 
 def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
     """The same test in another file: a repeat, or a record that landed under another name."""
-    from rigdata.readers.file_reader import FileReader
-
-    old = run.reader
-    reader = FileReader(path, file, run_id, old.channels, old.stated_rate, old.spec, old.cache)
-    return replace(run, id=run_id, reader=reader)
+    return replace(run, id=run_id, reader=replace(run.reader, path=path, file=file, run=run_id))
 
 
 def _load_hdf5(path: Path) -> Campaign:

@@ -85,8 +85,6 @@ def _without_gaps(time: FloatArray) -> FloatArray:
     if not len(steps) or not steps.max() > max(_GAP * steps.mean(), 0.0):  # of most columns nothing else is asked
         return time
     gaps = steps > _GAP * np.quantile(steps[steps > 0], 0.9)
-    if not gaps.any():
-        return time
     return np.append(0.0, np.cumsum(np.where(gaps, steps[~gaps].mean(), steps)))
 
 

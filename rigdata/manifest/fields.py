@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from rigdata.near_names import hint
@@ -133,14 +133,16 @@ def nearest(name: str, choices: Collection[str]) -> str:
     return hint(name.lower(), choices, cutoff=0.4)
 
 
+@dataclass
 class Findings:
     """The problems of one manifest, with their lines."""
 
-    def __init__(self, file: str, lines: dict[Path, int], files: TextFile) -> None:
-        self.file, self.lines, self.files = file, lines, files
-        self.problems: list[Problem] = []
-        self.errors = 0
-        self.open: tuple[Path, ...] = ()
+    file: str
+    lines: dict[Path, int]
+    files: TextFile
+    problems: list[Problem] = field(default_factory=list)
+    errors: int = 0
+    open: tuple[Path, ...] = ()
 
     def note_open(self, paths: Collection[Path]) -> None:
         """Note the places that are still open, all in one; what follows from them is not told."""

@@ -177,3 +177,15 @@ def test_no_locus_is_an_error(opened):
     source = opened(())
     with pytest.raises(RigDataError, match="no runs of kind locus"):
         measure_locus(source)
+
+
+def test_records_of_three_tenths_of_a_second_have_intervals_that_hold(campaign_of):
+    """They show no noise over seconds: the scatter within each counts, and no half of one stands apart."""
+    truth = RigTruth.constant(K, np.diag([4e5, 6e5]))
+    plan = RigPlan(locus=locus_points(6), locus_seconds=0.3)
+    found = measure_locus(load_campaign(campaign_of(rig(plan, truth=truth, seed=9))))
+    assert "misfit" not in found.status
+    places = np.array([point.position for point in found.points])
+    errors = places - [true_position(point.load_direction, point.load) for point in found.points]
+    limits = 4.0 * np.sqrt([np.diag(point.covariance) for point in found.points])
+    assert np.all(np.abs(errors - errors.mean(axis=0)) < limits)

@@ -76,6 +76,7 @@ GOOD = {
     "holds, two readings a second": {"rate": 2.0, "seconds": 180.0, "steps": 36},
     "noise of 3 um": {"noise": 3e-6},
     "soft pivots": {"stiffness": 3e7},
+    "very soft pivots, by which pads look untouched at first": {"stiffness": 2e7},
     "a converter of 5 um": {"noise": 5e-8, "step": 5e-6},
     "cells that read more at no load than under the push": {"untared": 300.0},
     "a shaft that rubs": {"lag": 0.15},

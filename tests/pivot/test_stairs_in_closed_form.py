@@ -127,6 +127,23 @@ def test_a_ramp_behind_a_free_way_has_no_holds(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("rest", "within"), [(0.8, 0.05), (2.0, 0.012)])
+def test_the_noise_of_ramps_is_learnt_from_the_rest_before_them(tmp_path, rest, within):
+    """About the whole ramps a spline's misfit was taken for noise: errors three times as large, half of the bands off.
+
+    A rest of 0.8 s has one block more than a curve has columns.
+    """
+    errors, spread = [], []
+    for seed in (1, 2):
+        write(tmp_path / f"{seed}.h5", Stairs(held=False, hold=rest), seed)
+        for curve in ti.fit_pivots(ti.load_campaign(tmp_path / f"{seed}.h5"), np.radians(ANGLES)):
+            errors.append(np.log(curve.stiffness(AT) / stiffness(curve.pad, AT)))
+            spread.append(curve.relative_stiffness_se(AT))
+    assert np.abs(errors).max() < within
+    assert np.mean(np.abs(errors) < 1.96 * np.array(spread)) >= 0.75
+
+
+@pytest.mark.slow
 def test_a_run_that_begins_at_the_top_begins_where_friction_still_holds_the_loading(tmp_path):
     """Its first hold was taken for one of unloading: the curves were 30 % wrong at their lower end."""
     write(tmp_path / "stairs.h5", Stairs(friction=0.004, unloads=True, way=0.0), 7)

@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 import time
 import warnings
 from concurrent.futures import Executor, Future
@@ -171,6 +172,14 @@ def test_a_background_job_gives_its_value_or_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(executors, "cores", lambda: 1)
     with background_job(doubled, 4) as value:
         assert value() is None
+
+
+def test_a_background_job_adds_no_thread_here():
+    """The block makes copies of this process, as for its pictures, and a copy of one with threads may hang."""
+    before = threading.active_count()
+    with background_job(doubled, 4) as value:
+        assert value() in (8, None)
+        assert threading.active_count() == before
 
 
 @pytest.mark.slow

@@ -141,7 +141,7 @@ class ClearancePolygon(Presented):
     def __str__(self) -> str:
         pads = ", ".join(f"{1e6 * c:.2f} ({1e6 * s:.2f})" for c, s in zip(self.clearance, self.clearance_se))
         text = f"clearance polygon {self.run}: per pad {pads} µm (se), pushed by {self.push_load:.0f} N"
-        return text + (f"; {', '.join(sentences(self.status))}" if self.status else "")
+        return "; ".join([text, *sentences(self.status)])
 
 
 def measure_clearance(
@@ -203,26 +203,22 @@ def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotC
 
 def _sides(run: Run, angles: FloatArray, curves: Sequence[PivotCurve]) -> tuple[ContactIntervals, SideFit]:
     """Averages and sides of a sweep whose shaft and probes stood still."""
-    contact, fit = _read_sides(run, angles, curves, LARGEST_DEFLECTION)
-    if (largest := fit.deflection.max()) > LARGEST_DEFLECTION:  # pads that seemed not to be touched were
-        contact, fit = _read_sides(run, angles, curves, largest)
+    deflection = LARGEST_DEFLECTION
+    for _ in range(2):
+        contact = read_sweep(run, angles, deflection)
+        pads = np.flatnonzero(np.bincount(contact.pad) >= _FEWEST_BLOCKS)
+        if len(pads) < 3:
+            what = f"reaches {len(pads)} of {len(angles)} pads"
+            raise refusal(run, "record", what, "Check pad angles and channels")
+        fit = fit_sides(contact, angles, pads, curves)
+        if fit.deflection.max() <= deflection:
+            break
+        deflection = fit.deflection.max()  # pads that seemed not to be touched were
     walk = fit.noise.walk * np.sqrt(np.ptp(contact.time))
     if walk > _LARGEST_WALK:
         what = f"has a shaft that was turned, or probes that moved: their zero walks by {1e6 * walk:.1f} µm"
         raise refusal(run, "record", what, "Keep shaft and probes still")
     return contact, fit
-
-
-def _read_sides(
-    run: Run, angles: FloatArray, curves: Sequence[PivotCurve], deflection: float
-) -> tuple[ContactIntervals, SideFit]:
-    """Averages and sides of a sweep whose pivots deflect by so much [m] at most."""
-    contact = read_sweep(run, angles, deflection)
-    pads = np.flatnonzero(np.bincount(contact.pad) >= _FEWEST_BLOCKS)
-    if len(pads) < 3:
-        what = f"reaches {len(pads)} of {len(angles)} pads"
-        raise refusal(run, "record", what, "Check pad angles and channels")
-    return contact, fit_sides(contact, angles, pads, curves)
 
 
 def _polygon(run: Run, contact: ContactIntervals, fit: SideFit, angles: FloatArray) -> ClearancePolygon:
@@ -268,11 +264,11 @@ def _polygon(run: Run, contact: ContactIntervals, fit: SideFit, angles: FloatArr
 def coldest_first(runs: Sequence[Run]) -> list[Run]:
     """Sweeps in order of speed, the cold ones of a speed before the warm ones, and those by their push."""
     temperature = {run.id: run.mean_temperature() or np.nan for run in runs}
-    speeds = {run.id: run.point.shaft_speed for run in runs}
-    slowest = [t for run, t in temperature.items() if speeds[run] == min(speeds.values()) and np.isfinite(t)]
-    warm = min(slowest, default=np.nan) + _SAME_TEMPERATURE
+    slowest = min((run.point.shaft_speed for run in runs), default=0.0)
+    cold = [temperature[run.id] for run in runs if run.point.shaft_speed == slowest]
+    warm = np.fmin.reduce(cold, initial=np.nan) + _SAME_TEMPERATURE
     # a temperature that nobody measured does not rule a sweep out
-    return sorted(runs, key=lambda run: (speeds[run.id], temperature[run.id] > warm, run.point.static_load))
+    return sorted(runs, key=lambda run: (run.point.shaft_speed, temperature[run.id] > warm, run.point.static_load))
 
 
 def _of_pads(numbers: Sequence[int]) -> str:

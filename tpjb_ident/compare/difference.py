@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.special import stdtrit
+from scipy.special import stdtridf, stdtrit
 
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.campaign import Campaign
@@ -37,8 +37,8 @@ _CLEARANCE = "clearance_m"
 _LEVEL = 0.95
 #: Columns of a value and its interval.
 _ENDS = ("", "_lo", "_hi")
-#: Degrees of freedom, by which the quantile that a table's interval was made with is read back.
-_FREEDOM = np.geomspace(1.0, 1e6, 400)
+#: Degrees of freedom from which a scatter is known.
+_MOST_FREEDOM = 1e6
 
 
 @dataclass(frozen=True, repr=False)
@@ -162,21 +162,17 @@ def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.Data
         columns |= _judged(name, (frame_a, frame_b), systematic - 2.0 * common[:, j], none, 8 * len(pairs))
     flags = [frame.get("quality", pd.Series("", frame.index)) for frame in (frame_a, frame_b)]
     doubtful = (flags[0] + "; " + flags[1]).map(errors_in).astype(bool)
-    for name in columns:
-        if name.endswith("_changed"):
-            columns[name] = np.where(doubtful, "cannot tell", columns[name])
-    return pd.DataFrame(columns)
+    table = pd.DataFrame(columns)
+    table.loc[doubtful, list(map(changed_column, COEFFICIENT_COLUMNS))] = "cannot tell"
+    return table
 
 
-def _random(frame: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray]:
+def _random(frame: pd.DataFrame, name: str) -> tuple[pd.Series, pd.Series | float]:
     """Random variance of a quantity and its degrees of freedom; of a table without them by the interval."""
     if f"{name}_random95" not in frame:
-        half = 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]).to_numpy(float)
-        return (half / HALF_INTERVAL) ** 2, np.full(len(frame), np.inf)
-    error, half = frame[f"{name}_se"].to_numpy(float), frame[f"{name}_random95"].to_numpy(float)
-    with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
-        quantile = np.nan_to_num(half / error, nan=HALF_INTERVAL)
-    return error**2, np.interp(-quantile, -stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL), _FREEDOM)
+        return (0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]) / HALF_INTERVAL) ** 2, np.inf
+    error = frame[f"{name}_se"]
+    return error**2, stdtridf(0.5 + 0.5 * _LEVEL, frame[f"{name}_random95"] / error)
 
 
 def _judged(
@@ -191,9 +187,8 @@ def _judged(
     random_a, freedom_a = _random(frames[0], name)
     random_b, freedom_b = _random(frames[1], name)
     variance = random_a + random_b + np.maximum(systematic, 0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):  # without scatter there is nothing to count
-        freedom = variance**2 / (random_a**2 / freedom_a + random_b**2 / freedom_b)
-    freedom = np.clip(np.nan_to_num(freedom, nan=_FREEDOM[-1]), 1.0, _FREEDOM[-1])
+    freedom = variance**2 / (random_a**2 / freedom_a + random_b**2 / freedom_b)
+    freedom = freedom.fillna(_MOST_FREEDOM).clip(1.0, _MOST_FREEDOM)  # without scatter there is nothing to count
     half = stdtrit(freedom, 0.5 + 0.5 * _LEVEL) * np.sqrt(variance)
     sure = stdtrit(freedom, 1 - 0.5 * (1 - _LEVEL) / max(number, 1)) * np.sqrt(variance)
     columns: dict[str, Any] = {}

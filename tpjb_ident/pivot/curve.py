@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -263,14 +264,19 @@ class PivotCurve(Presented):
             Of the secant stiffness instead of the tangent one.
         """
         loads = np.maximum(_positive(load).ravel(), 1e-6 * self.valid_to)
-        total = np.zeros((len(loads), len(loads)))
-        leading, _ = self.law.log_softness(loads, secant)
-        for fit, weight in zip(self.fits, self.weights, strict=True):
-            log, gradient = fit.log_softness(loads, secant)
-            difference = log - leading
-            total += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))
+        _, covariance = self._mixed(lambda fit: fit.log_softness(loads, secant))
         outside = np.maximum(loads / self.valid_to, np.min(self.steps.load) / loads)
-        return total + np.diag((EXTRAPOLATION_SPREAD * np.log(np.maximum(outside, 1.0))) ** 2)
+        return covariance + np.diag((EXTRAPOLATION_SPREAD * np.log(np.maximum(outside, 1.0))) ** 2)
+
+    def _mixed(self, quantity: Callable[[LawFit], tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
+        """Values (n,) of the leading law, and their covariance (n, n) by all laws about it."""
+        leading, _ = quantity(self.law)
+        covariance = np.zeros((len(leading), len(leading)))
+        for fit, weight in zip(self.fits, self.weights, strict=True):
+            value, gradient = quantity(fit)
+            difference = value - leading
+            covariance += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))
+        return leading, covariance
 
     def reading_band(self, load: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Deflection that the steps should show while loading, and its 95 % interval.
@@ -290,13 +296,9 @@ class PivotCurve(Presented):
         """
         values = _positive(load)
         applied, up = values.ravel() / (1.0 - self.law.theta[FRICTION]), np.ones(values.size)
-        centre, _ = self.law.reading_gradient(applied, up)
-        variance = np.zeros(len(applied))
-        for fit, weight in zip(self.fits, self.weights, strict=True):
-            reading, gradient = fit.reading_gradient(applied, up)
-            variance += weight * (np.sum(gradient @ fit.covariance * gradient, axis=1) + (reading - centre) ** 2)
-        half = (_quantile(0.95) * np.sqrt(variance)).reshape(values.shape)
-        value = (centre - self.law.theta[OFFSET]).reshape(values.shape)
+        reading, covariance = self._mixed(lambda fit: fit.reading_gradient(applied, up))
+        half = (_quantile(0.95) * np.sqrt(np.diag(covariance))).reshape(values.shape)
+        value = (reading - self.law.theta[OFFSET]).reshape(values.shape)
         return value, value - half, value + half
 
     def is_extrapolated(self, load: ArrayLike) -> BoolArray:

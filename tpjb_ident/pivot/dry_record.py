@@ -147,8 +147,7 @@ def before_contact(blocks: Blocks) -> BoolArray:
     more, way = load - load[:, None], deflection - deflection[:, None]
     near = (more >= 0.0) & (more < _NEAR * largest)
     loose = (near & (way > compliance * (_FREE * more + _NOTABLE_WAY * largest))).any(axis=1)
-    beside = np.convolve(loose, np.ones(3), "same") > 0  # the average in which the way ends holds some of it
-    return beside & (load < _NEAR * largest)
+    return loose & (load < _NEAR * largest)
 
 
 def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
@@ -264,7 +263,9 @@ def pooled_noise(records: Sequence[DryRecord], about_curve: bool = False) -> Noi
     for record in with_holds or records:  # only holds tell drift from deflection
         used = record.used
         blocks = used.take(used.hold >= 0)
-        if (about_curve and len(blocks) <= 20) or not record.holds:
+        # a curve takes five columns, or seven, and noise shows in what is left of three blocks more
+        needed = 8 + 2 * (len(np.unique(blocks.branch)) > 1)
+        if (about_curve and len(blocks) < needed) or not record.holds:
             blocks = used
         levels = (blocks.hold[:, None] == np.unique(blocks.hold)).astype(float)
         mean = smooth_columns(blocks) if about_curve or not record.holds else levels

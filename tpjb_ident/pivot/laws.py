@@ -27,6 +27,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import interpolate
 
 from rigdata.arrays import FloatArray
 
@@ -139,6 +140,8 @@ def _bend(u: FloatArray, b: float, w: float) -> tuple[FloatArray, FloatArray, Fl
 NODES = np.log(np.array([0.08, 0.16, 0.3, 0.55, 1.0, 1.6, 2.4, 4.0]))  # ln(W / W_r); the one at 0 is the scale
 FIXED = 4  # the node at the reference load: its value is zero, the scale stands beside it
 _FREE = np.flatnonzero(np.arange(len(NODES)) != FIXED)
+# weights (n, k) of the nodes at x (n,): linear in between, and beyond the ends
+_WEIGHTS = interpolate.make_interp_spline(NODES, np.eye(len(NODES)), k=1)
 TYPICAL_SLOPE = -0.15  # of ln(compliance) over ln(load), between linear (0) and a sphere (-1/3)
 SLOPE_SPREAD = 0.25
 BEND_SPREAD = 0.2  # change of that slope from node to node, standard deviation
@@ -154,7 +157,7 @@ def _spline_precision() -> FloatArray:
 
 def _spline_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
     """The logarithm of the compliance is piecewise linear in that of the load; beyond the nodes its slope goes on."""
-    weights = interpolation(_log(u))[:, _FREE]
+    weights = _WEIGHTS(_log(u))[:, _FREE]
     value = np.exp(weights @ q)
     return value, weights * value[:, None]
 
@@ -180,20 +183,9 @@ def _spline_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
     return phi, between[:, 1:] * phi[:, None]
 
 
-def interpolation(x: FloatArray) -> FloatArray:
-    """Weights (n, k) of linear interpolation at the nodes (k,); linear extrapolation beyond the ends."""
-    cell = np.clip(np.searchsorted(NODES, x) - 1, 0, len(NODES) - 2)
-    share = (x - NODES[cell]) / (NODES[cell + 1] - NODES[cell])
-    weights = np.zeros((len(x), len(NODES)))
-    rows = np.arange(len(x))
-    weights[rows, cell] = 1.0 - share
-    weights[rows, cell + 1] = share
-    return weights
-
-
 # ln u on which the compliance is integrated
 _GRID, _GRID_STEP = np.linspace(np.log(2e-3), np.log(25.0), 320, retstep=True)
-_GRID_COLUMNS = np.column_stack([np.ones(len(_GRID)), interpolation(_GRID)[:, _FREE]])
+_GRID_COLUMNS = np.column_stack([np.ones(len(_GRID)), _WEIGHTS(_GRID)[:, _FREE]])
 
 
 def _law(name: str, phi: Shape, psi: Shape, parameters: dict[str, tuple[float, float, float, float]]) -> Law:

@@ -10,10 +10,8 @@ with open_workers(count=4) as workers:   # or open_workers(scheduler="tcp://host
 ```
 """
 
-import collections
 import functools
 import gc
-import itertools
 import multiprocessing
 import os
 import pickle
@@ -84,20 +82,6 @@ def _with_shared(task: Task, shared: Any) -> Task:
     return task if shared is None else functools.partial(task, shared)
 
 
-@dataclass
-class _Entry:
-    """A job whose value is still to be given, and where it runs."""
-
-    job: Job
-    future: Future[Outcome] | None = None
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether its worker is gone: what the job itself raises comes as a value."""
-        future = self.future
-        return future is not None and (future.cancelled() or (future.done() and future.exception() is not None))
-
-
 class PoolWorkers(Workers):
     """Jobs spread by any `concurrent.futures.Executor`; one that breaks is replaced and its jobs are run again."""
 
@@ -113,13 +97,14 @@ class PoolWorkers(Workers):
     def map(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[Any]:
         """See `Workers`; raises `LostJobsError`."""
         packed = pickle.dumps(_with_shared(task, shared), protocol=5)
-        entries = collections.deque(_Entry(job) for job in jobs)
-        losses = 0
-        while entries:
+        futures: dict[int, Future[Outcome]] = {}  # by number of the job
+        first = losses = 0
+        while first < len(jobs):
             try:
-                for entry in itertools.islice(entries, _AHEAD * self.count):
-                    entry.future = entry.future or self.submit(_attempt, packed, entry.job)
-                ended = wait([entries[0].future], timeout=_STALLED).done  # type: ignore[list-item]
+                for number in range(first, min(first + _AHEAD * self.count, len(jobs))):
+                    if number not in futures:
+                        futures[number] = self.submit(_attempt, packed, jobs[number])
+                ended = wait([futures[first]], timeout=_STALLED).done
                 outcomes = [future.result() for future in ended]
             except Exception as error:  # every executor has its own way to say that a worker is gone
                 losses += 1
@@ -130,14 +115,17 @@ class PoolWorkers(Workers):
                     ) from error
                 broken = isinstance(error, BrokenExecutor)  # takes all of its jobs with it
                 self.executor = self._opened() if broken else self.executor
-                for entry in entries:
-                    entry.future = None if broken or entry.is_lost else entry.future
+                for number, future in list(futures.items()):
+                    # of a lost worker: what the job itself raises comes as a value
+                    if broken or future.cancelled() or (future.done() and future.exception() is not None):
+                        del futures[number]
                 continue
             if not outcomes and not self._alive():
                 raise LostJobsError("all workers are gone, and none came back. Start some again")
             for outcome in outcomes:
                 losses = 0
-                entries.popleft()
+                del futures[first]
+                first += 1
                 yield outcome.get()
 
 
@@ -224,7 +212,8 @@ def background_job(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
     """Run one job in a process of its own while the block goes on, and end that process with the block.
 
     Gives what waits for the job's value. None where there is no second core, the job had an error, or its process was
-    lost: whoever needs the value computes it again, and finds what was wrong.
+    lost: whoever needs the value computes it again, and finds what was wrong. No executor: its thread would be there
+    where the block makes copies of this process.
     """
     if cores() < 2:
         yield lambda: None
