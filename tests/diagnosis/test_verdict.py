@@ -2,6 +2,7 @@
 
 import math
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -11,11 +12,12 @@ from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
+from tpjb_ident.diagnosis.verdict import rules
 from tpjb_ident.diagnosis.verdict.behaviour import _words
 from tpjb_ident.diagnosis.verdict.decide import parameters_of
 from tpjb_ident.diagnosis.verdict.held_out import HeldOut, Touched, held_out_gap
 from tpjb_ident.diagnosis.verdict.interval import errors_each_way
-from tpjb_ident.diagnosis.verdict.rules import _named, _places, look_alikes
+from tpjb_ident.diagnosis.verdict.rules import _named, _of_model, _places, _without_effects, look_alikes
 
 
 class Ordered:
@@ -63,7 +65,7 @@ def held_out(before):
     elements = tuple(Element("h", name, ()) for name in ("kxx", "kyy"))
     observations = Observations(Layout(()), np.zeros(2), 0.09 * np.eye(2), np.full(2, math.sqrt(0.91)), elements)
     problem = SimpleNamespace(observations=observations, base=np.full(2, before), held=np.ones(2, dtype=bool))
-    return HeldOut(SimpleNamespace(problem=problem), None)
+    return HeldOut(SimpleNamespace(problem=problem, needs_more=lambda scale: False, has_terms=False), None)
 
 
 @pytest.mark.parametrize(
@@ -122,11 +124,30 @@ def test_points_left_out_that_do_not_show_an_effect_do_not_judge_it(unseen, shru
 )
 def test_an_effect_by_which_the_gap_grows_is_no_part_of_a_story(along, verdict):
     held = held_out(5.0)
-    held.fit.has_terms = False
     touched = sorted((Touched("x", *ends, True) for ends in along), key=lambda one: -one.remaining)
     held = HeldOut(held.fit, np.full(2, 2.0), tuple(touched))
     vars(held)["free"] = 0.3  # with tolerances free all of it is closed
     assert _named(held, (), ()).name == verdict
+
+
+@pytest.mark.parametrize(
+    ("scale", "without", "with_names"),
+    [(0.1, "consistent", "named"), (0.5, "consistent", "partly-explained"), (1.5, "unexplained", "unexplained")],
+)
+def test_a_model_may_be_wrong_by_what_it_is_trusted_to(scale, without, with_names):
+    # a rig that the model misses by half of its stated error is not unexplained, but a name is not the whole story
+    held = held_out(5.0)
+    held.fit.needs_more = lambda limit: scale > limit
+    held.fit.p, held.fit.posterior, held.fit.label = 0.5, SimpleNamespace(scale=scale), "x"
+    held.fit.faults, held.fit.names = (SimpleNamespace(is_term=False, label="x", candidate=None),), frozenset({"x"})
+    assert _without_effects(held).name == without
+    held = HeldOut(held.fit, np.full(2, 1.0), (Touched("x", 8.0, 0.5, True),))
+    vars(held)["free"] = 0.3
+    comparison = SimpleNamespace(tenable=[held.fit], probabilities={}, shares={})
+    with mock.patch.object(rules, "_places", return_value=()):
+        judgement = _of_model(comparison, held.fit.names, held, ())
+    assert judgement.name == with_names
+    assert ("the model may be trusted to that" in judgement.reasons[0]) == (with_names == "partly-explained")
 
 
 def bent_case(contradicted, jump=0.0):

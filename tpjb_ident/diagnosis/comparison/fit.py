@@ -116,11 +116,10 @@ class Fit:
                 labels.append(fault.label)
         return tuple(labels)
 
-    @property
-    def needs_more(self) -> bool:
-        """Whether the data speak for a larger model error than is stated: more than its prior does."""
+    def needs_more(self, scale: float) -> bool:
+        """Whether the data speak for a larger model error than this: more than its prior does."""
         errors = self.problem.errors
-        wrong = errors.scales > Deciding.trusted
+        wrong = errors.scales > scale
         return float(self.posterior.weights[wrong].sum()) > float(np.exp(errors.log_weights[wrong]).sum())
 
     @functools.cached_property

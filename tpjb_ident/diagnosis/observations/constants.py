@@ -27,11 +27,11 @@ class Deciding:
     nothing = 0.05
     #: Names in a family of look-alikes: a longer list says nothing.
     family = 3
-    #: Scale of the model's error up to which an answer stands: what the model is trusted to. With errors of 0.3 to 0.7
-    #: of what is stated 92 % of 85 faults are named so (9 % with a limit of 0.2, 61 % with 0.5), 3 with a wrong one
-    #: beside; with models that solve the same equations 12 of 50 causes outside the library get a wrong name (8, 10).
+    #: Scale of the model's error up to which effects are listed, or none is needed: what the model is trusted to. With
+    #: errors of 0.3 to 0.7 of what is stated, 92 % of 85 faults are listed so (9 % with a limit of 0.2, 61 % with 0.5).
     trusted = 1.0
-    #: The same that right models reach where programs solve the same equations: a search ends there.
+    #: The same that a name takes, and from which a search ends: programs that solve the same equations reach 0.1. From
+    #: here to what is stated 10 of 80 causes outside the library are explained by a wrong effect.
     right = 0.2
     #: Gap above noise along what an effect moves, after over before, that its name takes; right ones reach 0 to 0.45.
     halved = 0.5

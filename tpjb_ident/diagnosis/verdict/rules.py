@@ -48,7 +48,7 @@ def judge(run: Map, comparison: Comparison) -> Judgement:
 def _of_model(comparison: Comparison, sure: frozenset[str], held: HeldOut, drift: Sequence[Drift]) -> Judgement:
     """What is said of the model that counts: the one with exactly the sure names, or the most probable one."""
     model = held.fit
-    if model.needs_more:
+    if model.needs_more(Deciding.trusted):
         size = f"a model error of {model.posterior.scale:.2f} times the stated one"
         reason = f"the best explanation ({model.label}) leaves {size}, more than the model is trusted to"
     elif model not in comparison.tenable:
@@ -64,7 +64,7 @@ def _of_model(comparison: Comparison, sure: frozenset[str], held: HeldOut, drift
 
 def _without_effects(held: HeldOut) -> Judgement:
     nothing = held.fit
-    if not nothing.needs_more:
+    if not nothing.needs_more(Deciding.trusted):
         reason = f"no disagreement beyond noise and stated tolerances (p = {nothing.p:.2g})"
         return Judgement("consistent", held, (reason,))
     reason = (
@@ -119,10 +119,13 @@ def look_alikes(held: HeldOut, family: tuple[str, ...], shares: Mapping[str, flo
 
 def _named(held: HeldOut, drift: Sequence[Drift], places: tuple[str, ...]) -> Judgement:
     """Named where each effect halves the gap along what it moves, and no effect changes over the operating range."""
-    terms = held.fit.has_terms
-    if held.is_shrunk and not (drift or terms):
+    terms, wrong = held.fit.has_terms, held.fit.needs_more(Deciding.right)
+    if held.is_shrunk and not (drift or terms or wrong):
         return Judgement("ambiguous" if places else "named", held, (_shrunk(held),), places)
     reason = f"{_shrunk(held)}: a name leaves half of the first above noise at the most, and the second no larger"
+    if wrong:
+        size = f"a model error of {held.fit.posterior.scale:.2f} times the stated one"
+        reason = f"{_shrunk(held)}; what is left is {size}: the model may be trusted to that, or it is another cause"
     if drift:
         reason = f"the size of {drift[0].effect} {drift[0].words}, so its name is not the whole story"
     if terms:
