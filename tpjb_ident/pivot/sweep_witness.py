@@ -107,15 +107,17 @@ def probe_errors(load: FloatArray, place: FloatArray, angles: FloatArray, axes: 
     # gain of the first, taken off the second, and turns of either
     design = np.column_stack([second * along + first * other_along, -second * across, first * other_across])
     target = first * other_along - second * along
-    inverse = np.linalg.inv(design.T @ design + (_PADS / _PLAUSIBLE) ** 2 * np.eye(3))
-    gain, *turns = best = inverse @ (design.T @ target)
+    # by what pads would show that stand where they are said to: where that is nothing, those that do not show no gain
+    drawn = np.stack([2.0 * along * other_along, -other_along * across, along * other_across])
+    inverse = np.linalg.inv(drawn @ design + (_PADS / _PLAUSIBLE) ** 2 * np.eye(3))
+    gain, *turns = best = inverse @ (drawn @ target)
     variance = (_USUAL * _PADS**2 + np.sum((target - design @ best) ** 2)) / (_USUAL + len(pads) - 3)
     errors = np.log([1.0 + gain, 1.0 - gain] + 1j * np.array(turns))
     common = np.median([*errors.imag, 0.0])
     off = np.array([errors[0].real - errors[1].real, *(errors.imag - common)])
     slopes = np.diag([2.0, 1.0, 1.0])
     slopes[1:, 1:] -= errors.imag == common
-    limit = np.maximum(_UNEQUAL, _ERRORS * np.sqrt(variance * np.diag(slopes @ inverse @ slopes.T)))
+    limit = np.maximum(_UNEQUAL, _ERRORS * np.sqrt(variance * np.abs(np.diag(slopes @ inverse @ slopes.T))))
     gain, *turns = off * (np.abs(off) > limit) * (np.max(np.abs(off[1:])) < _EXCHANGED)
     return np.array([gain, -gain]) + 1j * np.array(turns)
 
