@@ -98,6 +98,20 @@ def test_a_repeated_direction_shows_the_drift(campaign):
     assert "do not hold how well the shaft comes back" in said
 
 
+@pytest.mark.parametrize("size", [0.6e-6, 3e-6, 30e-6])
+@pytest.mark.parametrize("before", [1, 3, 6])
+def test_a_zero_that_jumps_between_two_runs_is_no_steady_drift(campaign, size, before):
+    """Taken off as a drift in proportion to the run, 30 um in the middle left positions 24 half-intervals off."""
+    still = {p.run: p for p in measure_locus(Repeated(campaign, [0], np.zeros((7, 2)))).points}
+    found = measure_locus(Repeated(campaign, [0], np.outer(np.arange(7) >= before, [size, 0.2 * size])))
+    for point in found.points:
+        half = 1.96 * np.sqrt(np.diag(point.covariance + still[point.run].covariance))
+        assert np.all(np.abs(point.position - still[point.run].position) < half)
+    if size > 1e-6:
+        (words,) = [s.detail for s in found.status if s == "misfit"]
+        assert f"likely at one go before l-{before}" in words
+
+
 @pytest.mark.slow
 def test_intervals_hold_how_well_the_shaft_comes_back_where_repeats_tell_it(campaign, monkeypatch):
     """Of positions that scatter by half a micrometre from run to run, beside a drift, 95 % intervals hold 95 %."""

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, special
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
@@ -90,7 +90,7 @@ class Locus(Presented):
     centre : (2,) ndarray
         Reading of the bearing centre that was taken off [m]; zero where none is known.
     drift : (2,) ndarray
-        Drift taken off, per run in the order of testing [m]; NaN where no direction was repeated.
+        Drift taken off, per run in the order of testing, of a jump the mean [m]; NaN where no direction was repeated.
     status : tuple of Condition
         Named conditions.
     """
@@ -159,20 +159,19 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     orders = np.array([runs.index(record.run) for record in records], dtype=float)
     noise = _noise(records)
     centre = np.zeros(2) if polygon is None else polygon.centre
-    repeats, drift, drift_variance, scatter = _repeats(records, orders, noise, centre)
+    walk = _walk(records, orders, noise, centre)
     # with the bearing's centre from the same probes their zero falls out
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
     centre_covariance = zero if polygon is None else polygon.centre_covariance
-    points, on_its_way = [], []
-    for record, order in zip(records, orders, strict=True):
+    points, on_its_way = [], [walk.jump] if walk.jump else []
+    for record, moved, walked in zip(records, walk.moved, walk.covariance, strict=True):
         size = _moved(record, noise)
         if size:
             on_its_way.append(f"halves of {record.run.id} stand {1e6 * size:.2g} µm apart")
-        position = record.position - np.nan_to_num(drift) * order - centre
-        variance = noise.mean_variance(record.span) + scatter + order**2 * drift_variance
+        position = record.position - moved - centre
         # of a steady way the ends are as far from the mean as the halves from each other
-        variance += size**2 / 4.0
-        covariance = variance * np.eye(2) + centre_covariance
+        variance = noise.mean_variance(record.span) + size**2 / 4.0
+        covariance = variance * np.eye(2) + centre_covariance + walked
         points.append(LocusPoint(record.run.id, record.run.point, record.load, record.direction, position, covariance))
     off = np.zeros(2) if polygon is None else _off_centre(points, polygon)
     # nothing tells whether the zero moved before the sweep, after it or within: the interval holds the way
@@ -180,8 +179,8 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
     if off.any():
         on_its_way.append(f"positions go around a place {1e6 * math.hypot(*off):.2g} µm from the polygon's centre")
-    status = (*_status(points, polygon, repeats, listed(on_its_way, 4)), *refused_runs(problems))
-    return Locus(tuple(points), centre, drift, status)
+    status = (*_status(points, polygon, walk.repeats, listed(on_its_way, 4)), *refused_runs(problems))
+    return Locus(tuple(points), centre, walk.drift, status)
 
 
 @dataclass(frozen=True)
@@ -194,6 +193,17 @@ class _Record:
     direction: float  #: [rad]
     span: float  #: [s]
     blocks: tuple[NoiseSeries, NoiseSeries]  #: of either component
+
+
+@dataclass(frozen=True)
+class _Walk:
+    """What the probes' zero did over a locus of n runs, as far as directions tell that were repeated."""
+
+    repeats: int  #: runs at a set point that was there before
+    drift: FloatArray  #: (2,) per run [m]; NaN without any repeat
+    moved: FloatArray  #: (n, 2) [m]
+    covariance: FloatArray  #: (n, 2, 2) of that, and of how well the shaft comes back [m^2]
+    jump: str = ""  #: in words
 
 
 def _from_down(direction: float) -> float:
@@ -272,17 +282,14 @@ def _off_centre(points: Sequence[LocusPoint], polygon: ClearancePolygon) -> Floa
     return np.array([middle.real, middle.imag]) if abs(middle) > limit else np.zeros(2)
 
 
-def _repeats(
-    records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, centre: FloatArray
-) -> tuple[int, FloatArray, float, float]:
-    """Runs at a set point that was there before: how many, what drift (2,) per run [m], its variance, and scatter.
+def _walk(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, centre: FloatArray) -> _Walk:
+    """What repeats tell of the probes' zero, by least squares, with a place of its own for every set point.
 
-    By least squares, with a place of its own for every set point; of a component [m^2], drift NaN without any repeat.
-
-    Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number. A
-    repeat meets its set point otherwise than the first time: the shaft follows the load around the centre, and by half
-    of its change away from it, give or take a half of either. What two repeats or more leave beyond that and the noise
-    is scatter; with few of them it is as much larger as Student's interval is wider than the normal one.
+    Runs are evenly spaced in time as far as anyone knows: the zero drifts in proportion to the run's number, or it
+    jumps before one of them; `_likely` weighs these courses. A repeat meets its set point otherwise than the first
+    time: the shaft follows the load around the centre, and by half of its change away from it, give or take a half of
+    either. What two repeats or more leave beyond that and the noise is scatter; with few of them it is as much larger
+    as Student's interval is wider than the normal one.
     """
     numbers = []
     for b in records:
@@ -290,25 +297,55 @@ def _repeats(
     firsts = np.array(numbers)
     count = len(records) - len(np.unique(firsts))
     if count == 0:
-        return 0, np.full(2, np.nan), 0.0, 0.0
+        return _Walk(0, np.full(2, np.nan), np.zeros((len(records), 2)), np.zeros((len(records), 2, 2)))
     pull = np.array([r.load * np.exp(1j * r.direction) for r in records])
     met = pull / np.where(pull[firsts] == 0, 1e-300, pull[firsts])
     more, turn = np.abs(met) - 1, np.angle(met)
     place = np.array([r.position for r in records]) @ [1.0, 1j]
     along = place[firsts] - centre @ [1.0, 1j]
     elsewhere = _UNLIKE * np.hypot(more, turn) * np.abs(along)
-    place = place - (0.5 * more + 1j * turn) * along
-    places = np.stack([place.real, place.imag], axis=1)
     variance = np.array([noise.mean_variance(r.span) for r in records]) + elsewhere**2
     member = (firsts[:, None] == np.unique(firsts)).astype(float)
     within = np.eye(len(member)) - member @ (member / member.sum(axis=0)).T
-    since = within @ orders
-    weight = since / (since @ since)
-    remainder, scatter = within - np.outer(since, weight), 0.0
+    courses = np.column_stack([orders, (orders[:, None] >= orders[1:]) * np.ptp(orders)])
+    courses = courses[:, np.any(within @ courses, axis=0)]
+    since = within @ courses
+    weight = since / np.sum(since**2, axis=0)
+    apart = within @ (place - (0.5 * more + 1j * turn) * along)
+    drifts, scatter = apart @ weight, np.zeros(len(weight.T))
     if count > 1:
-        left = 0.5 * np.sum((remainder @ places) ** 2) * student_widening(2 * (count - 1)) ** 2
-        scatter = max(left - np.diag(remainder) @ variance, 0.0) / (count - 1)
-    return count, weight @ places, weight**2 @ (variance + scatter), scatter
+        left = 0.5 * np.sum(np.abs(apart[:, None] - since * drifts) ** 2, axis=0) * student_widening(2 * (count - 1)) ** 2
+        scatter = np.maximum(left - variance @ (np.diag(within)[:, None] - since * weight), 0.0) / (count - 1)
+    shares = _likely(records, pull, place[:, None] - courses * drifts, np.sum(variance))
+    moved = courses * drifts
+    mean, best = moved @ shares, np.argmax(shares)
+    spread = np.stack([(moved.T - mean).real, (moved.T - mean).imag])
+    covariance = np.einsum("ikn,jkn,k->nij", spread, spread, shares)
+    own = courses**2 @ (shares * (variance @ weight**2 + scatter * np.sum(weight**2, axis=0))) + shares @ scatter
+    size, text = np.ptp(np.abs(moved[:, best])), ""
+    if shares[0] < 0.5 and size > _LEAST_MOVE:
+        first = records[np.argmax(courses[:, best] > 0.0)].run.id
+        text = f"the probes' zero moved by {1e6 * size:.2g} µm, likely at one go before {first}"
+    drift = shares @ drifts
+    return _Walk(
+        count, np.array([drift.real, drift.imag]), np.stack([mean.real, mean.imag], axis=1), covariance + own[:, None, None] * np.eye(2), text
+    )
+
+
+def _likely(records: Sequence[_Record], pull: ComplexArray, places: ComplexArray, variance: float) -> FloatArray:
+    """Shares (k,) of courses of the zero, by how smoothly each leaves places (n, k) [m] go around with the pull (n,) [N].
+
+    Under one load they lie on an ellipse; what else they do is of a size that nobody knows beforehand.
+    """
+    loads = np.array([(record.run.point.static_load, record.run.point.spin) for record in records])
+    alike = (loads[:, None] == np.unique(loads, axis=0)).all(axis=2)
+    turn = np.exp(1j * np.angle(pull))[:, None]
+    design = np.hstack([alike, alike * turn, alike / turn])
+    values, _, rank, _ = np.linalg.lstsq(design, places, rcond=1e-9)
+    square = np.sum(np.abs(places - design @ values) ** 2, axis=0) + 2.0 * variance
+    prior = np.full(len(square), 1.0 / max(len(square) - 1, 1))
+    prior[0] = 2.0
+    return special.softmax(np.log(prior) - (len(pull) - rank) * np.log(square))
 
 
 def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
