@@ -156,7 +156,7 @@ def test_a_repeat_under_a_turned_load_is_no_drift(campaign, monkeypatch):
         place = centre + np.array([[cos, -sin], [sin, cos]]) @ (records[name].position - centre)
         records[name] = replace(records[name], position=place, direction=records[name].direction + turn)
     monkeypatch.setattr(locus, "_read", lambda run, channels: records[run.id])
-    known = {"centre": centre, "centre_covariance": np.zeros((2, 2)), "clearance": np.full(5, 1.0)}
+    known = {"centre": centre, "centre_covariance": np.zeros((2, 2)), "centre_doubt": 0.0, "clearance": np.full(5, 1.0)}
     found = measure_locus(source, SimpleNamespace(**known, angles=ANGLES, sensors={}))
     # turned by about a degree the shaft stands 0.8 um aside
     assert np.abs(found.drift).max() * 7 < 0.1e-6

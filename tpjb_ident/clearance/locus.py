@@ -23,7 +23,7 @@ from tpjb_ident.phasors.lines import line_design
 from tpjb_ident.phasors.slow_noise import DRIFT_RATE, NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples
 from tpjb_ident.pivot.blocks import time_bins
-from tpjb_ident.pivot.dry_record import refusal
+from tpjb_ident.pivot.dry_record import axial_channels, refusal
 from tpjb_ident.pivot.refusals import usable_runs
 from tpjb_ident.pivot.sweep_witness import as_witnessed
 from tpjb_ident.presentation import Presented
@@ -69,6 +69,8 @@ class LocusPoint:
         From the bearing centre [m]; from the probes' own zero where no centre is known.
     covariance : (2, 2) ndarray
         [m^2], the centre's own included, and where repeats tell it how well the shaft comes back.
+    doubt : (2, 2) ndarray or float
+        Beside that, of the probes' gains and of other centres that fit a sweep as well [m^2]: what all positions share.
     """
 
     run: str
@@ -77,6 +79,7 @@ class LocusPoint:
     load_direction: float
     position: FloatArray
     covariance: FloatArray
+    doubt: FloatArray | float = 0.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -107,7 +110,7 @@ class Locus(Presented):
         rows = []
         for p in self.points:
             measured = p.load, math.degrees(p.load_direction)
-            rows.append((*p.point.static_key, *measured, *p.position, *np.sqrt(np.diag(p.covariance)), p.run))
+            rows.append((*p.point.static_key, *measured, *p.position, *np.sqrt(np.diag(p.covariance + p.doubt)), p.run))
         return pd.DataFrame(rows, columns=[*STATIC_KEY, *_MEASURED])
 
     def plot(self, **options: Any) -> Any:
@@ -163,6 +166,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     # with the bearing's centre from the same probes their zero falls out
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
     centre_covariance = zero if polygon is None else polygon.centre_covariance
+    centre_doubt = 0.0 if polygon is None else polygon.centre_doubt
     points, on_its_way = [], [walk.jump] if walk.jump else []
     for record, moved, walked in zip(records, walk.moved, walk.covariance, strict=True):
         size = _moved(record, noise)
@@ -172,7 +176,10 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
         # of a steady way the ends are as far from the mean as the halves from each other
         variance = noise.mean_variance(record.span) + size**2 / 4.0
         covariance = variance * np.eye(2) + centre_covariance + walked
-        points.append(LocusPoint(record.run.id, record.run.point, record.load, record.direction, position, covariance))
+        doubt = _gain_errors(as_witnessed(record.run, channels), position) + centre_doubt
+        points.append(
+            LocusPoint(record.run.id, record.run.point, record.load, record.direction, position, covariance, doubt)
+        )
     off = np.zeros(2) if polygon is None else _off_centre(points, polygon)
     # nothing tells whether the zero moved before the sweep, after it or within: the interval holds the way
     points = [replace(p, covariance=p.covariance + np.outer(off, off)) for p in points]
@@ -235,6 +242,14 @@ def _read(run: Run, channels: Channels) -> _Record:
         span=time[-1] - time[0],
         blocks=(NoiseSeries(moment, duration, x, constant), NoiseSeries(moment, duration, y, constant)),
     )
+
+
+def _gain_errors(run: Run, position: FloatArray) -> FloatArray:
+    """Covariance (2, 2) [m^2] of a position (2,) [m] by what the gains of its probes are known to."""
+    probes = [channel for channel in axial_channels(run).values() if channel.quantity == "displacement"]
+    along = directions([probe.axis or 0.0 for probe in probes])
+    errors = along @ position * [probe.uncertainty or 0.0 for probe in probes]
+    return along.T * errors**2 @ along
 
 
 def _noise(records: Sequence[_Record]) -> NoiseModel:

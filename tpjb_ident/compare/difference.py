@@ -4,7 +4,7 @@ What is common to both cancels: a sensor with the same calibration in both manif
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +72,7 @@ def measured_side(campaign: Campaign, identification: Identification | None, sta
             scales = {curve.pad: curve.relative_calibration for curve in static.curves}
             pivots["relative_calibration"] = pivots["pad"].map(scales)
         if static.clearance is not None:
-            clearance = static.clearance.to_frame()
+            clearance = replace(static.clearance, relative_calibration=0.0).to_frame()
     return Side(campaign.id, coefficients, pivots, clearance, campaign, sensors)
 
 
