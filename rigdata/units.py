@@ -217,8 +217,8 @@ def temperature_offset(unit: str) -> float:
 
 
 def is_signal(unit: str) -> bool:
-    """Whether `unit` is what a data logger sees (V, mA, mV/V), not an engineering unit."""
-    return is_bridge_ratio(unit) or parse_unit(unit).powers in (parse_unit("V").powers, parse_unit("A").powers)
+    """Whether `unit` is what a data logger sees (V, mA, mV/V, count), not an engineering unit."""
+    return is_bridge_ratio(unit) or parse_unit(unit).powers in [parse_unit(base).powers for base in LISTED["signals"]]
 
 
 def is_bridge_ratio(unit: str) -> bool:

@@ -79,6 +79,8 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
         c.show(f"{folder.name}: channels", words("channel", "quantity", "unit", "axis", "axis by"), channels)
     for problem in problems:
         c.warn(f"left out: {problem}")
+    if not set.intersection(*({series.name for series in export.series} for export in exports)):
+        c.warn("no channel is in all files. Where two devices wrote a file each, join the two of a run in one first")
     for change in changes:
         c.print(change)
     if open_places:
