@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import ndimage, special
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
-from rigdata.vector import directions, zero_uncertainty
+from rigdata.vector import directions, wrapped, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Conditions, holding, sentences
 from tpjb_ident.estimate.statistics import student_widening
@@ -155,31 +155,28 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     runs = campaign.of_kind("locus")
     if not runs:
         raise refuse("campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
-    channels = {} if polygon is None else polygon.sensors
+    # with the bearing's centre from the same probes their zero falls out
+    zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
+    centre, known, doubt, channels = np.zeros(2), zero, np.zeros((2, 2)), {}
+    if polygon is not None:
+        centre, known, doubt = polygon.centre, polygon.centre_covariance, polygon.centre_doubt
+        channels = polygon.sensors
     records, problems = usable_runs(runs, lambda run: _read(run, channels))
     if 2 * len(records) <= len(runs):
         raise RigDataError(problems)
     orders = np.array([runs.index(record.run) for record in records], dtype=float)
     noise = _noise(records)
-    centre = np.zeros(2) if polygon is None else polygon.centre
     walk = _walk(records, orders, noise, centre)
-    # with the bearing's centre from the same probes their zero falls out
-    zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
-    centre_covariance = zero if polygon is None else polygon.centre_covariance
-    centre_doubt = 0.0 if polygon is None else polygon.centre_doubt
     points, on_its_way = [], [walk.jump] if walk.jump else []
     for record, moved, walked in zip(records, walk.moved, walk.covariance, strict=True):
-        size = _moved(record, noise)
-        if size:
+        if size := _moved(record, noise):
             on_its_way.append(f"halves of {record.run.id} stand {1e6 * size:.2g} µm apart")
         position = record.position - moved - centre
         # of a steady way the ends are as far from the mean as the halves from each other
         variance = noise.mean_variance(record.span) + size**2 / 4.0
-        covariance = variance * np.eye(2) + centre_covariance + walked
-        doubt = _gain_errors(as_witnessed(record.run, channels), position) + centre_doubt
-        points.append(
-            LocusPoint(record.run.id, record.run.point, record.load, record.direction, position, covariance, doubt)
-        )
+        run, covariance = record.run, variance * np.eye(2) + known + walked
+        shared = doubt + _gain_errors(as_witnessed(run, channels), position)
+        points.append(LocusPoint(run.id, run.point, record.load, record.direction, position, covariance, shared))
     off = np.zeros(2) if polygon is None else _off_centre(points, polygon)
     # nothing tells whether the zero moved before the sweep, after it or within: the interval holds the way
     points = [replace(p, covariance=p.covariance + np.outer(off, off)) for p in points]
@@ -306,67 +303,58 @@ def _walk(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, cen
     either. What two repeats or more leave beyond that and the noise is scatter; with few of them it is as much larger
     as Student's interval is wider than the normal one.
     """
-    numbers = []
-    for b in records:
-        numbers.append(np.argmax([_same_set_point(a.run.point, b.run.point) for a in records]))
-    firsts = np.array(numbers)
-    count = len(records) - len(np.unique(firsts))
+    points = [record.run.point for record in records]
+    loads, aims = np.array([(p.static_load, p.spin) for p in points]), np.array([p.static_load_direction for p in points])
+    alike = (loads[:, None] == loads).all(axis=2)
+    same = alike & (np.abs(wrapped(aims[:, None] - aims)) < _SAME_DIRECTION)
+    firsts, number = same.argmax(axis=1), len(records)
+    within, count = np.eye(number) - same / same.sum(axis=0), np.count_nonzero(firsts < np.arange(number))
     if count == 0:
-        return _Walk(0, np.full(2, np.nan), np.zeros((len(records), 2)), np.zeros((len(records), 2, 2)))
+        return _Walk(0, np.full(2, np.nan), np.zeros((number, 2)), np.zeros((number, 2, 2)))
     pull = np.array([r.load * np.exp(1j * r.direction) for r in records])
-    met = pull / np.where(pull[firsts] == 0, 1e-300, pull[firsts])
-    more, turn = np.abs(met) - 1, np.angle(met)
+    met = pull / (pull[firsts] + 1e-300)
     place = np.array([r.position for r in records]) @ [1.0, 1j]
     along = place[firsts] - centre @ [1.0, 1j]
-    elsewhere = _UNLIKE * np.hypot(more, turn) * np.abs(along)
-    variance = np.array([noise.mean_variance(r.span) for r in records]) + elsewhere**2
-    member = (firsts[:, None] == np.unique(firsts)).astype(float)
-    within = np.eye(len(member)) - member @ (member / member.sum(axis=0)).T
+    change = np.abs(met) - 1.0 + 1j * np.angle(met)
+    variance = np.array([noise.mean_variance(r.span) for r in records]) + (_UNLIKE * np.abs(change * along)) ** 2
     courses = np.column_stack([orders, (orders[:, None] >= orders[1:]) * np.ptp(orders)])
     courses = courses[:, np.any(within @ courses, axis=0)]
     since = within @ courses
     weight = since / np.sum(since**2, axis=0)
-    apart = within @ (place - (0.5 * more + 1j * turn) * along)
-    drifts, scatter = apart @ weight, np.zeros(len(weight.T))
-    if count > 1:
-        left = 0.5 * np.sum(np.abs(apart[:, None] - since * drifts) ** 2, axis=0) * student_widening(2 * (count - 1)) ** 2
-        scatter = np.maximum(left - variance @ (np.diag(within)[:, None] - since * weight), 0.0) / (count - 1)
-    shares = _likely(records, pull, place[:, None] - courses * drifts, np.sum(variance))
+    apart = within @ (place - (change - 0.5 * change.real) * along)
+    drifts = apart @ weight
+    left = np.sum(np.abs(apart[:, None] - since * drifts) ** 2, axis=0) * student_widening(max(2 * count - 2, 1)) ** 2
+    noisy = variance @ (np.diag(within)[:, None] - since * weight)
+    scatter = np.maximum(0.5 * left - noisy, 0.0) / max(count - 1, 1)  # one repeat leaves none
     moved = courses * drifts
-    mean, best = moved @ shares, np.argmax(shares)
-    spread = np.stack([(moved.T - mean).real, (moved.T - mean).imag])
-    covariance = np.einsum("ikn,jkn,k->nij", spread, spread, shares)
-    own = courses**2 @ (shares * (variance @ weight**2 + scatter * np.sum(weight**2, axis=0))) + shares @ scatter
-    size, text = np.ptp(np.abs(moved[:, best])), ""
+    shares = _likely(alike, pull, place[:, None] - moved, np.sum(variance))
+    mean, best = moved @ shares, shares.argmax()
+    spread = _vectors(moved.T - mean)
+    own = shares @ scatter + courses**2 @ (shares * np.sum((variance[:, None] + scatter) * weight**2, axis=0))
+    covariance = np.einsum("kni,knj,k->nij", spread, spread, shares) + own[:, None, None] * np.eye(2)
+    size, text = np.abs(drifts[best]) * np.ptp(orders), ""
     if shares[0] < 0.5 and size > _LEAST_MOVE:
-        first = records[np.argmax(courses[:, best] > 0.0)].run.id
+        first = records[courses[:, best].argmax()].run.id
         text = f"the probes' zero moved by {1e6 * size:.2g} µm, likely at one go before {first}"
-    drift = shares @ drifts
-    return _Walk(
-        count, np.array([drift.real, drift.imag]), np.stack([mean.real, mean.imag], axis=1), covariance + own[:, None, None] * np.eye(2), text
-    )
+    return _Walk(count, _vectors(drifts @ shares), _vectors(mean), covariance, text)
 
 
-def _likely(records: Sequence[_Record], pull: ComplexArray, places: ComplexArray, variance: float) -> FloatArray:
+def _vectors(numbers: ComplexArray) -> FloatArray:
+    """Complex numbers (..) as vectors (.., 2)."""
+    return np.stack([numbers.real, numbers.imag], axis=-1)
+
+
+def _likely(alike: BoolArray, pull: ComplexArray, places: ComplexArray, variance: float) -> FloatArray:
     """Shares (k,) of courses of the zero, by how smoothly each leaves places (n, k) [m] go around with the pull (n,) [N].
 
-    Under one load they lie on an ellipse; what else they do is of a size that nobody knows beforehand.
+    Under one load (`alike` (n, n)) they lie on an ellipse; what else they do is of a size that nobody knows beforehand.
     """
-    loads = np.array([(record.run.point.static_load, record.run.point.spin) for record in records])
-    alike = (loads[:, None] == np.unique(loads, axis=0)).all(axis=2)
     turn = np.exp(1j * np.angle(pull))[:, None]
     design = np.hstack([alike, alike * turn, alike / turn])
     values, _, rank, _ = np.linalg.lstsq(design, places, rcond=1e-9)
     square = np.sum(np.abs(places - design @ values) ** 2, axis=0) + 2.0 * variance
-    prior = np.full(len(square), 1.0 / max(len(square) - 1, 1))
-    prior[0] = 2.0
-    return special.softmax(np.log(prior) - (len(pull) - rank) * np.log(square))
-
-
-def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
-    turn = abs(math.remainder(first.static_load_direction - second.static_load_direction, 2 * math.pi))
-    same = first.static_load == second.static_load and first.spin == second.spin
-    return same and turn < _SAME_DIRECTION
+    prior = np.log(2 * len(square)) * (np.arange(len(square)) == 0)
+    return special.softmax(prior - (len(pull) - rank) * np.log(square))
 
 
 def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, repeats: int, moved: str) -> Conditions:

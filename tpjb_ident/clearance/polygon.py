@@ -103,10 +103,10 @@ def _explained(design: FloatArray, distances: FloatArray, solution: FloatArray, 
     """Whether four sides or more are alike by a covariance (n, n), and lie on one polygon as well as that says."""
     covariance = covariance + _LEAST_ERROR**2 * np.eye(len(distances))
     alike = np.abs(distances - design @ solution) < _ALIKE * np.sqrt(np.diag(covariance))
-    inexplicable = np.linalg.svd(design[alike])[0][:, 3:].T
-    apart = inexplicable @ distances[alike]
-    square = apart @ np.linalg.solve(inexplicable @ covariance[np.ix_(alike, alike)] @ inexplicable.T, apart)
-    return len(apart) > 0 and bool(special.chdtrc(len(apart), square) > _BY_CHANCE)
+    root = np.linalg.cholesky(covariance[np.ix_(alike, alike)])
+    sides = np.linalg.solve(root, np.column_stack([design, distances])[alike])
+    square = np.linalg.lstsq(sides[:, :3], sides[:, 3], rcond=None)[1]  # none of three sides
+    return bool(np.any(special.chdtrc(len(sides) - 3, square) > _BY_CHANCE))
 
 
 def _gain(design: FloatArray, weights: FloatArray) -> FloatArray:
