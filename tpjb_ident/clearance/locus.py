@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -157,10 +155,10 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
         raise refuse("campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
     # with the bearing's centre from the same probes their zero falls out
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
-    centre, known, doubt, channels = np.zeros(2), zero, np.zeros((2, 2)), {}
+    centre, known, doubt, channels = np.zeros(2), zero, 0.0, {}
     if polygon is not None:
-        centre, known, doubt = polygon.centre, polygon.centre_covariance, polygon.centre_doubt
-        channels = polygon.sensors
+        centre, known = polygon.centre, polygon.centre_covariance
+        doubt, channels = polygon.centre_doubt, polygon.sensors
     records, problems = usable_runs(runs, lambda run: _read(run, channels))
     if 2 * len(records) <= len(runs):
         raise RigDataError(problems)
@@ -180,7 +178,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     off = np.zeros(2) if polygon is None else _off_centre(points, polygon)
     # nothing tells whether the zero moved before the sweep, after it or within: the interval holds the way
     points = [replace(p, covariance=p.covariance + np.outer(off, off)) for p in points]
-    points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
+    points.sort(key=lambda p: _swept(p.point))
     if off.any():
         on_its_way.append(f"positions go around a place {1e6 * math.hypot(*off):.2g} µm from the polygon's centre")
     status = (*_status(points, polygon, walk.repeats, listed(on_its_way, 4)), *refused_runs(problems))
@@ -210,9 +208,9 @@ class _Walk:
     jump: str = ""  #: in words
 
 
-def _from_down(direction: float) -> float:
-    """Angle from straight down, 0 to 2 pi: the order in which a locus is swept."""
-    return (direction + math.pi / 2 + 1e-9) % (2 * math.pi)
+def _swept(point: OperatingPoint) -> tuple[float, ...]:
+    """Load, speed, and angle from straight down, 0 to 2 pi: the order in which a locus is swept."""
+    return point.static_load, point.spin, (point.static_load_direction + math.pi / 2 + 1e-9) % (2 * math.pi)
 
 
 def _read(run: Run, channels: Channels) -> _Record:
@@ -221,23 +219,25 @@ def _read(run: Run, channels: Channels) -> _Record:
         what = f"has only {good.sum()} usable samples of {len(good)}"
         raise refusal(run, "record", what, "Repeat this direction")
     time, place = time[good], place[good]
+    span = time[-1] - time[0]
     # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
     speed = run.point.shaft_speed_hz
-    turning = [speed, 2 * speed] if speed * (time[-1] - time[0]) > 2.0 else []
+    turning = [speed, 2 * speed] if speed * span > 2.0 else []
     design = line_design(time, np.array(turning), drift_order=0)
     mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
     load = mean[-1, 2:]
     steady = place - design[:, :-1] @ mean[:-1, :2]
     label, whole = time_bins(time, _BLOCK)
-    moment, x, y = (ndimage.mean(values, label, whole) for values in (time, *steady.T))
+    moment, *means = (ndimage.mean(values, label, whole) for values in (time, *steady.T))
     duration, constant = np.full(len(whole), _BLOCK), np.ones((len(whole), 1))
+    x, y = (NoiseSeries(moment, duration, mean, constant) for mean in means)
     return _Record(
         run=run,
         position=np.asarray(mean[-1, :2]),
         load=np.hypot(*load),
         direction=math.atan2(load[1], load[0]),
-        span=time[-1] - time[0],
-        blocks=(NoiseSeries(moment, duration, x, constant), NoiseSeries(moment, duration, y, constant)),
+        span=span,
+        blocks=(x, y),
     )
 
 
@@ -252,7 +252,7 @@ def _gain_errors(run: Run, position: FloatArray) -> FloatArray:
 def _noise(records: Sequence[_Record]) -> NoiseModel:
     """Noise of the probes, pooled over all runs."""
     chosen = records[:: max(1, len(records) // _NOISE_RUNS)]
-    series = list(itertools.chain.from_iterable(record.blocks for record in chosen))
+    series = [series for record in chosen for series in record.blocks]
     if max(len(s.time) for s in series) <= 3:
         # records of a few tenths of a second show no noise over seconds: take the scatter within each run
         scatter = np.mean([np.var(s.values) for s in series]) + 1e-18
@@ -264,7 +264,7 @@ def _moved(record: _Record, noise: NoiseModel) -> float:
     """How far apart the means of both halves of a record are [m]; zero where the shaft stands."""
     time = record.blocks[0].time
     late = time > 0.5 * (time[0] + time[-1])
-    if late.all() or not late.any():
+    if len(time) < 2:
         return 0.0
     contrast = late / late.sum() - ~late / (~late).sum()
     steady = replace(noise, drift=0.0).covariance(time, record.blocks[0].duration)
@@ -279,19 +279,22 @@ def _off_centre(points: Sequence[LocusPoint], polygon: ClearancePolygon) -> Floa
     Equal pads all around leave it at the centre, whatever film and pivots do; unequal ones move it by less than they
     differ.
     """
-    groups = defaultdict(list)
-    for point in points:
-        groups[point.point.static_load, point.point.spin].append(point)
-    largest = max(groups.values(), key=len)
+    alike = _under_one_load([p.point for p in points])
+    largest = [points[k] for k in np.flatnonzero(alike[alike.sum(axis=0).argmax()])]
     turn = np.exp(1j * np.array([p.load_direction for p in largest]))
     angles = np.sort(np.angle(turn))
-    if np.diff(angles, append=angles[0] + 2.0 * np.pi).max() > _AROUND:
-        return np.zeros(2)
     place = np.array([p.position for p in largest]) @ [1.0, 1j]
     middle = np.linalg.lstsq(np.column_stack([np.ones(len(turn)), turn]), place, rcond=None)[0][0]
     error = math.sqrt(np.median([np.trace(p.covariance) for p in largest]))
-    limit = _OFF_CENTRE + np.ptp(polygon.clearance[np.isfinite(polygon.clearance)]) + _STEADY * error
-    return np.array([middle.real, middle.imag]) if abs(middle) > limit else np.zeros(2)
+    limit = _OFF_CENTRE + np.nanmax(polygon.clearance) - np.nanmin(polygon.clearance) + _STEADY * error
+    goes_around = np.diff(angles, append=angles[0] + 2.0 * np.pi).max() < _AROUND
+    return _vectors(middle * (goes_around and abs(middle) > limit))
+
+
+def _under_one_load(points: Sequence[OperatingPoint]) -> BoolArray:
+    """Which points (n,) have load and speed in common, (n, n)."""
+    loads = np.array([(point.static_load, point.spin) for point in points])
+    return (loads[:, None] == loads).all(axis=2)
 
 
 def _walk(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, centre: FloatArray) -> _Walk:
@@ -304,8 +307,7 @@ def _walk(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, cen
     as Student's interval is wider than the normal one.
     """
     points = [record.run.point for record in records]
-    loads, aims = np.array([(p.static_load, p.spin) for p in points]), np.array([p.static_load_direction for p in points])
-    alike = (loads[:, None] == loads).all(axis=2)
+    aims, alike = np.array([point.static_load_direction for point in points]), _under_one_load(points)
     same = alike & (np.abs(wrapped(aims[:, None] - aims)) < _SAME_DIRECTION)
     firsts, number = same.argmax(axis=1), len(records)
     within, count = np.eye(number) - same / same.sum(axis=0), np.count_nonzero(firsts < np.arange(number))
@@ -318,7 +320,7 @@ def _walk(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, cen
     change = np.abs(met) - 1.0 + 1j * np.angle(met)
     variance = np.array([noise.mean_variance(r.span) for r in records]) + (_UNLIKE * np.abs(change * along)) ** 2
     courses = np.column_stack([orders, (orders[:, None] >= orders[1:]) * np.ptp(orders)])
-    courses = courses[:, np.any(within @ courses, axis=0)]
+    courses = courses[:, np.any(np.abs(within @ courses) > 1e-6, axis=0)]
     since = within @ courses
     weight = since / np.sum(since**2, axis=0)
     apart = within @ (place - (change - 0.5 * change.real) * along)
