@@ -223,7 +223,7 @@ def _update(blocks: list[_Block], old: _Tables | None, new: _Tables) -> list[str
 
 
 def _merge(block: _Block, new: Sequence[str], old: Sequence[str], changes: list[str]) -> None:
-    """Fill in open places, put new guesses in place of old ones, and add what a table lacks; open places that no draft has any more go."""
+    """Fill in open places, put new guesses in place of old ones, add what a table lacks; needless open ones go."""
     guessed, proposals = _values(old), _values(new)
     lines, present = [], set()
     for line in block.lines:

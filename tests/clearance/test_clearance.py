@@ -23,7 +23,6 @@ from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot.fit import fit_pivots
 
 
-
 def find_centre(angles, distances, covariance, gains=((0.0,),)):
     """Centre of probes whose gains are known exactly."""
     return find_centre_of(angles, distances, covariance, np.ones((len(angles), 1)) * gains)
@@ -229,7 +228,10 @@ def test_unequal_probes_are_made_alike_and_their_difference_is_in_the_interval(o
 
 
 def test_a_sweep_of_three_or_four_pads_says_what_it_leaves_open():
-    for number, expected in ((3, "only their mean"), (4, "tells which: pad #1 +8.0 µm, pad #2 -8.0 µm, pad #3 +8.0 µm")):
+    for number, expected in (
+        (3, "only their mean"),
+        (4, "tells which: pad #1 +8.0 µm, pad #2 -8.0 µm, pad #3 +8.0 µm"),
+    ):
         angles = np.radians([-90.0, 0.0, 90.0, 180.0][:number]) * (1.0 if number == 4 else 4.0 / 3.0)
         for off in (8e-6, 0.0):
             distance, covariance = 80e-6 + off * (np.arange(number) == 2), np.eye(number) * 1e-16

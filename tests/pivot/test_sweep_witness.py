@@ -94,7 +94,7 @@ def test_probes_along_right_angled_pads_show_no_gain_and_those_in_between_do(gai
     """A pad that stood 2 deg elsewhere read as a gain of 850 %: what pads as drawn would show of it is nothing."""
     stated = 0.25 * np.pi + 0.5 * np.pi * np.arange(4)
     for axes, shown, actual in (
-        (np.array([0.25, 0.75]) * np.pi, 0.0, stated + [0.0, off, 0.0, 0.001]),
+        (np.array([0.25, 0.75]) * np.pi, 0.0, stated + np.array([0.0, off, 0.0, 0.001])),
         (np.array([0.0, 0.5]) * np.pi, gain, stated),
     ):
         load, place = swept(actual)

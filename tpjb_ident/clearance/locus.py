@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,14 +15,14 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, wrapped, zero_uncertainty
-from tpjb_ident.clearance.measure import ClearancePolygon
+from tpjb_ident.clearance.measure import ClearancePolygon, probe_gains
 from tpjb_ident.conditions import Conditions, holding, sentences
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.lines import line_design
 from tpjb_ident.phasors.slow_noise import DRIFT_RATE, NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples
 from tpjb_ident.pivot.blocks import time_bins
-from tpjb_ident.pivot.dry_record import axial_channels, refusal
+from tpjb_ident.pivot.dry_record import refusal
 from tpjb_ident.pivot.refusals import usable_runs
 from tpjb_ident.pivot.sweep_witness import as_witnessed
 from tpjb_ident.presentation import Presented
@@ -155,7 +156,8 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
         raise refuse("campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
     # with the bearing's centre from the same probes their zero falls out
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
-    centre, known, doubt, channels = np.zeros(2), zero, 0.0, {}
+    centre, known, doubt = np.zeros(2), zero, np.zeros((2, 2))
+    channels: Channels = {}
     if polygon is not None:
         centre, known = polygon.centre, polygon.centre_covariance
         doubt, channels = polygon.centre_doubt, polygon.sensors
@@ -243,16 +245,15 @@ def _read(run: Run, channels: Channels) -> _Record:
 
 def _gain_errors(run: Run, position: FloatArray) -> FloatArray:
     """Covariance (2, 2) [m^2] of a position (2,) [m] by what the gains of its probes are known to."""
-    probes = [channel for channel in axial_channels(run).values() if channel.quantity == "displacement"]
-    along = directions([probe.axis or 0.0 for probe in probes])
-    errors = along @ position * [probe.uncertainty or 0.0 for probe in probes]
-    return along.T * errors**2 @ along
+    axes, uncertainty = probe_gains(run)
+    along = directions(axes)
+    return along.T * (along @ position * uncertainty) ** 2 @ along
 
 
 def _noise(records: Sequence[_Record]) -> NoiseModel:
     """Noise of the probes, pooled over all runs."""
     chosen = records[:: max(1, len(records) // _NOISE_RUNS)]
-    series = [series for record in chosen for series in record.blocks]
+    series = list(itertools.chain.from_iterable(record.blocks for record in chosen))
     if max(len(s.time) for s in series) <= 3:
         # records of a few tenths of a second show no noise over seconds: take the scatter within each run
         scatter = np.mean([np.var(s.values) for s in series]) + 1e-18
@@ -280,12 +281,12 @@ def _off_centre(points: Sequence[LocusPoint], polygon: ClearancePolygon) -> Floa
     differ.
     """
     alike = _under_one_load([p.point for p in points])
-    largest = [points[k] for k in np.flatnonzero(alike[alike.sum(axis=0).argmax()])]
-    turn = np.exp(1j * np.array([p.load_direction for p in largest]))
+    largest = alike[np.argmax(alike.sum(axis=0))]
+    turn = np.exp(1j * np.array([p.load_direction for p in points]))[largest]
     angles = np.sort(np.angle(turn))
-    place = np.array([p.position for p in largest]) @ [1.0, 1j]
+    place = np.array([p.position for p in points])[largest] @ [1.0, 1j]
     middle = np.linalg.lstsq(np.column_stack([np.ones(len(turn)), turn]), place, rcond=None)[0][0]
-    error = math.sqrt(np.median([np.trace(p.covariance) for p in largest]))
+    error = math.sqrt(np.median(np.array([np.trace(p.covariance) for p in points])[largest]))
     limit = _OFF_CENTRE + np.nanmax(polygon.clearance) - np.nanmin(polygon.clearance) + _STEADY * error
     goes_around = np.diff(angles, append=angles[0] + 2.0 * np.pi).max() < _AROUND
     return _vectors(middle * (goes_around and abs(middle) > limit))
@@ -310,7 +311,7 @@ def _walk(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, cen
     aims, alike = np.array([point.static_load_direction for point in points]), _under_one_load(points)
     same = alike & (np.abs(wrapped(aims[:, None] - aims)) < _SAME_DIRECTION)
     firsts, number = same.argmax(axis=1), len(records)
-    within, count = np.eye(number) - same / same.sum(axis=0), np.count_nonzero(firsts < np.arange(number))
+    within, count = np.eye(number) - same / same.sum(axis=0), int(np.sum(firsts < np.arange(number)))
     if count == 0:
         return _Walk(0, np.full(2, np.nan), np.zeros((number, 2)), np.zeros((number, 2, 2)))
     pull = np.array([r.load * np.exp(1j * r.direction) for r in records])
@@ -336,7 +337,7 @@ def _walk(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, cen
     covariance = np.einsum("kni,knj,k->nij", spread, spread, shares) + own[:, None, None] * np.eye(2)
     size, text = np.abs(drifts[best]) * np.ptp(orders), ""
     if shares[0] < 0.5 and size > _LEAST_MOVE:
-        first = records[courses[:, best].argmax()].run.id
+        first = records[int(np.argmax(courses[:, best]))].run.id
         text = f"the probes' zero moved by {1e6 * size:.2g} µm, likely at one go before {first}"
     return _Walk(count, _vectors(drifts @ shares), _vectors(mean), covariance, text)
 
@@ -347,7 +348,7 @@ def _vectors(numbers: ComplexArray) -> FloatArray:
 
 
 def _likely(alike: BoolArray, pull: ComplexArray, places: ComplexArray, variance: float) -> FloatArray:
-    """Shares (k,) of courses of the zero, by how smoothly each leaves places (n, k) [m] go around with the pull (n,) [N].
+    """Shares (k,) of courses of the zero, by how smoothly each leaves places (n, k) [m] go around with a pull (n,) [N].
 
     Under one load (`alike` (n, n)) they lie on an ellipse; what else they do is of a size that nobody knows beforehand.
     """

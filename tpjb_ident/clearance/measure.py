@@ -210,7 +210,9 @@ def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotC
     pads = " of all pads" if len(outside) == len(angles) else _of_pads([curve.pad for curve in outside])
     detail = f"pushed with {contact.push:.0f} N, the dry tests{pads} hold from {lowest:.0f} N on; the sweep corrects it"
     extrapolated = holding((outside, "give-extrapolated", detail))
-    return replace(polygon, status=(*polygon.status, *_status(fit, polygon, curves), *witness.conditions, *extrapolated))
+    return replace(
+        polygon, status=(*polygon.status, *_status(fit, polygon, curves), *witness.conditions, *extrapolated)
+    )
 
 
 def _sides(run: Run, angles: FloatArray, curves: Sequence[PivotCurve]) -> tuple[ContactIntervals, SideFit]:
@@ -240,8 +242,8 @@ def _read_sides(
 def _polygon(run: Run, contact: ContactIntervals, fit: SideFit, angles: FloatArray) -> ClearancePolygon:
     """Clearances about the centre, with the errors of both; NaN where a pad was not reached."""
     n, covariance = directions(angles[fit.pads]), fit.covariance
-    probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
-    gains = np.cos(angles[:, None] - [c.axis or 0.0 for c in probes]) ** 2 * [c.uncertainty or 0.0 for c in probes]
+    axes, uncertainty = probe_gains(run)
+    gains = np.cos(angles[:, None] - axes) ** 2 * uncertainty
     centre = find_centre(angles[fit.pads], fit.distance, covariance, gains[fit.pads] * np.mean(fit.distance))
     # clearance = (I - n G) distance on the reached pads: the centre's error is the same sides' error
     map_ = np.eye(len(n)) - n @ centre.gain[:2]
@@ -278,6 +280,12 @@ def _polygon(run: Run, contact: ContactIntervals, fit: SideFit, angles: FloatArr
         relative_calibration=np.linalg.norm(gains, axis=1),
         centre_doubt=centre.doubt,
     )
+
+
+def probe_gains(run: Run) -> FloatArray:
+    """Axes [rad] of a run's probes and how well their gains are known, (2, p)."""
+    probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
+    return np.array([(probe.axis, probe.uncertainty or 0.0) for probe in probes]).T
 
 
 def coldest_first(runs: Sequence[Run]) -> list[Run]:
@@ -329,7 +337,7 @@ def _inseparable(fit: SideFit, centre: Centre, gains: FloatArray) -> Conditions:
     if len(fit.pads) == 3:
         text = "three pads fit every centre: equal clearances are assumed, only their mean is measured"
     elif centre.doubt.any():
-        text = "pads differ, and fewer than four are alike: a centre elsewhere, with other deviations, fits the sweep as well"
+        text = "fewer than four pads are alike: a centre elsewhere, with other deviations, fits the sweep as well"
     elif np.abs(centre.suspects).max() > max(_IRREGULAR * error, 0.5e-6):
         text = f"one of four is off, and nothing tells which: {_offsets(fit.pads, centre.suspects)}"
     return holding((text, "pads-not-separable", text))

@@ -89,7 +89,9 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
     if len(angles) > 4:
         even = _gain(design, np.ones(len(angles)))
         moved, apart = (solution - even @ distances)[:2], distances - design @ even @ distances
-        if np.linalg.norm(apart) > _NOTABLE and not _explained(design, distances, solution, covariance + gains @ gains.T):
+        if np.linalg.norm(apart) > _NOTABLE and not _explained(
+            design, distances, solution, covariance + gains @ gains.T
+        ):
             doubt = apart @ apart / (len(angles) - 4) * even[:2] @ even[:2].T + np.outer(moved, moved)
     if len(angles) == 4:  # any one may be what stands off: each explains all that no centre does
         inexplicable = np.linalg.svd(design)[0][:, 3]

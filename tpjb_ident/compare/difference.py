@@ -184,8 +184,7 @@ def _judged(
 ) -> dict[str, Any]:
     """Columns of one quantity: both values, their difference, each with its interval, and whether it changed.
 
-    `systematic` is the variance of the difference that is not random; a table's interval without more holds all of it,
-    and what both sides share is taken off.
+    `systematic`: variance of the difference that is not random; less than none, where intervals hold what both share.
     The degrees of freedom are Welch's and Satterthwaite's. Of `number` differences that are looked at together one in
     twenty is beyond its own interval by chance; "yes" holds for all of them at once (Bonferroni).
     """

@@ -75,12 +75,13 @@ def _less_alike(
     condition: Conditions = ()
     for _ in range(_ROUNDS):  # what noise there is shows when the creep is off: until then it takes much for drift
         holds = [_held_to_light(record, noise, times) for record in held]
-        total, pull = np.sum([hold.sum(axis=1) for hold in holds], axis=0)
-        total = total + plausible**-2
+        runs = np.array([hold.sum(axis=0) for hold in holds])
+        total, pull = runs.sum(axis=0)
+        total += plausible**-2
         share = pull / total
-        scatter = _scatter(np.stack([hold.sum(axis=1) for hold in holds], axis=1), share)
+        scatter = _scatter(runs, share)
         # a jump within one hold is no creep: all show that
-        apart = np.maximum(scatter, _scatter(np.concatenate(holds, axis=1), share))
+        apart = np.maximum(scatter, _scatter(np.vstack(holds), share))
         error = np.sqrt(np.maximum(apart, 1.0) / total)
         best = np.argmax(share / error)
         limit = max(least * error[best], _ALIKE * math.sqrt(scatter[best] / total[best]))
@@ -101,9 +102,9 @@ def _less_alike(
 
 
 def _scatter(sums: FloatArray, share: FloatArray) -> FloatArray:
-    """How parts (n,) differ from a share (k,), by information and pull (2, n, k), over what they do by chance (k,)."""
-    information = np.maximum(sums[0], 1e-300)
-    return np.sum(information * (sums[1] / information - share) ** 2, axis=0) / max(len(information) - 1, 1)
+    """How parts (n,) differ from a share (k,), by information and pull (n, 2, k), over what they do by chance (k,)."""
+    information = np.maximum(sums[:, 0], 1e-300)
+    return np.sum((sums[:, 1] - information * share) ** 2 / information, axis=0) / max(len(sums) - 1, 1)
 
 
 def _courses(record: DryRecord, times: FloatArray) -> FloatArray:
@@ -123,7 +124,7 @@ def _courses(record: DryRecord, times: FloatArray) -> FloatArray:
 
 
 def _held_to_light(record: DryRecord, noise: NoiseModel, times: FloatArray) -> FloatArray:
-    """What holds (h,), each at a level of its own, say of the size of courses (k,): information and pull (2, h, k)."""
+    """What holds (h,), each at a level of its own, say of the size of courses (k,): information and pull (h, 2, k)."""
     used = record.blocks.hold >= 0
     blocks = record.blocks.take(used)
     member = (blocks.hold[:, None] == np.unique(blocks.hold)).astype(float)
@@ -134,4 +135,4 @@ def _held_to_light(record: DryRecord, noise: NoiseModel, times: FloatArray) -> F
     levels, columns = np.linalg.solve(root, level), np.linalg.solve(root, columns)
     basis, _ = np.linalg.qr(levels)
     free = columns - basis @ (basis.T @ columns)
-    return np.stack([member.T @ free[:, :-1] ** 2, member.T @ (free[:, :-1] * free[:, -1:])])
+    return np.stack([member.T @ free[:, :-1] ** 2, member.T @ (free[:, :-1] * free[:, -1:])], axis=1)

@@ -79,8 +79,6 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
         c.show(f"{folder.name}: channels", words("channel", "quantity", "unit", "axis", "axis by"), channels)
     for problem in problems:
         c.warn(f"left out: {problem}")
-    if not set.intersection(*({series.name for series in export.series} for export in exports)):
-        c.warn("no channel is in all files. Where two devices wrote a file each, join the two of a run in one first")
     for change in changes:
         c.print(change)
     if open_places:
@@ -101,15 +99,14 @@ def _draft(
     rows = []
     for channel, guess in guesses.channels.items():
         axis = "" if guess.axis.value is None else f"{guess.axis.number:g}"
-        reason = " ".join([f"({guess.axis.source})" * bool(axis), guess.axis.reason]).strip()
-        rows.append([channel, guess.quantity.value or "?", guess.unit or "?", axis, reason])
+        source = f"({guess.axis.source}) " * bool(axis)
+        rows.append([channel, guess.quantity.value or "?", guess.unit or "?", axis, source + guess.axis.reason])
     if bearing is None and not (c.target / BEARING).exists():
         _write(c, BEARING, _bearing_draft(guesses))
     kinds = Counter(run.kind.value or "unknown" for run in guesses.runs)
     runs = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
-    guessed = text.count("(guess)") - 1  # the head explains the mark
-    count = f"{len(rows)} channels, {len(guesses.runs)} records ({runs}), {guessed} entries marked (guess)"
-    return text, count, rows
+    summary = f"{len(rows)} channels, {len(guesses.runs)} records ({runs})"
+    return text, f"{summary}, {text.count('(guess)') - 1} entries marked (guess)", rows  # the head explains the mark
 
 
 def _write(c: Command, name: str, text: str, before: str = "") -> None:
@@ -127,15 +124,18 @@ def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[
     from rigdata.survey.exports import read_exports, record_files
 
     problems: list[Problem] = []
-    exports = []
+    exports, names = [], Counter[str]()
     with c.progress(f"looking at {folder.name}") as show:
         total = len(record_files(folder))
         for export in read_exports(folder, problems, names):
             exports.append(export)
+            names.update(series.name for series in export.series)
             show(export.name, len(exports), total)
     texts = [str(problem) for problem in problems]
     if not exports:
         raise BadInputError("\n".join(texts[:5]))
+    if max(names.values(), default=0) < len(exports):
+        c.warn("no channel is in all files. Where two devices wrote a file each, join the two of a run in one first")
     return exports, texts
 
 
