@@ -124,17 +124,17 @@ def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[
     from rigdata.survey.exports import read_exports, record_files
 
     problems: list[Problem] = []
-    exports, names = [], Counter[str]()
+    exports, columns = [], Counter[str]()
     with c.progress(f"looking at {folder.name}") as show:
         total = len(record_files(folder))
         for export in read_exports(folder, problems, names):
             exports.append(export)
-            names.update(series.name for series in export.series)
+            columns.update(series.name for series in export.series)
             show(export.name, len(exports), total)
     texts = [str(problem) for problem in problems]
     if not exports:
         raise BadInputError("\n".join(texts[:5]))
-    if max(names.values(), default=0) < len(exports):
+    if max(columns.values(), default=0) < len(exports):
         c.warn("no channel is in all files. Where two devices wrote a file each, join the two of a run in one first")
     return exports, texts
 
