@@ -9,6 +9,7 @@ from rigdata.campaign import load_campaign
 from rigdata.vector import directions
 from rigdata.virtual_rig import ClearanceSweep, DryTest, Fault, Instruments, Noise, RigPlan, RigTruth, VirtualRig
 from tests.pivot.test_assemble import record
+from tpjb_ident.pivot import sweep_witness as sweep_witness_module
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.sweep_witness import (
     SweepWitness,
@@ -17,6 +18,7 @@ from tpjb_ident.pivot.sweep_witness import (
     probes_of,
     push_circle,
     sweep_witness,
+    witness_of,
 )
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
@@ -101,6 +103,16 @@ def test_probes_along_right_angled_pads_show_no_gain_and_those_in_between_do(gai
         rows = directions(axes) * np.exp([[gain], [0.0]])
         errors = probe_errors(load, np.linalg.solve(directions(axes), rows @ place.T).T, stated, axes)
         np.testing.assert_allclose(errors, np.array([shown, -shown]), atol=3e-3)
+
+
+def test_a_sweep_that_does_not_go_around_tells_not_where_runs_begin(monkeypatch):
+    """A pad that half a turn had left out was said to begin elsewhere by 80 % of the clearance."""
+    load, place = swept()
+    run = record(1).run
+    for part, probes in ((AROUND >= 0.0, probes_of(run)), (AROUND < np.pi, ())):
+        vectors = load[part], place[part]
+        monkeypatch.setattr(sweep_witness_module, "_good_vectors", lambda run, vectors=vectors: vectors)
+        assert witness_of(run, ANGLES).probes == probes
 
 
 PLAN = RigPlan(

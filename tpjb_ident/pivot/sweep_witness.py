@@ -44,6 +44,7 @@ _EVIDENCE = {
 }  #: by quantity: what shows it, and conditions of gains and of axes
 _EXCHANGED = 0.6  # [rad] from which it is no axis any more but another channel or sign: that is refused elsewhere
 _TOUCHED = 0.99  # share of a sweep in which the shaft has not been farther out
+_PUSHED = 0.9  # cosine of the angle within which a pad is pushed at
 _PLAUSIBLE, _STAYS = 0.3, 0.1  # deviation of a sensor's error; of a run's weight: that the zero did not move
 _LEAST_LENGTH = 1e-9  # [m]: a shorter one is none
 _ELSEWHERE, _LEAST_MOVE, _SPREADS = 0.015, 1e-6, 5.0  # of the clearance, [m], robust deviations of the other runs
@@ -215,7 +216,10 @@ def witness_of(run: Run, angles: FloatArray) -> SweepWitness:
             text = f"{evidence} as if {pair[0].name} {more} {pair[1].name}; half of it is taken off each"
             conditions.append(Condition(of_gain, text))
     _, place = _good_vectors(as_witnessed(run, channels))
-    return SweepWitness(errors, channels, tuple(conditions), place, probes_of(run))
+    # a pad that was not pushed at is elsewhere by as much as nobody knows
+    pushed = np.cos(np.arctan2(load[:, 1], load[:, 0])[:, None] - angles).max(axis=0)
+    probes = probes_of(run) if pushed.min() > _PUSHED else ()
+    return SweepWitness(errors, channels, tuple(conditions), place, probes)
 
 
 def _good_vectors(run: Run) -> tuple[FloatArray, FloatArray]:
