@@ -109,7 +109,7 @@ def test_a_sweep_that_does_not_go_around_tells_not_where_runs_begin(monkeypatch)
     """A pad that half a turn had left out was said to begin elsewhere by 80 % of the clearance."""
     load, place = swept()
     run = record(1).run
-    for part, probes in ((AROUND >= 0.0, probes_of(run)), (AROUND < np.pi, ())):
+    for part, probes in ((AROUND >= 0.0, probes_of(run)), (np.pi > AROUND, ())):
         vectors = load[part], place[part]
         monkeypatch.setattr(sweep_witness_module, "_good_vectors", lambda run, vectors=vectors: vectors)
         assert witness_of(run, ANGLES).probes == probes
