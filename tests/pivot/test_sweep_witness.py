@@ -113,6 +113,7 @@ def test_a_sweep_that_does_not_go_around_tells_not_where_runs_begin(monkeypatch)
         vectors = load[part], place[part]
         monkeypatch.setattr(sweep_witness_module, "_good_vectors", lambda run, vectors=vectors: vectors)
         assert witness_of(run, ANGLES).probes == probes
+        assert witness_of(run, ANGLES[:0]).probes == probes_of(run)  # pads that nobody states
 
 
 PLAN = RigPlan(

@@ -218,7 +218,7 @@ def witness_of(run: Run, angles: FloatArray) -> SweepWitness:
     _, place = _good_vectors(as_witnessed(run, channels))
     # a pad that was not pushed at is elsewhere by as much as nobody knows
     pushed = np.cos(np.arctan2(load[:, 1], load[:, 0])[:, None] - angles).max(axis=0)
-    probes = probes_of(run) if pushed.min() > _PUSHED else ()
+    probes = probes_of(run) if np.all(pushed > _PUSHED) else ()
     return SweepWitness(errors, channels, tuple(conditions), place, probes)
 
 
