@@ -86,29 +86,30 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
     gain = _gain(design, weights)
     solution = gain @ distances
     suspects, doubt = np.zeros(len(angles)), np.zeros((2, 2))
-    if len(angles) > 4:
-        even = _gain(design, np.ones(len(angles)))
-        moved, apart = (solution - even @ distances)[:2], distances - design @ even @ distances
-        if np.linalg.norm(apart) > _NOTABLE and not _explained(
-            design, distances, solution, covariance + gains @ gains.T
-        ):
-            doubt = apart @ apart / (len(angles) - 4) * even[:2] @ even[:2].T + np.outer(moved, moved)
+    even = _gain(design, np.ones(len(angles)))
+    free = np.eye(len(angles)) - design @ even
+    apart, moved = free @ distances, (solution - even @ distances)[:2]
     if len(angles) == 4:  # any one may be what stands off: each explains all that no centre does
-        inexplicable = np.linalg.svd(design)[0][:, 3]
-        suspects = (inexplicable @ distances) / inexplicable
+        suspects = apart / np.diag(free)
+    elif not _explained(design, distances, solution, covariance + gains @ gains.T):
+        doubt = apart @ apart / (len(angles) - 4) * even[:2] @ even[:2].T + np.outer(moved, moved)
     # of pads at right angles two of the four lie along each axis
     shifts = _AS_DEVIATION * gain[:2] * suspects
     return Centre(solution[:2], solution[2], gain, 0.5 * shifts @ shifts.T, suspects, doubt)
 
 
 def _explained(design: FloatArray, distances: FloatArray, solution: FloatArray, covariance: FloatArray) -> bool:
-    """Whether four sides or more are alike by a covariance (n, n), and lie on one polygon as well as that says."""
+    """Whether four sides or more are alike by a covariance (n, n), and lie on one polygon as well as that says.
+
+    Where all of them differ by nothing of consequence, they need not.
+    """
     covariance = covariance + _LEAST_ERROR**2 * np.eye(len(distances))
-    alike = np.abs(distances - design @ solution) < _ALIKE * np.sqrt(np.diag(covariance))
+    off = distances - design @ solution
+    alike = np.abs(off) < _ALIKE * np.sqrt(np.diag(covariance))
     root = np.linalg.cholesky(covariance[np.ix_(alike, alike)])
     sides = np.linalg.solve(root, np.column_stack([design, distances])[alike])
     square = np.linalg.lstsq(sides[:, :3], sides[:, 3], rcond=None)[1]  # none of three sides
-    return bool(np.any(special.chdtrc(len(sides) - 3, square) > _BY_CHANCE))
+    return np.linalg.norm(off) < _NOTABLE or bool(np.any(special.chdtrc(len(sides) - 3, square) > _BY_CHANCE))
 
 
 def _gain(design: FloatArray, weights: FloatArray) -> FloatArray:

@@ -55,7 +55,7 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
     before = manifest.read_text("utf-8-sig") if update else ""
     drawings = [p for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]]
     bearing = bearing or (drawings[0].name if len(drawings) == 1 else None)
-    exports, problems = _read_exports(c, folder, column_names(before) if update else ())
+    exports, problems = _read_exports(c, folder, column_names(before))
     drawing = (folder if bearing else c.target) / (bearing or BEARING)
     angles: tuple[float, ...] = ()
     with suppress(BearingError):  # it cannot be read yet
@@ -131,12 +131,11 @@ def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[
             exports.append(export)
             columns.update(series.name for series in export.series)
             show(export.name, len(exports), total)
-    texts = [str(problem) for problem in problems]
     if not exports:
-        raise BadInputError("\n".join(texts[:5]))
+        raise BadInputError("\n".join(map(str, problems[:5])))
     if max(columns.values(), default=0) < len(exports):
         c.warn("no channel is in all files. Where two devices wrote a file each, join the two of a run in one first")
-    return exports, texts
+    return exports, [str(problem) for problem in problems]
 
 
 def _bearing_draft(guesses: Survey) -> str:
