@@ -24,7 +24,8 @@ def opened(campaign_of):
     def make(points, k=K, clearance=SWEEP.clearance, **changes):
         truth = RigTruth.constant(k, np.diag([4e5, 6e5]), pivot_stiffness=6e8)
         plan, instruments = RigPlan(locus=points, clearance=clearance), Instruments.like_paper(seed=2)
-        return load_campaign(campaign_of(rig(plan, truth=truth, instruments=instruments, seed=9, **changes)))
+        stated = {"plan": plan, "truth": truth, "instruments": instruments, "seed": 9}
+        return load_campaign(campaign_of(rig(**(stated | changes))))
 
     return make
 
@@ -63,6 +64,23 @@ def test_positions_from_the_bearing_centre(campaign, polygon):
     assert set(needed) <= set(frame.columns)
     assert frame.static_load_direction_deg.iloc[0] == pytest.approx(-90.0)
     assert "6 positions" in str(found)
+
+
+@pytest.mark.parametrize("channel", ["X1A", "X1B"])
+def test_tables_hold_a_gain_that_the_sweep_doubts(opened, channel):
+    """A probe 20 % high was named, and positions and clearances stood nine half-intervals off."""
+    truth = RigTruth.constant(K, np.diag([4e5, 6e5]), pivot_stiffness=6e8, clearance=(80e-6,) * 5)
+    source = opened(locus_points(6), truth=truth, faults=(Fault("scaled", channel=channel, value=1.2),))
+    polygon = measure_clearance(source, ANGLES)
+    assert "probe-gains-differ" in polygon.status
+    table = polygon.to_frame()
+    assert np.all(np.abs(table.clearance_m - 80e-6) < 1.96 * table.clearance_m_se)
+    assert np.all(np.abs(table.clearance_m - 80e-6) > 3.0 * polygon.clearance_se)
+    table = measure_locus(source, polygon).to_frame()
+    directions = np.radians(table.static_load_direction_measured_deg)
+    true = np.array([true_position(*pair) for pair in zip(directions, table.static_load_measured_N, strict=True)])
+    for place, error, axis in ((table.x_m, table.x_m_se, true[:, 0]), (table.y_m, table.y_m_se, true[:, 1])):
+        assert np.all(np.abs(place - axis) < 1.96 * error + 0.3e-6)
 
 
 def test_without_a_polygon_positions_are_raw_and_say_so(campaign, polygon, raw):

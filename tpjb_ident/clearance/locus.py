@@ -247,7 +247,8 @@ def _gain_errors(run: Run, position: FloatArray) -> FloatArray:
     """Covariance (2, 2) [m^2] of a position (2,) [m] by what the gains of its probes are known to."""
     axes, uncertainty = probe_gains(run)
     along = directions(axes)
-    return along.T * (along @ position * uncertainty) ** 2 @ along
+    inverse = np.linalg.pinv(along)
+    return inverse * (along @ position * uncertainty) ** 2 @ inverse.T
 
 
 def _noise(records: Sequence[_Record]) -> NoiseModel:

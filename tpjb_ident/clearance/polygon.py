@@ -99,17 +99,14 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
 
 
 def _explained(design: FloatArray, distances: FloatArray, solution: FloatArray, covariance: FloatArray) -> bool:
-    """Whether four sides or more are alike by a covariance (n, n), and lie on one polygon as well as that says.
-
-    Where all of them differ by nothing of consequence, they need not.
-    """
+    """Whether four sides or more lie on one polygon by a covariance (n, n), or all do but for what is of no matter."""
     covariance = covariance + _LEAST_ERROR**2 * np.eye(len(distances))
     off = distances - design @ solution
     alike = np.abs(off) < _ALIKE * np.sqrt(np.diag(covariance))
     root = np.linalg.cholesky(covariance[np.ix_(alike, alike)])
     sides = np.linalg.solve(root, np.column_stack([design, distances])[alike])
     square = np.linalg.lstsq(sides[:, :3], sides[:, 3], rcond=None)[1]  # none of three sides
-    return np.linalg.norm(off) < _NOTABLE or bool(np.any(special.chdtrc(len(sides) - 3, square) > _BY_CHANCE))
+    return bool(np.linalg.norm(off) < _NOTABLE or np.any(special.chdtrc(len(sides) - 3, square) > _BY_CHANCE))
 
 
 def _gain(design: FloatArray, weights: FloatArray) -> FloatArray:
