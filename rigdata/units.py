@@ -217,8 +217,9 @@ def temperature_offset(unit: str) -> float:
 
 
 def is_signal(unit: str) -> bool:
-    """Whether `unit` is what a data logger sees (V, mA, mV/V), not an engineering unit."""
-    return is_bridge_ratio(unit) or parse_unit(unit).powers in (parse_unit("V").powers, parse_unit("A").powers)
+    """Whether `unit` is what a data logger sees (V, mA, mV/V, count), not an engineering unit."""
+    volt, ampere, count = map(parse_unit, LISTED["signals"])
+    return is_bridge_ratio(unit) or parse_unit(unit).powers in (volt.powers, ampere.powers, count.powers)
 
 
 def is_bridge_ratio(unit: str) -> bool:

@@ -196,8 +196,13 @@ def stated_frame(pair: Pair, channels: Guesses) -> Frame | None:
     return Frame(pair, math.radians(angles[0]), 1 if turn > 0 else -1, source, reason)
 
 
-def fitted_frame(pair: Pair, readings: FloatArray, directions: FloatArray, reason: str) -> Frame | None:
-    """Fit the frame of two sensors to readings (n, 2) of known directions (n,) [rad]; None where they contradict."""
+def fitted_frame(
+    pair: Pair, readings: FloatArray, directions: FloatArray, reason: str, shared: float = 0.0
+) -> Frame | None:
+    """Fit the frame of two sensors to readings (n, 2) of known directions (n,) [rad]; None where they contradict.
+
+    All directions may be off by as much alike, `shared` [deg].
+    """
     if len(readings) < 2:
         return None
     turned = np.arctan2(readings[:, 1], readings[:, 0])
@@ -211,7 +216,7 @@ def fitted_frame(pair: Pair, readings: FloatArray, directions: FloatArray, reaso
     if residual > _MOST_OFF or mirrored < _MIRROR * max(residual, 1.0):
         return None
     reason = f"{reason}, residual {residual:.1f} deg"
-    return Frame(pair, angle, sense, "records", reason, residual / math.sqrt(len(readings)))
+    return Frame(pair, angle, sense, "records", reason, math.hypot(shared, residual / math.sqrt(len(readings))))
 
 
 def with_axes(channels: Guesses, frame: Frame, source: str = "") -> None:

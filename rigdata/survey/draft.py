@@ -88,7 +88,8 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
             lines.append(f'sensitivity = "{MARK}"   # such as {WORDS["sensitivities"].get(quantity, "1 V per unit")}')
     usual = surveyed.channels[model].polarity
     if guess.axis.value is not None and (guess.polarity < 0 or guess.polarity != usual):
-        lines.append(f"polarity = {guess.polarity}")
+        remark = "   # (guess) on cells; the other way round where the stator hangs" * (quantity == "acceleration")
+        lines.append(f"polarity = {guess.polarity}{remark}")
     if quantity == "temperature":
         pad = re.search(rf"(?:{PAD}|t|tc|temp\w*?)[-_ #]*(\d{{1,2}})(?!\d)", name, re.IGNORECASE)
         lines.append(f"pad = {int(pad[1])}   # (guess) its name" if pad and int(pad[1]) else "# pad = 1")
@@ -222,12 +223,15 @@ def _update(blocks: list[_Block], old: _Tables | None, new: _Tables) -> list[str
 
 
 def _merge(block: _Block, new: Sequence[str], old: Sequence[str], changes: list[str]) -> None:
-    """Fill in open places, put new guesses in place of old ones, and add what a table lacks; no line goes."""
+    """Fill in open places, put new guesses in place of old ones, add what a table lacks; needless open ones go."""
     guessed, proposals = _values(old), _values(new)
     lines, present = [], set()
     for line in block.lines:
         key, value = _entry(line)
         present.add(key)
+        if MARK in value and key in guessed and key not in proposals:
+            changes.append(f"{block.place}: {key} is not needed")
+            continue
         is_guess = bool(_OWN.search(line)) and key in guessed and value == guessed[key][0]
         if key in proposals and (MARK in value or is_guess) and MARK not in proposals[key][0]:
             result, drafted = proposals[key]

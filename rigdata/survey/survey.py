@@ -41,11 +41,14 @@ _MAINS_NEAR = 0.005
 _SPREADS = {"direction": (5.0, 0.0), "speed": (0.0, 0.015), "excitation": (0.0, 0.015), "load": (0.0, 0.03)}
 #: Share of the running records in which the shaft speed must show.
 _MOST_OF = 0.8
-#: A load that a file's name states and the cells contradict by more than this share is to be confirmed.
-_CONTRADICTS = 0.1
+#: A load that a file's name states and the cells contradict by more than this share is to be confirmed; cells that show
+#: no more than this share of it are in line with the stingers of a stator that hangs: they carry a preload alone.
+_CONTRADICTS, _PRELOAD = 0.1, 0.02
+#: By so much [deg] the shaft goes beside its pad in dry steps.
+_ASIDE = 3.0
 _RUNNING = ("dynamic", "locus")
-#: Readings (n, 2) of two sensors, the directions (n,) that they had [rad], and what tells these.
-_Evidence = tuple[FloatArray, FloatArray, str]
+#: Readings (n, 2) of two sensors, the directions (n,) that they had [rad], what tells these, and their error [deg].
+_Evidence = tuple[FloatArray, FloatArray, str, float]
 
 
 @dataclass(frozen=True)
@@ -189,11 +192,11 @@ class _Folder:
         steps, forces = last - first
         if not np.isfinite(directions).all():
             directions = cells.direction(forces)
-        yield steps, directions, f"{len(steps)} dry steps"
+        yield steps, directions, f"{len(steps)} dry steps", _ASIDE
         if len(steps) > 2:
             towards = np.exp(1j * directions)
             deviations = np.angle(towards - towards.mean())
-            yield last[0] - last[0].mean(axis=0), deviations, f"where {len(steps)} dry steps end"
+            yield last[0] - last[0].mean(axis=0), deviations, f"where {len(steps)} dry steps end", 0.0
 
     def _of_excitation(self, pair: Pair, cells: Frame) -> _Evidence:
         """How two accelerometers move: the housing gives way to the force on its cells along the excitation."""
@@ -204,7 +207,7 @@ class _Folder:
                 force, acceleration = along(line_phasors(forces, frequency), line_phasors(housing, frequency))
                 readings.append(acceleration)
                 directions.append(cells.direction(force))
-        return np.array(readings), np.array(directions), f"the excitation of {len(readings)} runs"
+        return np.array(readings), np.array(directions), f"the excitation of {len(readings)} runs", 0.0
 
     def find_sensitivities(self, line: float) -> None:
         """Reading per hertz of speed channels in volts, where it is one in all running records."""
@@ -265,7 +268,7 @@ def _with_load(run: RunGuess, load: float) -> RunGuess:
     agrees = deviation <= _CONTRADICTS * entry.number
     if entry.source == "file" and agrees:
         return run
-    if entry.source == "file" or deviation <= _SPREADS["load"][1] * entry.number:
+    if entry.source == "file" or deviation <= _SPREADS["load"][1] * entry.number or load < _PRELOAD * entry.number:
         source = "records" if agrees else "guess"
         return replace(run, load=replace(entry, source=source, reason=f"the file's name; {reason}"))
     return replace(run, load=Entry(load, "records", reason))

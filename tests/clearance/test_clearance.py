@@ -16,11 +16,17 @@ from rigdata.vector import directions
 from rigdata.virtual_rig import ClearanceSweep, DryTest, Fault, Noise, RigPlan
 from tests.clearance.cases import ANGLES, CLEARANCE, OtherRun, bearing_centre, rig, sphere
 from tpjb_ident.clearance.measure import _inseparable, coldest_first, measure_clearance, measure_run, pairs_frame
-from tpjb_ident.clearance.polygon import find_centre
+from tpjb_ident.clearance.polygon import find_centre as find_centre_of
 from tpjb_ident.clearance.sweep import _settled
 from tpjb_ident.compare.static_tests import bearing_problems
 from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot.fit import fit_pivots
+
+
+def find_centre(angles, distances, covariance, gains=((0.0,),)):
+    """Centre of probes whose gains are known exactly."""
+    return find_centre_of(angles, distances, covariance, np.ones((len(angles), 1)) * gains)
+
 
 WHOLE = rig(
     RigPlan(dry=tuple(DryTest(p) for p in range(1, 6)), clearance=(ClearanceSweep(), ClearanceSweep(push=800.0)))
@@ -221,16 +227,19 @@ def test_unequal_probes_are_made_alike_and_their_difference_is_in_the_interval(o
     assert np.max(np.abs(turned - ANGLES)) == pytest.approx(0.015, rel=0.2)
 
 
-def test_a_sweep_of_three_or_four_pads_says_what_it_leaves_open(whole):
-    found = measure_run(whole[0].of_kind("clearance")[0], ANGLES)
-    sides = SimpleNamespace(pads=np.arange(3), distance=found.clearance[:3], covariance=np.eye(3) * 1e-16)
-    assert "only their mean" in _inseparable(sides, found, 0)
-    square = replace(found, angles=np.radians([-90.0, 0.0, 90.0, 180.0]), clearance=found.clearance[:4])
-    square = replace(square, relative_calibration=np.zeros(4))
-    sides = SimpleNamespace(pads=np.arange(4), distance=np.array([80, 80, 88, 80]) * 1e-6, covariance=np.eye(4) * 1e-16)
-    assert "nothing tells which: pad #1 +8.0 µm, pad #2 -8.0 µm, pad #3 +8.0 µm" in _inseparable(sides, square, 0)
-    sides.distance = np.full(4, 80e-6)
-    assert _inseparable(sides, square, 0) == ""
+def test_a_sweep_of_three_or_four_pads_says_what_it_leaves_open():
+    for number, expected in (
+        (3, "only their mean"),
+        (4, "tells which: pad #1 +8.0 µm, pad #2 -8.0 µm, pad #3 +8.0 µm"),
+    ):
+        angles = np.radians([-90.0, 0.0, 90.0, 180.0][:number]) * (1.0 if number == 4 else 4.0 / 3.0)
+        for off in (8e-6, 0.0):
+            distance, covariance = 80e-6 + off * (np.arange(number) == 2), np.eye(number) * 1e-16
+            sides = SimpleNamespace(pads=np.arange(number), covariance=covariance)
+            centre = find_centre(angles, distance, covariance)
+            details = [condition.detail for condition in _inseparable(sides, centre, np.zeros((number, 2)))]
+            assert len(details) == (off > 0.0 or number == 3)
+            assert all(expected in detail for detail in details)
 
 
 def test_a_clean_sweep_is_measured_to_a_tenth_of_a_micrometre(opened):
@@ -301,6 +310,28 @@ def test_of_four_pads_any_may_be_off_and_the_error_reaches_to_each(degrees, pad)
     five = find_centre(ANGLES, np.full(5, 80e-6), SMALL)
     assert not five.covariance.any()
     assert not five.suspects.any()
+
+
+@pytest.mark.parametrize(
+    ("off", "is_open"),
+    [
+        ([0.0, 0.0, 6.0, 0.0, 0.0], False),
+        ([0.3, -0.2, 0.1, -0.3, 0.2], False),
+        ([0.0, 3.0, -1.0, 1.0, -2.0], True),
+        ([0.0, 9.0, 0.0, 0.0, -7.0], True),
+    ],
+)
+@pytest.mark.parametrize("ratio", [1.0, 0.998])
+def test_pads_of_which_none_alone_explains_the_sweep_leave_the_centre_in_doubt(off, is_open, ratio):
+    """Of 100, 103, 99, 101, 98 um one was told as worn by 3.7 um, and nothing held that all may stand off by some."""
+    angles = ANGLES[0] + 2.0 * np.pi * np.arange(len(off)) / len(off)
+    n, share = directions(angles), np.cos(angles[:, None] - np.radians([45.0, 135.0])) ** 2
+    distance = (100e-6 + 1e-6 * np.array(off)) * (share @ [ratio, 1.0])
+    found = find_centre(angles, distance, np.eye(len(off)) * 1e-16, 0.5e-6 * share)
+    assert found.doubt.any() == is_open
+    half = 1.96 * np.sqrt(np.sum(n @ found.doubt * n, axis=1))
+    if is_open:  # the bearing's own centre is at zero
+        assert np.all(np.abs(n @ found.position) < half)
 
 
 @pytest.mark.parametrize("angles", [ANGLES[:2], np.zeros(5)])

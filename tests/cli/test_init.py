@@ -123,6 +123,24 @@ def test_filling_in_a_unit_leaves_what_is_like_it_and_a_valid_manifest_valid(fol
     assert load_campaign(folder).runs[0].channels["Prox B"].unit == "um"
 
 
+def test_a_sensitivity_that_a_unit_makes_needless_is_open_no_more(folder):
+    manifest = drafted(folder, "dyn-5kN-1320rpm.csv", ("Time", "Prox A", "Temp 1", "FH [N]", "FV [N]"))
+    start = manifest.read_text("utf-8").index('[channels."Temp 1"]')
+    head, tail = manifest.read_text("utf-8")[:start], manifest.read_text("utf-8")[start:]
+    assert 'sensitivity = "??"' in tail.partition("[[")[0]
+    manifest.write_text(head + tail.replace('unit = "??"', 'unit = "degC"', 1), "utf-8")
+    result = ended(0, "init", folder, "--update")
+    assert "channel Temp 1: sensitivity is not needed" in result.stdout
+    assert "sensitivity" not in manifest.read_text("utf-8").partition('[channels."Temp 1"]')[2].partition("[")[0]
+
+
+def test_files_of_two_devices_are_said_to_be_halves_of_runs(folder):
+    record(folder / "d-5kN_daq1.csv")
+    assert "no channel is in all files" not in tpjb("init", folder, "--out", folder.parent / "one").stderr
+    record(folder / "d-5kN_daq2.csv", ("Time", "A1", "A2", "A3", "A4"))
+    assert "join the two of a run in one first" in " ".join(tpjb("init", folder).stderr.split())
+
+
 def test_open_places_are_one_line_and_the_last_one_the_next_command(folder):
     record(folder / "dyn-5kN-1320rpm.csv", ("Time", "Prox A", "Prox B", "FH [N]", "FV [N]"))
     first, *_, last = tpjb("init", folder).stdout.strip().splitlines()

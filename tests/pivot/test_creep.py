@@ -63,3 +63,16 @@ def test_what_a_pad_alone_shows_is_taken_off_and_the_others_stay(creeping):
         assert (after is before) == (pad not in creeping)
         slope = np.polyfit(after.blocks.load, after.blocks.deflection, 1)[0]
         assert abs(slope / 4e-9 - 1.0) < max(1.5 * after.creep, 0.03)
+
+
+@pytest.mark.parametrize("size", [-2e-6, -0.3e-6, 0.3e-6, 2e-6])
+@pytest.mark.parametrize("place", [0.32, 0.55, 0.88])
+def test_a_jump_within_one_hold_is_no_creep(size, place):
+    """It read as a creep of 200 %, which left nothing of the deflection: a pivot of 1e23 N/m."""
+    given = campaign()
+    blocks = given[1].blocks
+    after = blocks.time > place * blocks.time[-1]
+    given[1] = replace(given[1], blocks=replace(blocks, deflection=blocks.deflection + size * after))
+    less, _, conditions = without_creep(given, NOISE)
+    assert less == given
+    assert not any(conditions.values())

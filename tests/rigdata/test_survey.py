@@ -13,12 +13,13 @@ from rigdata.problem import Problem
 from rigdata.readers.base import RecordFile
 from rigdata.readers.series import Series
 from rigdata.readers.text.head import find_head
-from rigdata.survey.channels import guess_channel, usable_unit
+from rigdata.survey.channels import ChannelGuess, Entry, guess_channel, usable_unit
 from rigdata.survey.draft import draft_manifest
 from rigdata.survey.exports import Export, read_exports, record_files
 from rigdata.survey.runs import _load_of, guess_run
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
-from rigdata.survey.survey import survey
+from rigdata.survey.survey import Survey, survey
+from rigdata.vector import directions
 from rigdata.virtual_rig import DryTest, locus_points, operating_points
 from tests.good_campaigns import SMALL_PLAN, rocker_rig
 from tpjb_ident.check.campaign import check_campaign
@@ -91,6 +92,14 @@ def test_a_draft_says_what_is_missing_and_works_when_that_is_filled_in(exports, 
     assert {r.id: r.kind for r in campaign.runs} == {r.id: r.kind for r in truth.runs}
     run = truth.runs[0].id
     np.testing.assert_allclose(campaign.run(run).vector("force").values, truth.run(run).vector("force").values)
+
+
+def test_a_sign_of_an_accelerometer_is_a_guess_as_long_as_nobody_says_how_the_stator_is_held():
+    guess = ChannelGuess(Entry("acceleration", "file"), "g", axis=Entry(0.0, "records"), polarity=-1)
+    probe = replace(guess, quantity=Entry("displacement", "file"), unit="um")
+    text = draft_manifest(Survey({"A": guess, "X": probe}, (), {}), "x", None)
+    assert text.count("polarity = -1   # (guess) on cells") == 1
+    assert text.count("polarity = -1\n") == 1
 
 
 def _calibrations(manifest: str) -> dict[str, str]:
@@ -279,12 +288,30 @@ def test_units_in_names_are_understood():
         ("run_5kN_25Hz.csv", 6000.0, 5000.0, "guess", "the file's name; cells 6 kN"),
         ("run_08750_25Hz.csv", 8800.0, 8750.0, "records", "the file's name; cells 8.8 kN"),
         ("run_25Hz.csv", 5000.0, 5000.0, "records", "cells 5 kN"),
+        ("run_08750_25Hz.csv", 60.0, 8750.0, "guess", "the file's name; cells 0.06 kN"),  # the preload of stingers
     ],
 )
 def test_a_load_by_a_file_s_name_is_held_against_the_cells(name, load, kept, source, reason):
     (run,) = guessed((name, {"LC_H": ("N", SWING), "LC_V": ("N", SWING - load)}))
     assert run.load.value == pytest.approx(kept, rel=1e-3)
     assert (run.load.source, run.load.reason) == (source, reason)
+
+
+def test_where_dry_steps_end_tells_axes_of_probes_when_the_shaft_goes_aside():
+    """A shaft that went 12 % beside every pad made axes of 38 deg of probes at 45 deg, residual 0.2 deg."""
+    angles, time = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0]), np.arange(400) / 50.0
+    tests = []
+    for pad, angle in enumerate(angles, 1):
+        (x, y), rise = directions([angle])[0], np.clip(time / 8.0, 0.0, 1.0)
+        aside = directions([angle + 0.12])[0]
+        place = 80.0 * np.array([x, y]) + np.outer(rise, 6.0 * aside)
+        probes = place @ directions(np.radians([45.0, 135.0])).T
+        columns = {"X1": ("um", probes[:, 0]), "X2": ("um", probes[:, 1])}
+        columns |= {"L1": ("N", 5000.0 * rise * x), "L2": ("N", 5000.0 * rise * y)}
+        series = tuple(Series(name, unit, values, time) for name, (unit, values) in columns.items())
+        tests.append(Export(f"p-{pad}-up.csv", series))
+    channels = survey(tests, pivots=angles).channels
+    assert [channels[name].axis.number for name in ("X1", "X2")] == [45.0, 135.0]
 
 
 def test_the_pad_of_a_thermometer_is_read_from_its_name():

@@ -17,6 +17,7 @@ from rigdata.units import (
     UnitError,
     common_units,
     from_pint,
+    is_signal,
     parse_quantity,
     parse_unit,
     sensitivity_gain,
@@ -144,9 +145,12 @@ def test_refusals(says):
         ("1.6 mA/mm", "mA", "length", 1e-3 / 1.6),
         ("0.5 V/bar", "V", "pressure", 2e5),
         ("2 N/mV", "V", "force", 2000.0),
+        ("25.5 count/um", "count", "length", 1e-6 / 25.5),
+        ("1.6 counts/N", "LSB", "force", 1 / 1.6),
     ],
 )
 def test_sensitivities(sensitivity, signal, dimension, gain):
+    assert is_signal(signal)
     assert sensitivity_gain(sensitivity, signal, dimension) == pytest.approx(gain, rel=1e-12)
 
 

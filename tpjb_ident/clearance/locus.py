@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, special
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
-from rigdata.vector import directions, zero_uncertainty
-from tpjb_ident.clearance.measure import ClearancePolygon
+from rigdata.vector import directions, wrapped, zero_uncertainty
+from tpjb_ident.clearance.measure import ClearancePolygon, probe_gains
 from tpjb_ident.conditions import Conditions, holding, sentences
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.lines import line_design
@@ -69,6 +68,8 @@ class LocusPoint:
         From the bearing centre [m]; from the probes' own zero where no centre is known.
     covariance : (2, 2) ndarray
         [m^2], the centre's own included, and where repeats tell it how well the shaft comes back.
+    doubt : (2, 2) ndarray or float
+        Beside that, of the probes' gains and of other centres that fit a sweep as well [m^2]: what all positions share.
     """
 
     run: str
@@ -77,6 +78,7 @@ class LocusPoint:
     load_direction: float
     position: FloatArray
     covariance: FloatArray
+    doubt: FloatArray | float = 0.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -90,7 +92,7 @@ class Locus(Presented):
     centre : (2,) ndarray
         Reading of the bearing centre that was taken off [m]; zero where none is known.
     drift : (2,) ndarray
-        Drift taken off, per run in the order of testing [m]; NaN where no direction was repeated.
+        Drift taken off, per run in the order of testing, of a jump the mean [m]; NaN where no direction was repeated.
     status : tuple of Condition
         Named conditions.
     """
@@ -107,7 +109,7 @@ class Locus(Presented):
         rows = []
         for p in self.points:
             measured = p.load, math.degrees(p.load_direction)
-            rows.append((*p.point.static_key, *measured, *p.position, *np.sqrt(np.diag(p.covariance)), p.run))
+            rows.append((*p.point.static_key, *measured, *p.position, *np.sqrt(np.diag(p.covariance + p.doubt)), p.run))
         return pd.DataFrame(rows, columns=[*STATIC_KEY, *_MEASURED])
 
     def plot(self, **options: Any) -> Any:
@@ -152,36 +154,37 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     runs = campaign.of_kind("locus")
     if not runs:
         raise refuse("campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
-    channels = {} if polygon is None else polygon.sensors
+    # with the bearing's centre from the same probes their zero falls out
+    zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
+    centre, known, doubt = np.zeros(2), zero, np.zeros((2, 2))
+    channels: Channels = {}
+    if polygon is not None:
+        centre, known = polygon.centre, polygon.centre_covariance
+        doubt, channels = polygon.centre_doubt, polygon.sensors
     records, problems = usable_runs(runs, lambda run: _read(run, channels))
     if 2 * len(records) <= len(runs):
         raise RigDataError(problems)
     orders = np.array([runs.index(record.run) for record in records], dtype=float)
     noise = _noise(records)
-    centre = np.zeros(2) if polygon is None else polygon.centre
-    repeats, drift, drift_variance, scatter = _repeats(records, orders, noise, centre)
-    # with the bearing's centre from the same probes their zero falls out
-    zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
-    centre_covariance = zero if polygon is None else polygon.centre_covariance
-    points, on_its_way = [], []
-    for record, order in zip(records, orders, strict=True):
-        size = _moved(record, noise)
-        if size:
+    walk = _walk(records, orders, noise, centre)
+    points, on_its_way = [], [walk.jump] if walk.jump else []
+    for record, moved, walked in zip(records, walk.moved, walk.covariance, strict=True):
+        if size := _moved(record, noise):
             on_its_way.append(f"halves of {record.run.id} stand {1e6 * size:.2g} µm apart")
-        position = record.position - np.nan_to_num(drift) * order - centre
-        variance = noise.mean_variance(record.span) + scatter + order**2 * drift_variance
+        position = record.position - moved - centre
         # of a steady way the ends are as far from the mean as the halves from each other
-        variance += size**2 / 4.0
-        covariance = variance * np.eye(2) + centre_covariance
-        points.append(LocusPoint(record.run.id, record.run.point, record.load, record.direction, position, covariance))
+        variance = noise.mean_variance(record.span) + size**2 / 4.0
+        run, covariance = record.run, variance * np.eye(2) + known + walked
+        shared = doubt + _gain_errors(as_witnessed(run, channels), position)
+        points.append(LocusPoint(run.id, run.point, record.load, record.direction, position, covariance, shared))
     off = np.zeros(2) if polygon is None else _off_centre(points, polygon)
     # nothing tells whether the zero moved before the sweep, after it or within: the interval holds the way
     points = [replace(p, covariance=p.covariance + np.outer(off, off)) for p in points]
-    points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
+    points.sort(key=lambda p: _swept(p.point))
     if off.any():
         on_its_way.append(f"positions go around a place {1e6 * math.hypot(*off):.2g} µm from the polygon's centre")
-    status = (*_status(points, polygon, repeats, listed(on_its_way, 4)), *refused_runs(problems))
-    return Locus(tuple(points), centre, drift, status)
+    status = (*_status(points, polygon, walk.repeats, listed(on_its_way, 4)), *refused_runs(problems))
+    return Locus(tuple(points), centre, walk.drift, status)
 
 
 @dataclass(frozen=True)
@@ -196,9 +199,20 @@ class _Record:
     blocks: tuple[NoiseSeries, NoiseSeries]  #: of either component
 
 
-def _from_down(direction: float) -> float:
-    """Angle from straight down, 0 to 2 pi: the order in which a locus is swept."""
-    return (direction + math.pi / 2 + 1e-9) % (2 * math.pi)
+@dataclass(frozen=True)
+class _Walk:
+    """What the probes' zero did over a locus of n runs, as far as directions tell that were repeated."""
+
+    repeats: int  #: runs at a set point that was there before
+    drift: FloatArray  #: (2,) per run [m]; NaN without any repeat
+    moved: FloatArray  #: (n, 2) [m]
+    covariance: FloatArray  #: (n, 2, 2) of that, and of how well the shaft comes back [m^2]
+    jump: str = ""  #: in words
+
+
+def _swept(point: OperatingPoint) -> tuple[float, ...]:
+    """Load, speed, and angle from straight down, 0 to 2 pi: the order in which a locus is swept."""
+    return point.static_load, point.spin, (point.static_load_direction + math.pi / 2 + 1e-9) % (2 * math.pi)
 
 
 def _read(run: Run, channels: Channels) -> _Record:
@@ -207,24 +221,34 @@ def _read(run: Run, channels: Channels) -> _Record:
         what = f"has only {good.sum()} usable samples of {len(good)}"
         raise refusal(run, "record", what, "Repeat this direction")
     time, place = time[good], place[good]
+    span = time[-1] - time[0]
     # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
     speed = run.point.shaft_speed_hz
-    turning = [speed, 2 * speed] if speed * (time[-1] - time[0]) > 2.0 else []
+    turning = [speed, 2 * speed] if speed * span > 2.0 else []
     design = line_design(time, np.array(turning), drift_order=0)
     mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
     load = mean[-1, 2:]
     steady = place - design[:, :-1] @ mean[:-1, :2]
     label, whole = time_bins(time, _BLOCK)
-    moment, x, y = (ndimage.mean(values, label, whole) for values in (time, *steady.T))
+    moment, *means = (ndimage.mean(values, label, whole) for values in (time, *steady.T))
     duration, constant = np.full(len(whole), _BLOCK), np.ones((len(whole), 1))
+    x, y = (NoiseSeries(moment, duration, mean, constant) for mean in means)
     return _Record(
         run=run,
         position=np.asarray(mean[-1, :2]),
         load=np.hypot(*load),
         direction=math.atan2(load[1], load[0]),
-        span=time[-1] - time[0],
-        blocks=(NoiseSeries(moment, duration, x, constant), NoiseSeries(moment, duration, y, constant)),
+        span=span,
+        blocks=(x, y),
     )
+
+
+def _gain_errors(run: Run, position: FloatArray) -> FloatArray:
+    """Covariance (2, 2) [m^2] of a position (2,) [m] by what the gains of its probes are known to."""
+    axes, uncertainty = probe_gains(run)
+    along = directions(axes)
+    inverse = np.linalg.pinv(along)
+    return inverse * (along @ position * uncertainty) ** 2 @ inverse.T
 
 
 def _noise(records: Sequence[_Record]) -> NoiseModel:
@@ -242,7 +266,7 @@ def _moved(record: _Record, noise: NoiseModel) -> float:
     """How far apart the means of both halves of a record are [m]; zero where the shaft stands."""
     time = record.blocks[0].time
     late = time > 0.5 * (time[0] + time[-1])
-    if late.all() or not late.any():
+    if len(time) < 2:
         return 0.0
     contrast = late / late.sum() - ~late / (~late).sum()
     steady = replace(noise, drift=0.0).covariance(time, record.blocks[0].duration)
@@ -257,64 +281,84 @@ def _off_centre(points: Sequence[LocusPoint], polygon: ClearancePolygon) -> Floa
     Equal pads all around leave it at the centre, whatever film and pivots do; unequal ones move it by less than they
     differ.
     """
-    groups = defaultdict(list)
-    for point in points:
-        groups[point.point.static_load, point.point.spin].append(point)
-    largest = max(groups.values(), key=len)
-    turn = np.exp(1j * np.array([p.load_direction for p in largest]))
+    alike = _under_one_load([p.point for p in points])
+    largest = alike[np.argmax(alike.sum(axis=0))]
+    turn = np.exp(1j * np.array([p.load_direction for p in points]))[largest]
     angles = np.sort(np.angle(turn))
-    if np.diff(angles, append=angles[0] + 2.0 * np.pi).max() > _AROUND:
-        return np.zeros(2)
-    place = np.array([p.position for p in largest]) @ [1.0, 1j]
+    place = np.array([p.position for p in points])[largest] @ [1.0, 1j]
     middle = np.linalg.lstsq(np.column_stack([np.ones(len(turn)), turn]), place, rcond=None)[0][0]
-    error = math.sqrt(np.median([np.trace(p.covariance) for p in largest]))
-    limit = _OFF_CENTRE + np.ptp(polygon.clearance[np.isfinite(polygon.clearance)]) + _STEADY * error
-    return np.array([middle.real, middle.imag]) if abs(middle) > limit else np.zeros(2)
+    error = math.sqrt(np.median(np.array([np.trace(p.covariance) for p in points])[largest]))
+    limit = _OFF_CENTRE + np.nanmax(polygon.clearance) - np.nanmin(polygon.clearance) + _STEADY * error
+    goes_around = np.diff(angles, append=angles[0] + 2.0 * np.pi).max() < _AROUND
+    return _vectors(middle * (goes_around and abs(middle) > limit))
 
 
-def _repeats(
-    records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, centre: FloatArray
-) -> tuple[int, FloatArray, float, float]:
-    """Runs at a set point that was there before: how many, what drift (2,) per run [m], its variance, and scatter.
+def _under_one_load(points: Sequence[OperatingPoint]) -> BoolArray:
+    """Which points (n,) have load and speed in common, (n, n)."""
+    loads = np.array([(point.static_load, point.spin) for point in points])
+    return (loads[:, None] == loads).all(axis=2)
 
-    By least squares, with a place of its own for every set point; of a component [m^2], drift NaN without any repeat.
 
-    Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number. A
-    repeat meets its set point otherwise than the first time: the shaft follows the load around the centre, and by half
-    of its change away from it, give or take a half of either. What two repeats or more leave beyond that and the noise
-    is scatter; with few of them it is as much larger as Student's interval is wider than the normal one.
+def _walk(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, centre: FloatArray) -> _Walk:
+    """What repeats tell of the probes' zero, by least squares, with a place of its own for every set point.
+
+    Runs are evenly spaced in time as far as anyone knows: the zero drifts in proportion to the run's number, or it
+    jumps before one of them; `_likely` weighs these courses. A repeat meets its set point otherwise than the first
+    time: the shaft follows the load around the centre, and by half of its change away from it, give or take a half of
+    either. What two repeats or more leave beyond that and the noise is scatter; with few of them it is as much larger
+    as Student's interval is wider than the normal one.
     """
-    numbers = []
-    for b in records:
-        numbers.append(np.argmax([_same_set_point(a.run.point, b.run.point) for a in records]))
-    firsts = np.array(numbers)
-    count = len(records) - len(np.unique(firsts))
+    points = [record.run.point for record in records]
+    aims, alike = np.array([point.static_load_direction for point in points]), _under_one_load(points)
+    same = alike & (np.abs(wrapped(aims[:, None] - aims)) < _SAME_DIRECTION)
+    firsts, number = same.argmax(axis=1), len(records)
+    within, count = np.eye(number) - same / same.sum(axis=0), int(np.sum(firsts < np.arange(number)))
     if count == 0:
-        return 0, np.full(2, np.nan), 0.0, 0.0
+        return _Walk(0, np.full(2, np.nan), np.zeros((number, 2)), np.zeros((number, 2, 2)))
     pull = np.array([r.load * np.exp(1j * r.direction) for r in records])
-    met = pull / np.where(pull[firsts] == 0, 1e-300, pull[firsts])
-    more, turn = np.abs(met) - 1, np.angle(met)
+    met = pull / (pull[firsts] + 1e-300)
     place = np.array([r.position for r in records]) @ [1.0, 1j]
     along = place[firsts] - centre @ [1.0, 1j]
-    elsewhere = _UNLIKE * np.hypot(more, turn) * np.abs(along)
-    place = place - (0.5 * more + 1j * turn) * along
-    places = np.stack([place.real, place.imag], axis=1)
-    variance = np.array([noise.mean_variance(r.span) for r in records]) + elsewhere**2
-    member = (firsts[:, None] == np.unique(firsts)).astype(float)
-    within = np.eye(len(member)) - member @ (member / member.sum(axis=0)).T
-    since = within @ orders
-    weight = since / (since @ since)
-    remainder, scatter = within - np.outer(since, weight), 0.0
-    if count > 1:
-        left = 0.5 * np.sum((remainder @ places) ** 2) * student_widening(2 * (count - 1)) ** 2
-        scatter = max(left - np.diag(remainder) @ variance, 0.0) / (count - 1)
-    return count, weight @ places, weight**2 @ (variance + scatter), scatter
+    change = np.abs(met) - 1.0 + 1j * np.angle(met)
+    variance = np.array([noise.mean_variance(r.span) for r in records]) + (_UNLIKE * np.abs(change * along)) ** 2
+    courses = np.column_stack([orders, (orders[:, None] >= orders[1:]) * np.ptp(orders)])
+    courses = courses[:, np.any(np.abs(within @ courses) > 1e-6, axis=0)]
+    since = within @ courses
+    weight = since / np.sum(since**2, axis=0)
+    apart = within @ (place - (change - 0.5 * change.real) * along)
+    drifts = apart @ weight
+    left = np.sum(np.abs(apart[:, None] - since * drifts) ** 2, axis=0) * student_widening(max(2 * count - 2, 1)) ** 2
+    noisy = variance @ (np.diag(within)[:, None] - since * weight)
+    scatter = np.maximum(0.5 * left - noisy, 0.0) / max(count - 1, 1)  # one repeat leaves none
+    moved = courses * drifts
+    shares = _likely(alike, pull, place[:, None] - moved, np.sum(variance))
+    mean, best = moved @ shares, shares.argmax()
+    spread = _vectors(moved.T - mean)
+    own = shares @ scatter + courses**2 @ (shares * np.sum((variance[:, None] + scatter) * weight**2, axis=0))
+    covariance = np.einsum("kni,knj,k->nij", spread, spread, shares) + own[:, None, None] * np.eye(2)
+    size, text = np.abs(drifts[best]) * np.ptp(orders), ""
+    if shares[0] < 0.5 and size > _LEAST_MOVE:
+        first = records[int(np.argmax(courses[:, best]))].run.id
+        text = f"the probes' zero moved by {1e6 * size:.2g} µm, likely at one go before {first}"
+    return _Walk(count, _vectors(drifts @ shares), _vectors(mean), covariance, text)
 
 
-def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
-    turn = abs(math.remainder(first.static_load_direction - second.static_load_direction, 2 * math.pi))
-    same = first.static_load == second.static_load and first.spin == second.spin
-    return same and turn < _SAME_DIRECTION
+def _vectors(numbers: ComplexArray) -> FloatArray:
+    """Complex numbers (..) as vectors (.., 2)."""
+    return np.stack([numbers.real, numbers.imag], axis=-1)
+
+
+def _likely(alike: BoolArray, pull: ComplexArray, places: ComplexArray, variance: float) -> FloatArray:
+    """Shares (k,) of courses of the zero, by how smoothly each leaves places (n, k) [m] go around with a pull (n,) [N].
+
+    Under one load (`alike` (n, n)) they lie on an ellipse; what else they do is of a size that nobody knows beforehand.
+    """
+    turn = np.exp(1j * np.angle(pull))[:, None]
+    design = np.hstack([alike, alike * turn, alike / turn])
+    values, _, rank, _ = np.linalg.lstsq(design, places, rcond=1e-9)
+    square = np.sum(np.abs(places - design @ values) ** 2, axis=0) + 2.0 * variance
+    prior = np.log(2 * len(square)) * (np.arange(len(square)) == 0)
+    return special.softmax(prior - (len(pull) - rank) * np.log(square))
 
 
 def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, repeats: int, moved: str) -> Conditions:

@@ -11,13 +11,13 @@ import numpy as np
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.problem import refuse
 from rigdata.vector import directions
-from tpjb_ident.clearance.polygon import SideFit, corners, find_centre, fit_sides, untested
+from tpjb_ident.clearance.polygon import Centre, SideFit, corners, find_centre, fit_sides, untested
 from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals, read_sweep
 from tpjb_ident.conditions import Conditions, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.curve import PivotCurve
-from tpjb_ident.pivot.dry_record import axial_channels, refusal, relative_calibration
+from tpjb_ident.pivot.dry_record import axial_channels, refusal
 from tpjb_ident.pivot.sweep_witness import as_witnessed, witness_of
 from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import TANGENT
@@ -73,12 +73,15 @@ class ClearancePolygon(Presented):
     status : tuple of Condition
         Named conditions.
     relative_calibration : (n,) ndarray
-        Standard uncertainty along the pads from the probes' certificates, relative; not in the standard errors, as in
-        `PivotCurve`.
+        Standard uncertainty along the pads from the probes' certificates, relative; in `clearance_error` and in the
+        tables' errors alone.
     sensors : mapping of str to Channel
         Sensors that the sweep shows otherwise than stated, as they were read here, by name.
     as_read : tuple of (n,) ndarray, optional
         Pushed clearances and fitted angles as the probes read them, where some are read otherwise.
+    centre_doubt : (2, 2) ndarray
+        Of a centre elsewhere, with other deviations of the pads, that fits as well [m^2]; in `clearance_error` and in
+        the tables' errors alone.
     """
 
     run: str
@@ -102,18 +105,20 @@ class ClearancePolygon(Presented):
     relative_calibration: FloatArray | float = 0.0
     sensors: Channels = field(default_factory=dict, repr=False)
     as_read: tuple[FloatArray, FloatArray] | None = None
+    centre_doubt: FloatArray = field(default_factory=lambda: np.zeros((2, 2)), repr=False)
 
     def to_frame(self) -> pd.DataFrame:
         """Table of `clearance.csv` (outputs.md): one row per pad, SI, angles in degrees."""
         import pandas as pd
 
+        error, pushed = self.clearance_error, self.clearance_pushed_se**2 - self.clearance_se**2
         return pd.DataFrame(
             {
                 "pad": np.arange(1, len(self.angles) + 1),
                 "clearance_m": self.clearance,
-                "clearance_m_se": self.clearance_se,
+                "clearance_m_se": error,
                 "clearance_pushed_m": self.clearance_pushed,
-                "clearance_pushed_m_se": self.clearance_pushed_se,
+                "clearance_pushed_m_se": np.sqrt(error**2 + pushed),
                 "pad_angle_deg": np.degrees(self.angles),
                 "fitted_angle_deg": np.degrees(self.fitted_angle),
                 "fitted_angle_deg_se": np.degrees(self.fitted_angle_se),
@@ -125,10 +130,17 @@ class ClearancePolygon(Presented):
             }
         )
 
+    @property
+    def clearance_error(self) -> FloatArray:
+        """Standard error of the clearances (n,) [m] with all that is known: of gains and of other centres as well."""
+        n = directions(self.angles)
+        others = np.sum(n @ self.centre_doubt * n, axis=1)
+        return np.sqrt(self.clearance_se**2 + (self.relative_calibration * self.clearance) ** 2 + others)
+
     def negative_preloads(self, pad_clearance: Sequence[float]) -> str:
         """Pads that stand further out than their own clearances (n,) [m] allow, in words; empty where none does."""
         preload = 1.0 - self.clearance / pad_clearance
-        error = self.relative_calibration + self.clearance_se / self.clearance + _LEAST_ERROR
+        error = self.clearance_error / self.clearance + _LEAST_ERROR
         listed = ", ".join(f"#{pad + 1} {preload[pad]:+.3f}" for pad in np.flatnonzero(preload < -_IRREGULAR * error))
         return f"the sweep shows pads of negative preload: {listed}" if listed else ""
 
@@ -198,7 +210,9 @@ def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotC
     pads = " of all pads" if len(outside) == len(angles) else _of_pads([curve.pad for curve in outside])
     detail = f"pushed with {contact.push:.0f} N, the dry tests{pads} hold from {lowest:.0f} N on; the sweep corrects it"
     extrapolated = holding((outside, "give-extrapolated", detail))
-    return replace(polygon, status=(*_status(fit, polygon, curves), *witness.conditions, *extrapolated))
+    return replace(
+        polygon, status=(*polygon.status, *_status(fit, polygon, curves), *witness.conditions, *extrapolated)
+    )
 
 
 def _sides(run: Run, angles: FloatArray, curves: Sequence[PivotCurve]) -> tuple[ContactIntervals, SideFit]:
@@ -224,7 +238,9 @@ def _sides(run: Run, angles: FloatArray, curves: Sequence[PivotCurve]) -> tuple[
 def _polygon(run: Run, contact: ContactIntervals, fit: SideFit, angles: FloatArray) -> ClearancePolygon:
     """Clearances about the centre, with the errors of both; NaN where a pad was not reached."""
     n, covariance = directions(angles[fit.pads]), fit.covariance
-    centre = find_centre(angles[fit.pads], fit.distance, covariance)
+    axes, uncertainty = probe_gains(run)
+    gains = np.cos(angles[:, None] - axes) ** 2 * uncertainty
+    centre = find_centre(angles[fit.pads], fit.distance, covariance, gains[fit.pads] * np.mean(fit.distance))
     # clearance = (I - n G) distance on the reached pads: the centre's error is the same sides' error
     map_ = np.eye(len(n)) - n @ centre.gain[:2]
     unknown = np.einsum("ki,ij,kj->k", n, centre.covariance, n)
@@ -236,7 +252,6 @@ def _polygon(run: Run, contact: ContactIntervals, fit: SideFit, angles: FloatArr
                                      angles[fit.pads] + fit.tilt, fit.tilt_se])  # fmt: skip
     clearance, clearance_se, deflection, deflection_se, fitted, fitted_se = columns
     # another run meets the probes' zero elsewhere: by about what it drifts within this one
-    probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
     span = np.ptp(contact.time)
     drift = ((fit.noise.drift * span) ** 2 + fit.noise.walk**2 * span) * np.eye(2)
     return ClearancePolygon(
@@ -257,8 +272,16 @@ def _polygon(run: Run, contact: ContactIntervals, fit: SideFit, angles: FloatArr
         pivot_scale_se=fit.scale_se,
         noise=fit.noise,
         temperature=run.mean_temperature() or np.nan,
-        relative_calibration=np.array([relative_calibration(probes, angle) for angle in angles]),
+        status=_inseparable(fit, centre, gains),
+        relative_calibration=np.linalg.norm(gains, axis=1),
+        centre_doubt=centre.doubt,
     )
+
+
+def probe_gains(run: Run) -> FloatArray:
+    """Axes [rad] of a run's probes and how well their gains are known, (2, p)."""
+    probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
+    return np.array([(probe.axis, probe.uncertainty or 0.0) for probe in probes]).T
 
 
 def coldest_first(runs: Sequence[Run]) -> list[Run]:
@@ -283,15 +306,13 @@ def _status(fit: SideFit, polygon: ClearancePolygon, curves: Sequence[PivotCurve
     disagrees = abs(fit.scale - 1.0) > max(_IRREGULAR * fit.scale_se, _DISAGREES)
     give = f"they deflect {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say"
     offsets = polygon.clearance - np.nanmedian(polygon.clearance)
-    errors = np.hypot(polygon.clearance_se, polygon.relative_calibration * polygon.clearance)
     # below half a micrometre a difference between pads is of no consequence, however well it is measured
-    deviating = np.flatnonzero(np.abs(offsets) > np.maximum(_IRREGULAR * errors, 0.5e-6))
+    deviating = np.flatnonzero(np.abs(offsets) > np.maximum(_IRREGULAR * polygon.clearance_error, 0.5e-6))
     listed = _offsets(deviating, offsets[deviating])
     turn = np.mean(fit.tilt)
     is_turned = abs(turn) > max(_IRREGULAR * np.sqrt(np.mean(fit.tilt_se**2) / len(fit.pads)), 5e-3)
     return holding(
         (missing, "pads-not-reached", missing),
-        (inseparable := _inseparable(fit, polygon, len(deviating)), "pads-not-separable", inseparable),
         (others, "give-from-sweep", f"no pivot curves{pads}, zero load extrapolated from the sweep alone"),
         (disagrees, "pivots-disagree", give),
         (listed, "irregular", f"{listed} from the median of all: worn, damaged or wrongly assembled"),
@@ -305,21 +326,17 @@ def _offsets(pads: IntArray, offsets: FloatArray) -> str:
     return ", ".join(f"pad #{pad + 1} {1e6 * offset:+.1f} µm" for pad, offset in zip(pads, offsets, strict=True))
 
 
-def _inseparable(fit: SideFit, polygon: ClearancePolygon, deviating: int) -> str:
-    """What the sides leave open of which so many deviate; empty where four or more are alike, or all of four are."""
+def _inseparable(fit: SideFit, centre: Centre, gains: FloatArray) -> Conditions:
+    """What the sides leave open of which pads deviate, with what gains (n, p) make of distances, as a share."""
+    error = np.sqrt(np.trace(fit.covariance) + np.sum((gains[fit.pads] * centre.clearance) ** 2))
+    text = ""
     if len(fit.pads) == 3:
-        return "three pads fit every centre: equal clearances are assumed, only their mean is measured"
-    if len(fit.pads) > 4:
-        text = (
-            f"{deviating} of {len(fit.pads)} deviate: a centre elsewhere, with other deviations, fits the sweep as well"
-        )
-        return text if len(fit.pads) - deviating < 4 else ""
-    suspects = find_centre(polygon.angles[fit.pads], fit.distance, fit.covariance).suspects
-    gains = (polygon.relative_calibration * polygon.clearance)[fit.pads]
-    error = np.sqrt(np.trace(fit.covariance) + np.sum(gains**2))
-    if np.abs(suspects).max() < max(_IRREGULAR * error, 0.5e-6):
-        return ""
-    return f"one of four is off, and nothing tells which: {_offsets(fit.pads, suspects)}"
+        text = "three pads fit every centre: equal clearances are assumed, only their mean is measured"
+    elif centre.doubt.any():
+        text = "fewer than four pads are alike: a centre elsewhere, with other deviations, fits the sweep as well"
+    elif np.abs(centre.suspects).max() > max(_IRREGULAR * error, 0.5e-6):
+        text = f"one of four is off, and nothing tells which: {_offsets(fit.pads, centre.suspects)}"
+    return holding((text, "pads-not-separable", text))
 
 
 def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> pd.DataFrame:

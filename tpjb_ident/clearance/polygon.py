@@ -19,7 +19,9 @@ squares a single pad off by D would show as 0.6 D on that pad, 0.32 D on the two
 it, of five.)
 
 Of four pads any one may be the one that stands off, and nothing tells which: the centre is that of least squares, and
-its error reaches to every such explanation. Three pads fit any centre: their differences are lost.
+its error reaches to every such explanation. Three pads fit any centre: their differences are lost. Of more, where fewer
+than four lie on one polygon as well as gains and sides are known, all may stand off by what they do on the mean: the
+doubt of the centre reaches to that.
 """
 
 from __future__ import annotations
@@ -41,6 +43,8 @@ from tpjb_ident.pivot.curve import PivotCurve
 
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
 _DEVIATES = 2.0  # such widths from which a pad stands off clearly
+#: Errors within which pads are alike, of this at least [m]; probability of chance; difference of consequence [m].
+_ALIKE, _LEAST_ERROR, _BY_CHANCE, _NOTABLE = 3.0, 1e-7, 0.05, 5e-7
 TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
 _SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
 _SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
@@ -60,10 +64,14 @@ class Centre:
     gain: FloatArray  #: (3, n) of position and clearance with respect to the distances
     covariance: FloatArray  #: (2, 2) of the position, by explanations that nothing tells apart [m^2]
     suspects: FloatArray  #: (n,) by how much each pad stands off if it alone does; zero where the pads tell [m]
+    doubt: FloatArray  #: (2, 2) of the position, where pads differ and none alone explains it [m^2]
 
 
-def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArray) -> Centre:
-    """Centre of a clearance polygon: angles (n,) [rad], distances (n,) [m] with covariance (n, n)."""
+def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArray, gains: FloatArray) -> Centre:
+    """Centre of a clearance polygon: angles (n,) [rad], distances (n,) [m] with covariance (n, n).
+
+    `gains` (n, p): errors of the distances by those of p probes' gains [m].
+    """
     design = np.column_stack([directions(angles), np.ones(len(angles))])
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
         raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
@@ -77,13 +85,28 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
         weights = equal if np.linalg.matrix_rank(design * equal[:, None], 1e-3) == 3 else weights
     gain = _gain(design, weights)
     solution = gain @ distances
-    suspects = np.zeros(len(angles))
+    suspects, doubt = np.zeros(len(angles)), np.zeros((2, 2))
+    even = _gain(design, np.ones(len(angles)))
+    free = np.eye(len(angles)) - design @ even
+    apart, moved = free @ distances, (solution - even @ distances)[:2]
     if len(angles) == 4:  # any one may be what stands off: each explains all that no centre does
-        inexplicable = np.linalg.svd(design)[0][:, 3]
-        suspects = (inexplicable @ distances) / inexplicable
+        suspects = apart / np.diag(free)
+    elif not _explained(design, distances, solution, covariance + gains @ gains.T):
+        doubt = apart @ apart / (len(angles) - 4) * even[:2] @ even[:2].T + np.outer(moved, moved)
     # of pads at right angles two of the four lie along each axis
     shifts = _AS_DEVIATION * gain[:2] * suspects
-    return Centre(solution[:2], solution[2], gain, 0.5 * shifts @ shifts.T, suspects)
+    return Centre(solution[:2], solution[2], gain, 0.5 * shifts @ shifts.T, suspects, doubt)
+
+
+def _explained(design: FloatArray, distances: FloatArray, solution: FloatArray, covariance: FloatArray) -> bool:
+    """Whether four sides or more lie on one polygon by a covariance (n, n), or all do but for what is of no matter."""
+    covariance = covariance + _LEAST_ERROR**2 * np.eye(len(distances))
+    off = distances - design @ solution
+    alike = np.abs(off) < _ALIKE * np.sqrt(np.diag(covariance))
+    root = np.linalg.cholesky(covariance[np.ix_(alike, alike)])
+    sides = np.linalg.solve(root, np.column_stack([design, distances])[alike])
+    square = np.linalg.lstsq(sides[:, :3], sides[:, 3], rcond=None)[1]  # none of three sides
+    return bool(np.linalg.norm(off) < _NOTABLE or np.any(special.chdtrc(len(sides) - 3, square) > _BY_CHANCE))
 
 
 def _gain(design: FloatArray, weights: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ What is common to both cancels: a sensor with the same calibration in both manif
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +72,7 @@ def measured_side(campaign: Campaign, identification: Identification | None, sta
             scales = {curve.pad: curve.relative_calibration for curve in static.curves}
             pivots["relative_calibration"] = pivots["pad"].map(scales)
         if static.clearance is not None:
-            clearance = static.clearance.to_frame()
+            clearance = replace(static.clearance, relative_calibration=0.0).to_frame()
     return Side(campaign.id, coefficients, pivots, clearance, campaign, sensors)
 
 
@@ -180,13 +180,13 @@ def _judged(
 ) -> dict[str, Any]:
     """Columns of one quantity: both values, their difference, each with its interval, and whether it changed.
 
-    `systematic` is the variance of the difference that is not random; a table's interval without more holds all of it.
+    `systematic`: variance of the difference that is not random; less than none, where intervals hold what both share.
     The degrees of freedom are Welch's and Satterthwaite's. Of `number` differences that are looked at together one in
     twenty is beyond its own interval by chance; "yes" holds for all of them at once (Bonferroni).
     """
     random_a, freedom_a = _random(frames[0], name)
     random_b, freedom_b = _random(frames[1], name)
-    variance = random_a + random_b + np.maximum(systematic, 0.0)
+    variance = np.maximum(random_a + random_b + systematic, 0.0)
     freedom = variance**2 / (random_a**2 / freedom_a + random_b**2 / freedom_b)
     freedom = freedom.fillna(_MOST_FREEDOM).clip(1.0, _MOST_FREEDOM)  # without scatter there is nothing to count
     half = stdtrit(freedom, 0.5 + 0.5 * _LEVEL) * np.sqrt(variance)
@@ -229,7 +229,7 @@ def _pivots(a: Side, b: Side) -> pd.DataFrame:
         return pd.DataFrame()
     frame_a, frame_b = (pd.concat(tables, ignore_index=True) for tables in frames)
     before, after = frame_a["systematic"], frame_b["systematic"]
-    systematic = (after - before) ** 2 if is_one_rig else before**2 + after**2
+    systematic = -2.0 * before * after if is_one_rig else 0.0  # the intervals hold both
     judged = _judged(TANGENT, (frame_a, frame_b), systematic, _NO_CHANGE * frame_a[TANGENT], len(frame_a))
     return pd.DataFrame({"pad": frame_a["pad"], "force_N": frame_a["force_N"], **judged})
 

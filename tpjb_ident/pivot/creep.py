@@ -23,6 +23,7 @@ from tpjb_ident.pivot.dry_record import DryRecord, pooled_noise, smooth_columns
 # share of the deflection that liners and joints creep: what holds hardly show is not made large; the same of a joint
 # that only one pad has
 _PLAUSIBLE, _OF_ONE = 0.03, 0.2
+_MOST = 0.8  # of the deflection: what more of it comes late is none
 _TIMES = (0.3, 1.0, 3.0, 10.0)  # time constants over the usual length of a hold
 # standard errors from which it is creep, by the noise, which takes creep for drift, and by how the runs differ; of one
 # pad by the noise of the others, where another pad creeps, and where most do
@@ -73,14 +74,18 @@ def _less_alike(
     less = list(records)
     condition: Conditions = ()
     for _ in range(_ROUNDS):  # what noise there is shows when the creep is off: until then it takes much for drift
-        sums = np.array([_held_to_light(record, noise, times) for record in held])
-        information, pull = np.maximum(sums[:, 0], 1e-300), sums[:, 1]
-        total = information.sum(axis=0) + plausible**-2
-        share = pull.sum(axis=0) / total
-        scatter = np.sum(information * (pull / information - share) ** 2, axis=0) / max(len(held) - 1, 1)
-        error = np.sqrt(np.maximum(scatter, 1.0) / total)
+        holds = [_held_to_light(record, noise, times) for record in held]
+        runs = np.array([hold.sum(axis=0) for hold in holds])
+        total, pull = runs.sum(axis=0)
+        total += plausible**-2
+        share = pull / total
+        scatter = _scatter(runs, share)
+        # a jump within one hold is no creep: all show that
+        apart = np.maximum(scatter, _scatter(np.vstack(holds), share))
+        error = np.sqrt(np.maximum(apart, 1.0) / total)
         best = np.argmax(share / error)
-        if share[best] < max(least * error[best], _ALIKE * math.sqrt(scatter[best] / total[best])):
+        limit = max(least * error[best], _ALIKE * math.sqrt(scatter[best] / total[best]))
+        if not limit <= share[best] < _MOST:
             break
         weight = special.softmax(0.5 * np.where(share > 0.0, (share / error) ** 2, 0.0))
         less = []
@@ -94,6 +99,12 @@ def _less_alike(
         detail = f"{percent} of the deflection follow a step within some {times[best % len(times)]:.2g} s"
         condition = (Condition("deflection-creeps", detail),)
     return less, noise, condition
+
+
+def _scatter(sums: FloatArray, share: FloatArray) -> FloatArray:
+    """How parts (n,) differ from a share (k,), by information and pull (n, 2, k), over what they do by chance (k,)."""
+    information = np.maximum(sums[:, 0], 1e-300)
+    return np.sum((sums[:, 1] - information * share) ** 2 / information, axis=0) / max(len(sums) - 1, 1)
 
 
 def _courses(record: DryRecord, times: FloatArray) -> FloatArray:
@@ -112,16 +123,16 @@ def _courses(record: DryRecord, times: FloatArray) -> FloatArray:
     return np.hstack([anew, carried - carried[0]])
 
 
-def _held_to_light(record: DryRecord, noise: NoiseModel, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What a record's holds, each at a level of its own, say of the size of every course: information, and pull."""
+def _held_to_light(record: DryRecord, noise: NoiseModel, times: FloatArray) -> FloatArray:
+    """What holds (h,), each at a level of its own, say of the size of courses (k,): information and pull (h, 2, k)."""
     used = record.blocks.hold >= 0
     blocks = record.blocks.take(used)
-    level = (blocks.hold[:, None] == np.unique(blocks.hold)).astype(float)
-    load = blocks.load - level @ (level.T @ blocks.load / level.sum(axis=0))  # a load that wanders moves the pivot too
-    if np.any(load):
-        level = np.column_stack([level, load / np.abs(load).max()])
+    member = (blocks.hold[:, None] == np.unique(blocks.hold)).astype(float)
+    load = blocks.load - member @ (member.T @ blocks.load / member.sum(axis=0))  # one that wanders moves the pivot too
+    level = np.column_stack([member, load / np.abs(load).max()]) if np.any(load) else member
     root = np.linalg.cholesky(blocks.covariance(noise, record.quantisation))
-    levels, courses = np.linalg.solve(root, level), np.linalg.solve(root, _courses(record, times)[used])
+    columns = np.column_stack([_courses(record, times)[used], blocks.deflection])
+    levels, columns = np.linalg.solve(root, level), np.linalg.solve(root, columns)
     basis, _ = np.linalg.qr(levels)
-    free = courses - basis @ (basis.T @ courses)
-    return np.sum(free**2, axis=0), free.T @ np.linalg.solve(root, blocks.deflection)
+    free = columns - basis @ (basis.T @ columns)
+    return np.stack([member.T @ free[:, :-1] ** 2, member.T @ (free[:, :-1] * free[:, -1:])], axis=1)

@@ -135,8 +135,8 @@ class PivotCurve(Presented):
     hysteresis : Hysteresis or None
         Loop of loading and unloading, where both were recorded.
     relative_calibration : float
-        Standard uncertainty of the stiffness from probe and cell certificates, relative; not in the bands,
-        because it is common to everything that the same channels measure.
+        Standard uncertainty of the stiffness from probe and cell certificates and from what a sweep shows of them,
+        relative. The bands hold it; standard errors do not, because what the same channels measure shares it.
     status : tuple of Condition
         Named conditions; empty when all is well.
     runs : tuple of str
@@ -215,8 +215,7 @@ class PivotCurve(Presented):
         Returns
         -------
         lo, hi : ndarray
-            [N/m], shape of `load`. Random errors, drift, friction and the choice of the law; calibration is
-            in `relative_calibration`.
+            [N/m], shape of `load`. Random errors, drift, friction, the choice of the law, and calibration.
         """
         return self._band(load, level, secant=False)
 
@@ -234,11 +233,12 @@ class PivotCurve(Presented):
 
     def _band(self, load: ArrayLike, level: float, secant: bool) -> tuple[FloatArray, FloatArray]:
         value = self.secant(load) if secant else self.stiffness(load)
-        factor = np.exp(_quantile(level) * self.relative_stiffness_se(load, secant))
+        error = np.hypot(self.relative_stiffness_se(load, secant), self.relative_calibration)
+        factor = np.exp(_quantile(level) * error)
         return np.asarray(value / factor), np.asarray(value * factor)
 
     def relative_stiffness_se(self, load: ArrayLike, secant: bool = False) -> FloatArray:
-        """Standard error of ln(stiffness) at pad loads [N].
+        """Standard error of ln(stiffness) at pad loads [N], calibration apart.
 
         Parameters
         ----------

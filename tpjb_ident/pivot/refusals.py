@@ -185,7 +185,7 @@ def _misplaced(records: Sequence[DryRecord]) -> list[Problem]:
             what = (
                 f"run {record.run.id}: the shaft stands {1e6 * ahead:.0f} um toward pad {record.pad} and "
                 f"{1e6 * aside:+.0f} um beside it, while the other dry runs of this campaign say "
-                f"{1e6 * distance:.0f} um toward it: channels exchanged or wrong pad"
+                f"{1e6 * distance:.0f} um toward it: channels exchanged, wrong pad, or probes set anew in between"
             )
             is_certain = not near or abs(aside) >= _FAR_ASIDE * distance
             problems.append(_problem(record, "displacement channels", what, is_certain))

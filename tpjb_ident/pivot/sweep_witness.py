@@ -44,6 +44,7 @@ _EVIDENCE = {
 }  #: by quantity: what shows it, and conditions of gains and of axes
 _EXCHANGED = 0.6  # [rad] from which it is no axis any more but another channel or sign: that is refused elsewhere
 _TOUCHED = 0.99  # share of a sweep in which the shaft has not been farther out
+_PUSHED = 0.9  # cosine of the angle within which a pad is pushed at
 _PLAUSIBLE, _STAYS = 0.3, 0.1  # deviation of a sensor's error; of a run's weight: that the zero did not move
 _LEAST_LENGTH = 1e-9  # [m]: a shorter one is none
 _ELSEWHERE, _LEAST_MOVE, _SPREADS = 0.015, 1e-6, 5.0  # of the clearance, [m], robust deviations of the other runs
@@ -107,15 +108,17 @@ def probe_errors(load: FloatArray, place: FloatArray, angles: FloatArray, axes: 
     # gain of the first, taken off the second, and turns of either
     design = np.column_stack([second * along + first * other_along, -second * across, first * other_across])
     target = first * other_along - second * along
-    inverse = np.linalg.inv(design.T @ design + (_PADS / _PLAUSIBLE) ** 2 * np.eye(3))
-    gain, *turns = best = inverse @ (design.T @ target)
+    # by what pads would show that stand where they are said to: where that is nothing, those that do not show no gain
+    drawn = np.stack([2.0 * along * other_along, -other_along * across, along * other_across])
+    inverse = np.linalg.inv(drawn @ design + (_PADS / _PLAUSIBLE) ** 2 * np.eye(3))
+    gain, *turns = best = inverse @ (drawn @ target)
     variance = (_USUAL * _PADS**2 + np.sum((target - design @ best) ** 2)) / (_USUAL + len(pads) - 3)
     errors = np.log([1.0 + gain, 1.0 - gain] + 1j * np.array(turns))
     common = np.median([*errors.imag, 0.0])
     off = np.array([errors[0].real - errors[1].real, *(errors.imag - common)])
     slopes = np.diag([2.0, 1.0, 1.0])
     slopes[1:, 1:] -= errors.imag == common
-    limit = np.maximum(_UNEQUAL, _ERRORS * np.sqrt(variance * np.diag(slopes @ inverse @ slopes.T)))
+    limit = np.maximum(_UNEQUAL, _ERRORS * np.sqrt(variance * np.abs(np.diag(slopes @ inverse @ slopes.T))))
     gain, *turns = off * (np.abs(off) > limit) * (np.max(np.abs(off[1:])) < _EXCHANGED)
     return np.array([gain, -gain]) + 1j * np.array(turns)
 
@@ -213,7 +216,10 @@ def witness_of(run: Run, angles: FloatArray) -> SweepWitness:
             text = f"{evidence} as if {pair[0].name} {more} {pair[1].name}; half of it is taken off each"
             conditions.append(Condition(of_gain, text))
     _, place = _good_vectors(as_witnessed(run, channels))
-    return SweepWitness(errors, channels, tuple(conditions), place, probes_of(run))
+    # a pad that was not pushed at is elsewhere by as much as nobody knows
+    pushed = np.cos(np.arctan2(load[:, 1], load[:, 0])[:, None] - angles).max(axis=0)
+    probes = probes_of(run) if np.all(pushed > _PUSHED) else ()
+    return SweepWitness(errors, channels, tuple(conditions), place, probes)
 
 
 def _good_vectors(run: Run) -> tuple[FloatArray, FloatArray]:

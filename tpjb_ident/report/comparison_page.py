@@ -225,7 +225,7 @@ def clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
     """Clearance per pad at zero push load beside the drawing's; intervals hold the error of the probes' gains."""
     unit = size("length")
     digits = 2 if unit < 1e-5 else 4
-    halves = 1.96 * np.hypot(polygon.clearance_se, polygon.relative_calibration * polygon.clearance)
+    halves = 1.96 * polygon.clearance_error
     rows = []
     for k, (drawing, value, half) in enumerate(zip(drawn, polygon.clearance, halves, strict=True)):
         measured = with_interval(value, value - half, value + half, unit)

@@ -55,7 +55,7 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
     before = manifest.read_text("utf-8-sig") if update else ""
     drawings = [p for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]]
     bearing = bearing or (drawings[0].name if len(drawings) == 1 else None)
-    exports, problems = _read_exports(c, folder, column_names(before) if update else ())
+    exports, problems = _read_exports(c, folder, column_names(before))
     drawing = (folder if bearing else c.target) / (bearing or BEARING)
     angles: tuple[float, ...] = ()
     with suppress(BearingError):  # it cannot be read yet
@@ -99,15 +99,14 @@ def _draft(
     rows = []
     for channel, guess in guesses.channels.items():
         axis = "" if guess.axis.value is None else f"{guess.axis.number:g}"
-        reason = " ".join([f"({guess.axis.source})" * bool(axis), guess.axis.reason]).strip()
-        rows.append([channel, guess.quantity.value or "?", guess.unit or "?", axis, reason])
+        source = f"({guess.axis.source}) " * bool(axis)
+        rows.append([channel, guess.quantity.value or "?", guess.unit or "?", axis, source + guess.axis.reason])
     if bearing is None and not (c.target / BEARING).exists():
         _write(c, BEARING, _bearing_draft(guesses))
     kinds = Counter(run.kind.value or "unknown" for run in guesses.runs)
     runs = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
-    guessed = text.count("(guess)") - 1  # the head explains the mark
-    count = f"{len(rows)} channels, {len(guesses.runs)} records ({runs}), {guessed} entries marked (guess)"
-    return text, count, rows
+    summary = f"{len(rows)} channels, {len(guesses.runs)} records ({runs})"
+    return text, f"{summary}, {text.count('(guess)') - 1} entries marked (guess)", rows  # the head explains the mark
 
 
 def _write(c: Command, name: str, text: str, before: str = "") -> None:
@@ -125,16 +124,18 @@ def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[
     from rigdata.survey.exports import read_exports, record_files
 
     problems: list[Problem] = []
-    exports = []
+    exports, columns = [], Counter[str]()
     with c.progress(f"looking at {folder.name}") as show:
         total = len(record_files(folder))
         for export in read_exports(folder, problems, names):
             exports.append(export)
+            columns.update(series.name for series in export.series)
             show(export.name, len(exports), total)
-    texts = [str(problem) for problem in problems]
     if not exports:
-        raise BadInputError("\n".join(texts[:5]))
-    return exports, texts
+        raise BadInputError("\n".join(map(str, problems[:5])))
+    if max(columns.values(), default=0) < len(exports):
+        c.warn("no channel is in all files. Where two devices wrote a file each, join the two of a run in one first")
+    return exports, [str(problem) for problem in problems]
 
 
 def _bearing_draft(guesses: Survey) -> str:
