@@ -288,9 +288,10 @@ class _Search:
             further = [self._beside(path, fit) for path in paths or self.paths if path.fault.label not in fit.labels]
             self._propose_scored(fit, further, fit.strain, (fit.faults, fit.linear))
         # what tolerances say: what looks alike lies past the same jumps of K and C, with tolerances where they are
-        rivals = [
-            path for path in self.paths if path.fault.label not in fit.labels and self.problem.said_by(path.fault)
-        ]
+        rivals = []
+        for path in self.paths if fit.faults else ():
+            if path.fault.label not in fit.labels and self.problem.said_by(path.fault):
+                rivals.append(self._beside(path, fit))
         for fault in fit.faults:
             faults, linear = self._without(fit, fault)
             state = posterior(self.problem.errors, linear)
@@ -298,8 +299,7 @@ class _Search:
             self._offer(Start(faults, state.mean, linear.jacobian, estimate=estimate))
             if rivals:
                 rows = fit.strain.rows if fault.own >= 0 else np.delete(fit.strain.rows, fit.place_of(fault), axis=1)
-                local = [self._beside(path, fit) for path in rivals]
-                self._propose_scored(fit, local, replace(fit.strain, rows=rows), (faults, linear), risen=True)
+                self._propose_scored(fit, rivals, replace(fit.strain, rows=rows), (faults, linear), risen=True)
 
     def _propose_scored(
         self,
