@@ -272,6 +272,10 @@ def _scan(report: Reporter, run: Run, length: int) -> tuple[dict[str, ChannelSta
                 digest.update(block.tobytes())
             if start == 0:
                 first[name] = channels[name].to_si(block)
+    for device in run.devices[1:]:  # judged at their own times
+        for name in channels.keys() & set(device.channels):
+            statistics[name] = ChannelStatistics()
+            statistics[name].add(run.reader.read_device([name], 0, device.length)[0])
     first = {n: v for n, v in first.items() if n in channels}
     shown = any(channels[name].quantity in ALWAYS_NEEDED for name in first)
     return statistics, first, digest.hexdigest() if shown else ""
