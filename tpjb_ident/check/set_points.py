@@ -187,6 +187,8 @@ def check_excitation(runs: Sequence[Observation]) -> None:
             others = "".join(f"; there are {c.detail}" for c in run.conditions if c == _UNEXPECTED)
             run.report.ask("no excitation", stated=run.run.point.excitation_hz, others=others)
             run.report.cells_doubted = True
+        elif any(condition.endswith("X on excitation line") for condition in run.conditions):
+            run.report.ask("on shaft line", float(not run.run.of("keyphasor")))
         elif not run.report.cells_doubted and run.run.excitation_direction is not None:
             directed.append(run)
     _check_directions(directed)
