@@ -70,6 +70,7 @@ def test_what_turns_with_the_shaft_is_no_excitation_along_another_direction(keyp
     ("loads", "mount", "gain", "zero", "named"),
     [
         ((3000.0, 6000.0), None, 0.0, 72.0, ["no static force"]),
+        ((3000.0,), None, 0.0, 30.0, ["no static force"]),
         ((3000.0,), "floating", 0.0, 72.0, ["no static force"]),
         ((3000.0, 6000.0), "floating", 0.02, 0.0, ["no static force"]),
         ((3000.0, 6000.0), "cells", 0.02, 0.0, ["load size"]),

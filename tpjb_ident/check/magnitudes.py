@@ -39,8 +39,8 @@ class Sizes:
     report: Reporter
     motion: float  #: m, of the shaft against the housing
     cells: float  #: N
-    film: float  #: N, cells and the housing's inertia
     acceleration: float  #: m/s^2
+    film: float  #: N, cells and the housing's inertia
     static: float  #: N, mean of the cells
 
     @property
@@ -62,7 +62,7 @@ def check_magnitudes(observations: Sequence[Observation]) -> None:
             for q in VECTOR_QUANTITIES:
                 length.append(float(np.linalg.norm(observation.line(q))) if observation.shows(q) else np.nan)
             film, static = np.linalg.norm(observation.film_force), np.linalg.norm(observation.mean("force"))
-            measured.append(Sizes(observation.report, length[0], length[1], float(film), length[2], float(static)))
+            measured.append(Sizes(observation.report, *length, float(film), float(static)))
     for sizes in measured:
         check_sizes(sizes)
     check_weight(measured, largest)

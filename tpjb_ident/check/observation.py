@@ -237,8 +237,7 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
     if not timed:
         return Observation(run, report, digest=digest, speed=speed)
     samples = used[:: max(1, len(used) // _DECIMATED)] if run.kind == "clearance" else np.empty((0, 0))
-    seconds = length / run.sample_rate
-    observation = Observation(run, report, live, lines, _spread(used), samples, digest, speed, seconds)
+    observation = Observation(run, report, live, lines, _spread(used), samples, digest, speed, length / run.sample_rate)
     if phasors is None:
         return observation
     shown, stated = phasors.lines.excitation[line].frequency, run.point.excitation_hz

@@ -127,7 +127,7 @@ def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
     names = [line.name for line in former.excitation + former.nuisance]
     if names != [line.name for line in lines.excitation + lines.nuisance]:
         return None
-    shift = lines.frequencies - result.lines.frequencies
+    shift = lines.frequencies - former.frequencies
     if np.abs(shift).max() * result.length > MAX_RETUNED:
         return None
     turn = np.exp(-2j * np.pi * np.multiply.outer(result.start + 0.5 * result.length, shift))
