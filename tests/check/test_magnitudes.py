@@ -134,6 +134,16 @@ def test_check_and_identify_both_name_a_description_that_is_far_off(small_campai
     assert all("records-contradicted" in p.quality for p in points)
 
 
+@pytest.mark.parametrize(
+    ("mass", "static", "told"),
+    [(30.0, 0.0, []), (0.062, 0.0, [("light", "error")]), (0.062, 5000.0, [("light", "warning")])],
+)
+def test_a_stator_lighter_than_pads_is_named(demo, mass, static, told):
+    run = replace(demo, point=OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 157.0796), housing_mass=mass)
+    sizes = Sizes(Reporter(run), 5e-6, 1e3, 0.02, 1e3, static)
+    assert judged(lambda sizes: check_weight([sizes], 5000.0), sizes) == told
+
+
 def test_a_stator_heavier_than_its_loads_and_another_rate_are_named(campaign_of):
     campaign = load_campaign(campaign_of(rocker_rig(3, plan=replace(SMALL_PLAN, dry=(), locus=(), clearance=()))))
     observations = [observe(run) for run in campaign.runs]

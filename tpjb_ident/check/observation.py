@@ -272,7 +272,7 @@ def _scan(report: Reporter, run: Run, length: int) -> tuple[dict[str, ChannelSta
             if start == 0:
                 first[name] = channels[name].to_si(block)
     for device in run.devices[1:]:  # judged at their own times
-        for name in channels.keys() & set(device.channels):
+        for name in channels.keys() & device.channels:
             statistics[name] = ChannelStatistics()
             statistics[name].add(run.reader.read_device([name], 0, device.length)[0])
     first = {n: v for n, v in first.items() if n in channels}
