@@ -15,6 +15,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.equation import totals
+from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.statistics import trimming_limits, trimming_weight
 
 #: |sum| over sum of moduli of a run's windows below which its phase counts as wandering.
@@ -86,7 +87,7 @@ def window_means(
     lower, upper, shrinkage = trimming_limits(2 * z.shape[1])
     means = _pooled(turned, run, time, readings, good, present)
     for _ in range(_ROUNDS):
-        solved = np.linalg.solve(means.noise, means.residual.T)
+        solved = np.linalg.solve(unbiased_noise(means.noise, means.spare), means.residual.T)
         distance = 2 * np.einsum("na,an->n", means.residual.conj(), solved).real
         size = means.count[run]
         inside = np.where(good > 0, 1 - 1 / np.maximum(size, 2.0), 1 + 1 / np.maximum(size, 1.0))
@@ -126,7 +127,8 @@ def _pooled(
     slope[total < _DRIFT_WINDOWS] = 0.0
     drift = _drift(mean, slope, readings.devices)
     residual = z - mean[run] - drift[run] * away[:, None]
-    complete = present.all(axis=1) if present.all(axis=1).any() else np.ones(g, dtype=bool)
+    complete = present.all(axis=1)
+    complete |= not complete.any()
     runs = np.sqrt(total[complete])[:, None] * mean[complete]
     motion = motion_in(residual, weights, runs, readings.film) * present[run]
     residual = residual - motion
