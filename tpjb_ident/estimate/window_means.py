@@ -15,7 +15,6 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.equation import totals
-from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.statistics import trimming_limits, trimming_weight
 
 #: |sum| over sum of moduli of a run's windows below which its phase counts as wandering.
@@ -77,7 +76,7 @@ def window_means(
     """
     z = np.where(present[run], z, 0.0)
     complete = np.asarray(np.isfinite(z).all(axis=1))
-    good = np.where(complete, (weights > 0.2).astype(float), 0.0)
+    good = (complete & (weights > 0.2)).astype(float)
     if not good.any():
         return None
     z = np.where(complete[:, None], z, 0.0)
@@ -87,11 +86,13 @@ def window_means(
     lower, upper, shrinkage = trimming_limits(2 * z.shape[1])
     means = _pooled(turned, run, time, readings, good, present)
     for _ in range(_ROUNDS):
-        solved = np.linalg.solve(unbiased_noise(means.noise, means.spare), means.residual.T)
+        solved = np.linalg.solve(means.noise, means.residual.T)
         distance = 2 * np.einsum("na,an->n", means.residual.conj(), solved).real
         size = means.count[run]
-        inside = np.where(good > 0, 1 - 1 / np.maximum(size, 2.0), 1 + 1 / np.maximum(size, 1.0))
-        trimmed = np.where(complete & (size > 0), trimming_weight(distance / inside, lower, upper), 0.0)
+        # one that took no part is far away by the noise of few others, which is too small on average
+        few = max(means.spare / max(means.spare - z.shape[1], 1.0), 1.0)
+        inside = np.where(good > 0, 1 - 1 / np.maximum(size, 2.0), few * (1 + 1 / np.maximum(size, 1.0)))
+        trimmed = complete * (size > 0) * trimming_weight(distance / inside, lower, upper)
         lost = totals(run, trimmed, len(present)) < 1.0
         good = np.where(lost[run], good, trimmed)
         means = _pooled(turned, run, time, readings, good, present)
