@@ -251,7 +251,7 @@ class RunReader(RecordFile):
         if self.apart():
             parts = [f"{', '.join(device.channels[:6])} ({device.rate:.6g} Hz)" for device in self.devices()]
             text = f"sampled apart: {'; '.join(parts[:6])}"
-            problems.append(self.problem("note", "channels", text, "Nothing, if that is meant"))
+            problems.append(self.problem("note", "channels", text, "State delay_uncertainty if they may start late"))
         extra = [name for name in names if name not in self.channels]
         if extra:
             listed = ", ".join(name[:40] for name in extra[:6])

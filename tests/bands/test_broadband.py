@@ -452,6 +452,16 @@ def test_lines_are_driven_where_the_command_is_or_else_what_moves():
     assert spectra(D, D, command).driven.all()
 
 
+def test_a_shaft_on_a_line_of_the_period_hides_no_other_line():
+    rng = np.random.default_rng(9)
+    D = 1e-3 * _complex(rng, (8, 60, 2))
+    D[:, 20:40] += 1.0
+    D[:, [24, 48]] += 30.0
+    run = spectra(D, D, period=1.0)
+    run.disturbed[[24, 48]] = True
+    assert np.flatnonzero(run.driven).tolist() == [*range(20, 24), *range(25, 40)]
+
+
 @pytest.mark.parametrize(
     ("kind", "rms", "peak", "one_sided", "share"),
     [("random", 0.08, 0.3, 0.0, 0.128), ("multisine", 0.01, 0.03, 0.0, 0.002), ("impact", 0.01, 0.06, 1.0, 0.108),

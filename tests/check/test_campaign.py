@@ -18,12 +18,13 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem
 from rigdata.virtual_rig import Fault, Noise, Sensor
 from tests.good_campaigns import PLAN, ROCKER_STIFFNESS, SMALL_PLAN, directions, rocker_rig, sample, stiff_rig
+from tests.manifests import PROBES_AND_CELLS, SET_POINT, manifest, write_files
 from tests.rigs import held_run
 from tests.rigs.held_run import HeldReader, channels
 from tests.seeds import first_quick
 from tpjb_ident.check.campaign import _check_lengths, check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, explanation, indefiniteness, merge, reach, repairs
-from tpjb_ident.check.observation import Observation, _at_rest, excitation_line, steady_level
+from tpjb_ident.check.observation import Observation, _at_rest, excitation_line, observe, steady_level
 from tpjb_ident.check.signals import check_signal, is_spare
 from tpjb_ident.estimate.term import CHANGE_AS_DEVIATION
 from tpjb_ident.identification.identify import identify
@@ -97,17 +98,26 @@ def test_coarse_converters_repeat_readings_without_being_stuck():
     assert statistics.longest_flat >= 1500 > 10 * statistics.expected_flat()
 
 
-@pytest.mark.parametrize(("rate", "named"), [(None, ["stuck P"]), (2.0, [])])
-def test_a_slow_channel_s_last_reading_lasts_to_the_end(rate, named):
-    run = run_of()
-    reading = round(run.sample_rate / 2.0)
-    shown = np.interp(
-        np.arange(8 * reading), reading * np.arange(8), 55.0 + 0.01 * np.random.default_rng(2).normal(size=8)
-    )
-    report = Reporter(run)
-    gauge = replace(PROBES[0], name="P", quantity="pressure", sample_rate=rate)
-    check_signal(report, gauge, seen(shown), False, [gauge])
-    assert report.keys == named
+def test_channels_are_judged_at_their_own_times(tmp_path):
+    """A logger that starts later misses nothing; of a thermometer ten readings alike are ten."""
+    rng, starts, rates = np.random.default_rng(3), {"A": 0.0, "B": 0.137, "C": 0.0}, {"A": 1000, "B": 500, "C": 10}
+    clocks = {"PX": "A", "PY": "A", "FX": "B", "FY": "B", "T": "C"}
+    described = {name: {"quantity": "time", "unit": "s", "clock": name[-1]} for name in ("TA", "TB", "TC")}
+    thermometer = {"T": {"quantity": "temperature", "unit": "degC"}}
+    for name, keys in {**PROBES_AND_CELLS, **thermometer}.items():
+        described[name] = {**keys, "clock": clocks[name]}
+    columns = {f"T{clock}": starts[clock] + np.arange(2 * rate) / rate for clock, rate in rates.items()}
+    for name, clock in clocks.items():
+        columns[name] = 40.0 + rng.standard_normal(2 * rates[clock])
+    columns["T"][5:15] = 40.0
+    rows = [",".join(columns)]
+    for k in range(2000):
+        rows.append(",".join(f"{values[k]:.4f}" if k < len(values) else "" for values in columns.values()))
+    drive = {"excitation_frequency": "25 Hz", "excitation_direction": "45 deg"}
+    run = {"id": "d", "kind": "dynamic", "file": "d.csv", **SET_POINT, **drive}
+    folder = write_files(tmp_path, manifest(described, run), {"d.csv": "\n".join(rows) + "\n"})
+    keys = observe(load_campaign(folder).runs[0]).report.keys
+    assert not [key for key in keys if key.startswith(("missing", "stuck"))]
 
 
 def test_the_excitation_is_seen_through_bad_samples_and_gaps_channel_by_channel():

@@ -45,7 +45,7 @@ def random_rig(rng: np.random.Generator, demo) -> Sizes:
     static = 0.0 if is_free else load
     force = abs(film - mass * acceleration) if is_free else film
     run = replace(demo, point=OperatingPoint(load, -math.pi / 2, 2 * math.pi * 22, omega))
-    return Sizes(Reporter(run), motion, force, film, acceleration, static)
+    return Sizes(Reporter(run), motion, force, acceleration, film, static)
 
 
 def judged(check, sizes, *more):
@@ -66,7 +66,7 @@ def test_rigs_of_every_size_pass(demo):
 @pytest.mark.parametrize(("mass", "acceleration", "severity"), [(3000, 0.05, "warning"), (3000, 0.5, "error")])
 def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(demo, mass, acceleration, severity):
     run = replace(demo, housing_mass=mass)
-    rig = Sizes(Reporter(run), 1e-6, 2000.0, 2000.0, acceleration, run.point.static_load)
+    rig = Sizes(Reporter(run), 1e-6, 2000.0, acceleration, 2000.0, run.point.static_load)
     assert judged(check_weight, rig, 5000.0) == [("weight", severity)]
     light = replace(rig, report=Reporter(replace(run, housing_mass=30.0)))
     assert judged(check_weight, light, 5000.0) == []
@@ -91,7 +91,7 @@ def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(
 )
 def test_each_bound_at_its_place(demo, changes, key, severity):
     run = replace(demo, point=OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 157.0796))
-    good = Sizes(Reporter(run), 5e-6, 1e3, 1e3, 0.02, 5000.0)
+    good = Sizes(Reporter(run), 5e-6, 1e3, 0.02, 1e3, 5000.0)
     sizes = replace(good, **changes)
     assert judged(check_sizes, sizes) == ([] if key is None else [(key, severity)])
 
@@ -132,6 +132,16 @@ def test_check_and_identify_both_name_a_description_that_is_far_off(small_campai
     assert severity in {p.severity for p in check_campaign(campaign)}
     points = identify(campaign, IdentifySettings(methods=(), method="ols")).points
     assert all("records-contradicted" in p.quality for p in points)
+
+
+@pytest.mark.parametrize(
+    ("mass", "static", "told"),
+    [(30.0, 0.0, []), (0.062, 0.0, [("light", "error")]), (0.062, 5000.0, [("light", "warning")])],
+)
+def test_a_stator_lighter_than_pads_is_named(demo, mass, static, told):
+    run = replace(demo, point=OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 157.0796), housing_mass=mass)
+    sizes = Sizes(Reporter(run), 5e-6, 1e3, 0.02, 1e3, static)
+    assert judged(lambda sizes: check_weight([sizes], 5000.0), sizes) == told
 
 
 def test_a_stator_heavier_than_its_loads_and_another_rate_are_named(campaign_of):

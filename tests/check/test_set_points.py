@@ -21,6 +21,7 @@ from tpjb_ident.check.observation import excitation_line, observe
 from tpjb_ident.check.probe_readings import check_shaft_lines
 from tpjb_ident.check.run_gain import PointRuns, deviating_runs, dynamic_difference, gain_of_run
 from tpjb_ident.check.set_points import check_excitation, check_places, check_rotation, check_static_loads
+from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.run_phasors import run_phasors
 
 
@@ -57,10 +58,19 @@ def test_force_or_displacement_acts_along_the_stated_direction(force, displaceme
     assert findings([observation(5000.0, 1000.0, 0.0, force, displacement)]) == [named]
 
 
+@pytest.mark.parametrize(("keyphasors", "named"), [([], ["on shaft line"]), (["KEY"], [])])
+def test_what_turns_with_the_shaft_is_no_excitation_along_another_direction(keyphasors, named):
+    run = observation(5000.0, 1000.0, 0.0, 26.0, 30.0)
+    run.conditions = (Condition("1X on excitation line"),)
+    run.run.of = lambda quantity: keyphasors
+    assert findings([run]) == [named]
+
+
 @pytest.mark.parametrize(
     ("loads", "mount", "gain", "zero", "named"),
     [
         ((3000.0, 6000.0), None, 0.0, 72.0, ["no static force"]),
+        ((3000.0,), None, 0.0, 30.0, ["no static force"]),
         ((3000.0,), "floating", 0.0, 72.0, ["no static force"]),
         ((3000.0, 6000.0), "floating", 0.02, 0.0, ["no static force"]),
         ((3000.0, 6000.0), "cells", 0.02, 0.0, ["load size"]),

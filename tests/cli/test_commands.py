@@ -58,6 +58,7 @@ def test_check_lists_every_error_and_exits_2(small_campaign, tmp_path):
     assert "X1A" in result.stdout
     assert "L1H" in result.stdout
     assert "lenght: unknown key. Did you mean 'length'? Or give --bearing" in " ".join(result.stdout.split())
+    assert result.stdout.strip().splitlines()[-1] == f"Next: tpjb show {broken}"
 
 
 def test_identify_finds_what_was_put_in(identified):

@@ -72,6 +72,23 @@ def test_windows_without_a_phasor_and_those_struck_before_do_not_count():
     assert meant(np.full_like(z, np.nan)) is None
 
 
+def test_good_windows_that_were_struck_among_few_come_back():
+    few, shares = np.flatnonzero(np.arange(len(RUN)) % WINDOWS < 4), []
+    for seed in range(20):
+        z, struck = windows(seed)[few], np.random.default_rng(seed).random(len(few)) < 0.4
+        time = np.arange(len(few)) % 4 * 0.5
+        found = window_means(
+            z,
+            RUN[few],
+            time,
+            Readings(DEVICES, np.eye(CHANNELS)),
+            np.where(struck, 0.0, 1.0),
+            np.ones((RUNS, CHANNELS), bool),
+        )
+        shares.append(found.weights[struck].mean())
+    assert np.mean(shares) > 0.95
+
+
 def test_a_channel_that_a_run_lacks_leaves_the_others_theirs():
     z = windows(3)
     present = np.ones((RUNS, CHANNELS), dtype=bool)

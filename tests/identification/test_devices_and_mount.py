@@ -52,6 +52,8 @@ def test_a_clock_that_nobody_stated_is_found(ppm):
     rig, blocks, _ = made(replace(CASE, rates={"force": 1e-6 * ppm, "acceleration": 1e-6 * ppm}))
     found = devices(with_found_devices(rig, blocks, START).channels)
     assert found == {"displacement": "", "force": "cells", "acceleration": "cells"}
+    turning = replace(blocks, shaft=np.ones(len(blocks), complex))  # a line of the shaft beats with the drive
+    assert with_found_devices(rig, turning, START) is rig
     alone, of_cells, _ = made(replace(CASE, rates={"force": 1e-6 * ppm}))
     found = devices(with_found_devices(alone, of_cells, START).channels)
     assert found == {"displacement": "", "force": "cells", "acceleration": ""}

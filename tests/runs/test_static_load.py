@@ -175,3 +175,8 @@ def test_stingers_of_a_floating_stator_tell_neither_loads_nor_a_zero():
     assert [miss.tolist() for miss in loads.misses] == [[0.0] * 4] * 2
     stands = static_loads(SimpleNamespace(mount="cells", channels={}), points)
     assert "cells-not-tared" in stands.conditions(0)
+    alone = static_loads(SimpleNamespace(mount=None, channels={}), points[1:])
+    assert alone.conditions(0) == ("cells-contradict-set-points",)
+    assert "floating" in alone.conditions(0)[0].detail
+    little = [loaded(np.full(4, 0.01) + 0j, 5000.0)]
+    assert static_loads(SimpleNamespace(mount=None, channels={}), little).conditions(0) == ("no-static-force",)

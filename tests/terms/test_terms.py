@@ -20,7 +20,7 @@ from tests.estimate.block_cases import (
 from tests.seeds import seeds
 from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.load_turn import LoadTurn
-from tpjb_ident.terms.registry import learnt_rig
+from tpjb_ident.terms.registry import learnt_rig, solved_as_learnt
 from tpjb_ident.terms.temperature import Temperature
 
 SEEDS = seeds(3)
@@ -370,6 +370,18 @@ def test_a_floating_stator_s_accelerometers_are_held_against_the_probes(late, sh
     solution = solved(rig, replace(blocks, z=z), truth)
     (term,) = [t for t in solution.terms if t.name == "housing"]
     assert term.conditions(solution.fitted["housing"]) == named
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("late", [3e-4, -1.5e-4, -3e-4, -2e-3])
+def test_one_line_tells_a_floating_stator_s_delays_from_a_shaft_that_gives(late, seed):
+    """A shaft that gave way would show in phase as well, as no sound gain does."""
+    rig, blocks, truth = made(Case(mount="floating", hertz=(47.0,), loads=(5000.0,)), seed)
+    z, probes = blocks.z.copy(), rig.pick("displacement")
+    cells_and_accelerometers = [j for j in range(len(rig)) if j not in probes]
+    z[:, cells_and_accelerometers] *= np.exp(-1j * blocks.omega * late)[:, None]
+    solution = solved_as_learnt(rig, lambda rig: solved(rig, replace(blocks, z=z), truth))
+    assert solution.conditions() == (_LATE,) if late > 0 else held(solution, truth)
 
 
 @pytest.mark.slow

@@ -54,7 +54,7 @@ def film_products(runs: Sequence[RunSpectra]) -> FilmProducts:
     """What the lines of a point's runs tell; of a period, those beyond the band as well."""
     unknown = np.full((len(runs), len(runs[0].frequencies), 2), np.nan)
     within, runs = runs[0].frequencies, [run.wide or run for run in runs]
-    driven = np.all([run.driven & ~run.disturbed for run in runs], axis=0)
+    driven = np.all([run.driven for run in runs], axis=0)
     if not driven.any():
         return FilmProducts(np.nan, unknown, 0.0, 0.0, True)
     film = _film(runs, driven)

@@ -225,11 +225,11 @@ class RunSpectra(RunPhasors):
 
     @cached_property
     def driven(self) -> BoolArray:
-        """Bins (n_bins,) that the excitation drives; of a period the film fills others by its curvature."""
+        """Bins (n_bins,) that the excitation alone drives; of a period the film fills others by its curvature."""
         if self.period is None:
-            return np.ones(len(self.frequencies), dtype=bool)
+            return ~self.disturbed
         drives = [self.displacement, self.force] if self.command is None else [self.command]
-        sizes = [np.linalg.norm(drive.mean(axis=0), axis=1) for drive in drives]
+        sizes = [np.linalg.norm(drive.mean(axis=0), axis=1) * ~self.disturbed for drive in drives]
         share = np.max([size / max(size.max(), 1e-300) for size in sizes], axis=0)
         if self.command is None:
             return share >= _DRIVEN
@@ -247,7 +247,7 @@ class RunSpectra(RunPhasors):
         """Rms of the motion that the excitation makes [m]."""
         if self.period is None:
             return self.clean_rms
-        return float(np.linalg.norm(self.displacement.mean(axis=0)[self.driven & ~self.disturbed]) / np.sqrt(2))
+        return float(np.linalg.norm(self.displacement.mean(axis=0)[self.driven]) / np.sqrt(2))
 
 
 def run_spectra(

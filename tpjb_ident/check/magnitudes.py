@@ -39,8 +39,8 @@ class Sizes:
     report: Reporter
     motion: float  #: m, of the shaft against the housing
     cells: float  #: N
-    film: float  #: N, cells and the housing's inertia
     acceleration: float  #: m/s^2
+    film: float  #: N, cells and the housing's inertia
     static: float  #: N, mean of the cells
 
     @property
@@ -58,11 +58,9 @@ def check_magnitudes(observations: Sequence[Observation]) -> None:
         is_sine = observation.run.kind == "dynamic" and observation.run.excitation_kind == "sine"
         check_travel(observation, is_sine)
         if is_sine:
-            length = []
-            for q in VECTOR_QUANTITIES:
-                length.append(float(np.linalg.norm(observation.line(q))) if observation.shows(q) else np.nan)
-            film, static = np.linalg.norm(observation.film_force), np.linalg.norm(observation.mean("force"))
-            measured.append(Sizes(observation.report, length[0], length[1], float(film), length[2], float(static)))
+            shown = [observation.line(q) * (1.0 if observation.shows(q) else np.nan) for q in VECTOR_QUANTITIES]
+            vectors = *shown, observation.film_force, observation.mean("force")
+            measured.append(Sizes(observation.report, *map(float, map(np.linalg.norm, vectors))))
     for sizes in measured:
         check_sizes(sizes)
     check_weight(measured, largest)
@@ -70,8 +68,8 @@ def check_magnitudes(observations: Sequence[Observation]) -> None:
 
 def check_travel(observation: Observation, is_sine: bool) -> None:
     """Probes that move too far, or, where a shaft that turns is shaken by a sine, not at all."""
-    low, _, high = observation.spread
-    travel = {observation.channels[k].name: float(high[k] - low[k]) for k in observation.pick("displacement")}
+    sizes = np.ptp(observation.spread, axis=0)
+    travel = {observation.channels[k].name: float(sizes[k]) for k in observation.pick("displacement")}
     alive = [c for c in observation.channels if travel.get(c.name, 0.0) >= _STILL_PROBE]
     is_shown = is_sine and observation.run.point.shaft_speed > 0 and NO_NOISE not in observation.report.keys
     for channel in observation.of("displacement"):
@@ -87,11 +85,10 @@ def check_sizes(sizes: Sizes) -> None:
     report, motion, acceleration = sizes.report, sizes.motion, sizes.acceleration
     point = report.run.point
     length = point.static_load * motion / sizes.film if sizes.film > 0 else math.nan
-    little = _LITTLE_MOTION if length < _SHORTEST_FILM else _NO_MOTION
-    if motion < little:
+    if motion < (_LITTLE_MOTION if length < _SHORTEST_FILM else _NO_MOTION):
         report.ask("no motion", _LITTLE_MOTION / max(motion, 1e-30), motion=motion)
-    bearing = max(_CLEARANCE_FLOOR, _CLEARANCE_RATIO * math.sqrt(point.static_load / _LEAST_PRESSURE))
-    if length > min(bearing, _NO_CLEARANCE):
+    bearing = _CLEARANCE_RATIO * math.sqrt(point.static_load / _LEAST_PRESSURE)
+    if length > np.clip(bearing, _CLEARANCE_FLOOR, _NO_CLEARANCE):
         report.ask("beyond clearance", length)
     if sizes.is_carried and acceleration > 0:
         stiffness = sizes.cells * point.excitation**2 / acceleration
@@ -101,12 +98,14 @@ def check_sizes(sizes: Sizes) -> None:
 
 
 def check_weight(measured: Sequence[Sizes], largest: float) -> None:
-    """A stator that stands on its cells is made for the loads, and its inertia is no large part of their force."""
+    """A stator is made for its loads, whose thousandth its pads weigh alone; on cells its inertia is no large part."""
     mass = max((sizes.report.run.housing_mass for sizes in measured), default=0.0)
     decides = any(sizes.is_carried and mass * sizes.acceleration > _INERTIA * sizes.cells for sizes in measured)
     ratio = mass * _GRAVITY / largest if largest > 0 else 0.0
     for sizes in measured:
         sizes.report.ask("weight", ratio, grave="error" if decides else "warning", mass=mass, load=largest)
+        if ratio:
+            sizes.report.ask("light", 1 / ratio, grave="warning" if sizes.is_carried else "error", mass=mass)
 
 
 def _check_rate(report: Reporter, run: Run) -> None:

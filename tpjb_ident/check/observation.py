@@ -237,8 +237,7 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
     if not timed:
         return Observation(run, report, digest=digest, speed=speed)
     samples = used[:: max(1, len(used) // _DECIMATED)] if run.kind == "clearance" else np.empty((0, 0))
-    seconds = length / run.sample_rate
-    observation = Observation(run, report, live, lines, _spread(used), samples, digest, speed, seconds)
+    observation = Observation(run, report, live, lines, _spread(used), samples, digest, speed, length / run.sample_rate)
     if phasors is None:
         return observation
     shown, stated = phasors.lines.excitation[line].frequency, run.point.excitation_hz
@@ -272,6 +271,10 @@ def _scan(report: Reporter, run: Run, length: int) -> tuple[dict[str, ChannelSta
                 digest.update(block.tobytes())
             if start == 0:
                 first[name] = channels[name].to_si(block)
+    for device in run.devices[1:]:  # judged at their own times
+        for name in channels.keys() & device.channels:
+            statistics[name] = ChannelStatistics()
+            statistics[name].add(run.reader.read_device([name], 0, device.length)[0])
     first = {n: v for n, v in first.items() if n in channels}
     shown = any(channels[name].quantity in ALWAYS_NEEDED for name in first)
     return statistics, first, digest.hexdigest() if shown else ""

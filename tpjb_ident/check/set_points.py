@@ -55,7 +55,7 @@ def check_static_loads(observations: Sequence[Observation], mount: str | None = 
             forces.append(mean @ [1, 1j])
     means, loads = np.array(forces, complex), np.array([set_point(run.run.point) for run in shown], complex)
     ratios = means / loads
-    if mount == "floating" or without_static_part((means - cell_zero(means, loads)[0]) / loads):
+    if mount == "floating" or without_static_part((means - cell_zero(means, loads)[0]) / loads, len(set(loads)) < 2):
         for observation in shown:
             observation.report.ask("no static force")
         return False
@@ -95,13 +95,16 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, uncertainty: float 
     return (zero, error) if is_clear and allowed else (0j, 0.0)
 
 
-def without_static_part(ratios: ComplexArray) -> bool:
-    """Whether the cells show no static force at all, as piezo-electric ones: not a little of it, but none."""
+def without_static_part(ratios: ComplexArray, has_zero: bool = False) -> bool:
+    """Whether the cells show no static force at all, as piezo-electric ones: not a little of it, but none.
+
+    `has_zero`: the little may be their zero, as where one load does not tell it.
+    """
     if not len(ratios):
         return False
     mean = abs(complex(ratios.mean()))
-    error = np.sqrt(np.mean(np.abs(ratios - ratios.mean()) ** 2) / max(len(ratios) - 1, 1))
-    return bool(mean < _NO_STATIC[0] or (mean < _NO_STATIC[1] and mean < 4 * error))
+    error = ratios.std() / np.sqrt(max(len(ratios) - 1, 1))
+    return bool(mean < _NO_STATIC[0] or (mean < _NO_STATIC[1] and (has_zero or mean < 4 * error)))
 
 
 def _check_direction(observation: Observation, off: float) -> str:
@@ -123,8 +126,8 @@ def _check_size(observation: Observation, ratio: float) -> str:
         word = "small" if decades > 0 else "large"
         hint = f"; as if the sensitivity in the manifest were {10 ** abs(decades)} times too {word}"
     load = observation.run.point.static_load
-    off = abs(math.log(max(ratio, 1e-9)))
-    return observation.report.ask("load size", off, hint=hint, shown=ratio * load, stated=load)
+    size = abs(math.log(max(ratio, 1e-9)))
+    return observation.report.ask("load size", size, hint=hint, shown=ratio * load, stated=load)
 
 
 def check_speed(observation: Observation) -> None:
@@ -187,6 +190,8 @@ def check_excitation(runs: Sequence[Observation]) -> None:
             others = "".join(f"; there are {c.detail}" for c in run.conditions if c == _UNEXPECTED)
             run.report.ask("no excitation", stated=run.run.point.excitation_hz, others=others)
             run.report.cells_doubted = True
+        elif any(condition.endswith("X on excitation line") for condition in run.conditions):
+            run.report.ask("on shaft line", float(not run.run.of("keyphasor")))
         elif not run.report.cells_doubted and run.run.excitation_direction is not None:
             directed.append(run)
     _check_directions(directed)
@@ -202,10 +207,9 @@ def _turn(run: Observation, vector: ComplexArray) -> float:
 def _check_directions(runs: Sequence[Observation]) -> None:
     turned = []
     for run in runs:
-        # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
-        is_moved = abs(_turn(run, run.line("displacement"))) <= _MOVED_ALONG
         turn = _turn(run, run.film_force)
-        if abs(turn) > _ALONG and not is_moved:
+        # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
+        if abs(turn) > _ALONG and not abs(_turn(run, run.line("displacement"))) <= _MOVED_ALONG:
             turned.append((run, turn))
     hint = _miswired_cells(runs) if len(turned) >= _SEVERAL else ""
     for run in runs if hint else ():

@@ -50,16 +50,13 @@ def check_signal(
         if not noise_free and not still:
             report.ask("constant" if is_slow else "dead", 1.0, name, **words)
         return
-    # a reading of a slow channel lasts for many samples
-    reading = max(report.run.sample_rate / channel.sample_rate, 1.0) if channel.sample_rate else 1.0
-    if not noise_free and stands_still(statistics, reading):
+    if not noise_free and stands_still(statistics):
         report.ask("stuck", statistics.longest_flat / statistics.samples, name, **words)
     clipped = statistics.clipped_share()
     if clipped > 0 and (is_dynamic or not _is_held(statistics)):
         report.ask("clipped", clipped, name, **words)
     if channel.quantity == "temperature":
-        limits = np.array([statistics.low, statistics.high])
-        cold, hot = np.sort(channel.slope * limits + channel.zero) - _CELSIUS
+        cold, hot = np.sort(channel.to_si(np.array([statistics.low, statistics.high]))) - _CELSIUS
         report.ask("temperature", float(cold < _COLDEST or hot > _HOTTEST), name, cold=cold, hot=hot)
 
 

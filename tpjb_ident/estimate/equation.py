@@ -243,7 +243,7 @@ class State:
     slope: ComplexArray  #: (P, 2, 2), N/m: dH / d ln W
     slope_known: np.ndarray  #: (P,) bool
     compliance: ComplexArray  #: (2, 2), m/N: of the cells under the housing, or (n, 2, 2) of a floating one's shaft
-    floating: ComplexArray  #: (2, 2): kappa
+    floating: ComplexArray  #: (2, 2) or (n, 2, 2): kappa
     factor: ComplexArray  #: (n, m): T
     shift: ComplexArray  #: (n, m + 2): s, what does not go with the motion
     u: ComplexArray  #: (n, 4): true motion

@@ -76,7 +76,7 @@ def window_means(
     """
     z = np.where(present[run], z, 0.0)
     complete = np.asarray(np.isfinite(z).all(axis=1))
-    good = np.where(complete, (weights > 0.2).astype(float), 0.0)
+    good = (complete & (weights > 0.2)).astype(float)
     if not good.any():
         return None
     z = np.where(complete[:, None], z, 0.0)
@@ -89,8 +89,10 @@ def window_means(
         solved = np.linalg.solve(means.noise, means.residual.T)
         distance = 2 * np.einsum("na,an->n", means.residual.conj(), solved).real
         size = means.count[run]
-        inside = np.where(good > 0, 1 - 1 / np.maximum(size, 2.0), 1 + 1 / np.maximum(size, 1.0))
-        trimmed = np.where(complete & (size > 0), trimming_weight(distance / inside, lower, upper), 0.0)
+        # one that took no part is far away by the noise of few others, which is too small on average
+        few = max(means.spare / max(means.spare - z.shape[1], 1.0), 1.0)
+        inside = np.where(good > 0, 1 - 1 / np.maximum(size, 2.0), few * (1 + 1 / np.maximum(size, 1.0)))
+        trimmed = complete * (size > 0) * trimming_weight(distance / inside, lower, upper)
         lost = totals(run, trimmed, len(present)) < 1.0
         good = np.where(lost[run], good, trimmed)
         means = _pooled(turned, run, time, readings, good, present)
@@ -126,7 +128,8 @@ def _pooled(
     slope[total < _DRIFT_WINDOWS] = 0.0
     drift = _drift(mean, slope, readings.devices)
     residual = z - mean[run] - drift[run] * away[:, None]
-    complete = present.all(axis=1) if present.all(axis=1).any() else np.ones(g, dtype=bool)
+    complete = present.all(axis=1)
+    complete |= not complete.any()
     runs = np.sqrt(total[complete])[:, None] * mean[complete]
     motion = motion_in(residual, weights, runs, readings.film) * present[run]
     residual = residual - motion

@@ -121,7 +121,7 @@ class _Rate(NamedTuple):
 def _rate(rig: Rig, blocks: Blocks, quantity: str) -> _Rate | None:
     """Rate of a quantity's clock against the probes'; None where no one rate explains the runs."""
     rows, probes = rig.pick(quantity), rig.pick("displacement")
-    usable = (blocks.windows > 3) & blocks.present[:, rows + probes].all(axis=1)
+    usable = (blocks.windows > 3) & blocks.present[:, rows + probes].all(axis=1) & np.isnan(blocks.shaft)
     if not rows or usable.sum() < 2:
         return None
     turn, turn_error = _turning(blocks, rows)

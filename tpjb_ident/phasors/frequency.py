@@ -17,12 +17,10 @@ from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.lines import NAMED_HARMONICS, SPEED_DRIFT, LineSet, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 
-#: Samples of tachometer and keyphasor that are looked at.
+#: Samples of a tachometer that are looked at.
 FIRST_LOOK = 2**17
 #: A tachometer this far from the set point is not believed.
 MAX_DEPARTURE = 0.05
-#: Mean of the unit phasors of pulses or windows below which drive and shaft are not locked.
-_LOCKED = 0.98
 #: The 1X line stands so many times above its scatter over the windows, or tells no phase.
 _CLEAR = 10.0
 #: Unit phasors where nothing tells the shaft's turning.
@@ -59,10 +57,10 @@ def shaft_order(frequency: float, speed: float) -> int:
 
 
 def shaft_phases(run: Run, phasors: RunPhasors) -> ComplexArray:
-    """Unit phasor of what turns with the shaft at every excitation line, (n_lines,); NaN where that is not known.
+    """Mean phasor over the run of what turns with the shaft at every excitation line, (n_lines,); NaN if not known.
 
-    What turns with the shaft (runout of the probes, unbalance in the cells) then has the drive's frequency, and its
-    phasor is the same in all runs of a point but for this phase.
+    What turns with the shaft (runout of the probes, unbalance in the cells) is the same in all runs of a point but for
+    this factor: of size one where the drive is locked to the shaft, else of what their beat leaves of it.
     """
     phases = np.full(len(phasors.lines.excitation), np.nan + 0j)
     for i, line in enumerate(phasors.lines.excitation):
@@ -70,20 +68,18 @@ def shaft_phases(run: Run, phasors: RunPhasors) -> ComplexArray:
         turns = _by_keyphasor(run, line.frequency / n) if n else _NO_TURNS
         if n > 1 and not len(turns):
             turns = _by_first_line(phasors, line.frequency / n)
-        mean = complex(np.sum(turns**n)) / max(len(turns), 1)
-        if abs(mean) > _LOCKED:
-            phases[i] = mean / abs(mean)
+        if len(turns) > 2:
+            phases[i] = np.mean(turns**n)
     return phases
 
 
 def _by_keyphasor(run: Run, turning: float) -> ComplexArray:
     """Unit phasors at the frequency `turning` [Hz] of the shaft as every pulse of the keyphasor shows it."""
-    pulses = np.empty(0)
     for channel in run.of("keyphasor")[:1]:
-        record = run.record(channel.name, 0, min(run.length, FIRST_LOOK))
+        record = run.record(channel.name)
         pulses = pulse_times(record.values, record.time)
-        pulses = pulses[np.isfinite(pulses)]
-    return np.exp(-2j * np.pi * turning * pulses) if len(pulses) > 2 else _NO_TURNS
+        return np.asarray(np.exp(-2j * np.pi * turning * pulses[np.isfinite(pulses)]))
+    return _NO_TURNS
 
 
 def _by_first_line(phasors: RunPhasors, turning: float) -> ComplexArray:
@@ -131,7 +127,7 @@ def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
     names = [line.name for line in former.excitation + former.nuisance]
     if names != [line.name for line in lines.excitation + lines.nuisance]:
         return None
-    shift = lines.frequencies - result.lines.frequencies
+    shift = lines.frequencies - former.frequencies
     if np.abs(shift).max() * result.length > MAX_RETUNED:
         return None
     turn = np.exp(-2j * np.pi * np.multiply.outer(result.start + 0.5 * result.length, shift))

@@ -30,9 +30,8 @@ _THRESHOLD = 7.0  # noise standard deviations beyond both medians
 _UNDITHERED = 0.3  # share of samples that differ from the one before, below which noise does not reach a step
 _SHORTEST = 50  # samples
 _TIMES_EXPECTED = 10.0
-_NOISE_FREE = (
-    0.5  # share of repeated readings, apart from the longest stretch: a computed record, or a coarse converter
-)
+#: Share of repeated readings, apart from the longest stretch: a computed record, or a coarse converter.
+_NOISE_FREE = 0.5
 REMEDY = "Check sensitivities and axes against the certificates and the drawing; set the wrong one to ignore"
 #: Two directions whose smallest singular value is below this tell no plane.
 _PLANE = 0.1
@@ -167,9 +166,9 @@ def live_run(run: Run) -> Run:
     return run
 
 
-def stands_still(statistics: ChannelStatistics, reading: float = 1.0) -> bool:
-    """Whether the longest stretch of equal readings of some samples each is longer than chance makes it."""
-    return statistics.longest_flat >= max(_SHORTEST * reading, _TIMES_EXPECTED * statistics.expected_flat())
+def stands_still(statistics: ChannelStatistics) -> bool:
+    """Whether the longest stretch of equal readings is longer than chance makes it."""
+    return statistics.longest_flat >= max(_SHORTEST, _TIMES_EXPECTED * statistics.expected_flat())
 
 
 def _problem(run: Run, name: str, statistics: ChannelStatistics) -> Problem:

@@ -100,7 +100,7 @@ def load_misses(points: Sequence[RunsOfPoint], zero: complex = 0.0) -> tuple[lis
     measured = np.concatenate(ratios)
     measured = measured[np.isfinite(measured)]
     common = _common_ratio(measured) if len(measured) else complex(1.0)
-    if without_static_part(measured):
+    if without_static_part(measured, len({data.point.static_load for data in points}) < 2):
         common = 0j
     if not 0.5 < abs(common.real) < 2.0:  # such cells correct nothing, but are told
         return [np.zeros(len(ratio), complex) for ratio in ratios], common
@@ -138,7 +138,8 @@ def load_conditions(miss: ComplexArray, common: complex) -> Conditions:
         (
             size and not is_gain,
             "cells-contradict-set-points",
-            f"{text} in all runs: a sensitivity is wrong, a cell inverted, or the cells are exchanged",
+            f"{text} in all runs: a sensitivity is wrong, a cell inverted, or the cells are exchanged; or the stator "
+            'floats, and they stand in its stingers (mount = "floating" in [housing])',
         ),
         (
             is_gain and max(aside, abs(turn)) > MAX_SIDEWAYS,

@@ -57,7 +57,5 @@ class Delay(Factor):
             return said
         if not self.rig.out_of_step:
             return (*said, Condition(OUT_OF_STEP, "; ".join(self.words(fitted))))
-        conditions = []
-        for shown in self.rig.contradicted.values():
-            conditions += [condition for condition in shown if condition == OUT_OF_STEP]
-        return (*conditions, *said)
+        shown = [c for c in sum(self.rig.contradicted.values(), ()) if c == OUT_OF_STEP]
+        return (*shown, *said)

@@ -6,7 +6,7 @@ accelerometers have another gain, axis or delay than is stated. A shaft's lag gr
 """
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -26,9 +26,9 @@ _CELLS = (2.0, 5.0, 0.3)
 _STIFF = 3.3
 #: Nothing is known of a housing that neither manifest nor accelerometer tells of: it stands still, or it floats.
 _UNKNOWN = 1.0
-#: Motion of a floating stator's shaft over that of the stator, and what accelerometers may differ from probes there
-#: before anything is known of them, one deviation; where nothing but their phase is wrong, gains and pitch alone.
-_SHAFT, _PITCH = 0.1, 0.03
+#: Motion of a floating stator's shaft over that of the stator, before anything is known of it, one deviation; what its
+#: accelerometers may differ from the probes by gains and pitch: more is a contradiction, and no lag hides behind it.
+_SHAFT, _PITCH = 0.1, 0.02
 #: The difference from which one of them is wrong; from which it is no work of a delay or a corner.
 _OTHERWISE, _GROSS = 0.05, 0.2
 #: A sign is beyond doubt from so many standard errors on.
@@ -43,23 +43,27 @@ STIFFEST = 0.01 * _NANOMETRE
 _ALIKE = 1 / 6
 #: Share of the acceleration that the housing's equations leave where sensors are right, at most: rigs have 0.05. Of a
 #: floating stator inertia is most of the force, and a pedestal under its shaft leaves 0.13.
-_UNEXPLAINED = {"cells": 0.2, "floating": 0.1, "unknown": 0.1}
+_UNEXPLAINED = {"cells": 0.2, "floating": 0.1}
 #: The same of a support with another compliance at every frequency; logarithm by which frequencies differ.
 _LEFT, _ONE_LINE = 0.1, 0.01
 #: Inertia's share of the force below which wrong accelerometers do no harm worth refusing a point for.
 HARMLESS = 2e-3
+#: A number of which nothing is stated: no record contradicts it.
+_Found, _STEP = partial(Parameter, harmless=np.inf), 1e-3
 
 
 class Housing(Term):
     """Compliance [nm/N] and loss of the cells; of a floating stator kappa, its lag, and the shaft's."""
 
     name = "housing"
+    contradiction = "accelerometers-contradict-cells"
 
     def prepare(self, rig: Rig, blocks: Blocks) -> None:
         """Parameters and what goes with them."""
         self._omega = blocks.usual_omega
         self._inertia = rig.mass * _usual_ratio(blocks.z[:, rig.pick("acceleration")], blocks.z[:, rig.pick("force")])
         self._blocks = blocks
+        self._is_timed = any(sensor.delay_uncertainty for sensor in rig.channels)
         usual, across, loss = _CELLS
         if not rig.has_acceleration:
             usual = 0.0  # the inertia stays in F, as is said of the point
@@ -68,11 +72,10 @@ class Housing(Term):
         if rig.mount == "cells":
             self.sentence = "{p.name} of the cells {value:.3g} {p.unit} (standard error {error:.2g})"
             self.parameters = (
-                Parameter("c_xx", "nm/N", SOFT, usual),
-                Parameter("c_yy", "nm/N", SOFT, usual),
-                Parameter("c_xy", "nm/N", across),
-                Parameter("loss_x", "1", loss),
-                Parameter("loss_y", "1", loss),
+                _Found("c_xx", "nm/N", SOFT, usual),
+                _Found("c_yy", "nm/N", SOFT, usual),
+                _Found("c_xy", "nm/N", across),
+                *[_Found(f"loss_{axis}", "1", loss) for axis in "xy"],
             )
             if rig.has_acceleration:
                 force, shown = (np.nan_to_num(vector(rig, blocks, q)) for q in ("force", "acceleration"))
@@ -82,15 +85,16 @@ class Housing(Term):
                     (xx, xy), (yx, yy) = springs.real.tolist()
                     self.start = (xx, yy, (xy + yx) / 2, 0.0, 0.0)
         elif rig.mount == "unknown":
-            self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
+            self.parameters = (_Found("inertia not measured", "1", _UNKNOWN),)
         elif rig.has_acceleration:
-            lag = Parameter("lag", "rad", _LOSS / 2 if rig.out_of_step else _SHAFT)
-            differs = _PITCH if rig.out_of_step else _SHAFT
-            entries = [Parameter(f"kappa_{name}", "1", differs) for name in ("xx", "xy", "yx", "yy")]
             compliance = _shaft(rig, blocks) / _NANOMETRE or 1.0
-            shaft = [Parameter(f"c_{name}", "nm/N", compliance) for name in ("xx", "yy")]
-            losses = [Parameter(name, "1", _SHAFT) for name in ("loss", "damping")]
-            self.parameters = (*entries, *shaft, *losses, lag)
+            self.parameters = (
+                *[Parameter(f"kappa_{axes}", "1", _PITCH) for axes in ("xx", "xy", "yx", "yy")],
+                *[_Found(f"c_{axes}", "nm/N", compliance) for axes in ("xx", "yy")],
+                _Found("loss", "1", _LOSS),
+                _Found("damping", "1", _LOSS),
+                _Found("lag", "rad", _LOSS / 2 if self._is_timed else _SHAFT),
+            )
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
         """Compliance or kappa of the state."""
@@ -110,7 +114,7 @@ class Housing(Term):
 
     def is_on_foundation(self, fitted: Fitted) -> bool:
         """Whether no one spring, but a support all the same carries the housing."""
-        return self._is_unexplained(fitted) and self.rig.mount == "cells" and self._foundation
+        return self.rig.mount == "cells" and self._is_unexplained(fitted) and self._foundation
 
     def acceleration(self, blocks: Blocks, fitted: Fitted) -> ComplexArray:
         """What every block's cells, or probes where the housing floats, let the accelerometers show, (n, 2) [m/s^2]."""
@@ -118,33 +122,31 @@ class Housing(Term):
         if self.rig.mount == "cells":
             return -square * vector(self.rig, blocks, "force") @ _compliance(fitted.value)
         kappa, compliance = self._hung(blocks, fitted.value)
-        moved = vector(self.rig, blocks, "displacement") @ kappa.T
-        return square * (moved + np.einsum("nij,nj->ni", compliance, film_force(self.rig, blocks)))
+        d, force = vector(self.rig, blocks, "displacement"), film_force(self.rig, blocks)
+        return square * (kappa @ d[:, :, None] + compliance @ force[:, :, None])[:, :, 0]
 
     def _hung(self, blocks: Blocks, value: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Kappa (2, 2), and the shaft's compliance (n, 2, 2) [m/N]: steel and bolts lose alike, oil with frequency."""
+        """Kappa and the shaft's compliance [m/N], (n, 2, 2): steel and bolts lose alike, oil with frequency."""
         *_, loss, damping, lag = value.tolist()
-        kappa = np.eye(2) * (1 - 1j * lag) + value[:4].reshape(2, 2)
-        losses = loss + damping * blocks.omega / self._omega
-        return kappa, np.multiply.outer(1 - 1j * losses, _NANOMETRE * np.diag(value[4:6]))
+        share = blocks.omega / self._omega
+        kappa = np.multiply.outer(np.exp(-1j * lag * share), np.eye(2)) + value[:4].reshape(2, 2)
+        return kappa, np.multiply.outer(1 - 1j * (loss + damping * share), _NANOMETRE * np.diag(value[4:6]))
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
-        """In the housing's own rows, which are linear in every single parameter."""
+        """In the housing's own rows, by small steps of every parameter."""
         columns = self.no_columns(blocks)
         m, h, value = blocks.z.shape[1], state.at_run(blocks), state.parameters[self.name]
-        for k, unit in enumerate(np.eye(len(value))):
-            more, less = replace(state), replace(state)
-            self.apply(blocks, more, value + unit)
-            self.apply(blocks, less, value - unit)
-            rows = [housing_rows(self.rig, blocks, changed, h) for changed in (more, less)]
-            columns[:, m:, k] = np.einsum("nij,nj->ni", (rows[0] - rows[1]) / 2, state.u)
+        rows = housing_rows(self.rig, blocks, state, h)
+        for k, step in enumerate(_STEP * np.eye(len(value))):
+            changed = replace(state)
+            self.apply(blocks, changed, value + step)
+            change = housing_rows(self.rig, blocks, changed, h) - rows
+            columns[:, m:, k] = np.einsum("nij,nj->ni", change / _STEP, state.u)
         return columns
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
-        if self.rig.mount == "unknown" or not self.rig.has_acceleration:
-            return ()
-        if self.is_on_foundation(fitted):
+        if self.rig.mount == "unknown" or not self.rig.has_acceleration or self.is_on_foundation(fitted):
             return ()
         conditions = self._shown(fitted)
         if self.rig.out_of_step:  # the delay tells whether it stays that they lead
@@ -199,11 +201,10 @@ class Housing(Term):
         """
         if abs(phase) < _LOSS + 3 * error:
             return ()
-        late = sensors if phase < 0 else "accelerometers"
+        late = sensors if phase < 0 else f"accelerometers, against the {sensors},"
         text = (
             f"{np.degrees(abs(phase)):.1f} deg, as if the {late} were {1e3 * abs(phase) / self._omega:.2g} ms late or "
-            f"behind a filter; between the {sensors} and the housing there is none. State `delay` or `filter` of the "
-            "channels"
+            "behind a filter"
         )
         is_plain = self.rig.static and not any(s.quantity == "force" and s.response for s in self.rig.channels)
         is_harmless = 0 < phase * self._inertia < HARMLESS and is_plain and self.rig.mount == "cells"
@@ -224,19 +225,19 @@ class Housing(Term):
         if rig.mount == "unknown" or not rig.has_acceleration:
             return rig
         fitted = solution.fitted[self.name]
-        first = 3 if rig.mount == "cells" else len(fitted.value) - 1
-        times, least = _LATE_AS_STATED if any(sensor.delay_uncertainty for sensor in rig.channels) else _LATE
+        first = 3 if rig.mount == "cells" else -1
+        times, least = _LATE_AS_STATED if self._is_timed else _LATE
         late = fitted.value[first:] < -np.maximum(times * fitted.deviation[first:], least)
         if not late.any() or self.is_on_foundation(fitted):
             return rig
         lag = float(fitted.value[first:][late].min())
+        said = {**rig.contradicted, self.name: self.conditions(fitted)}
         if rig.mount == "cells":
-            compared, sound = "force", all(condition == OUT_OF_STEP for condition in self.conditions(fitted))
+            compared, sound = "force", all(condition == OUT_OF_STEP for condition in said[self.name])
         else:
             compared, sound = "displacement", not (self._is_unexplained(fitted) or _otherwise(fitted, _GROSS))
-        uncertain = {compared: -lag / self._omega}
-        sensors = tuple(replace(s, delay_uncertainty=uncertain.get(s.quantity, 0.0)) for s in rig.channels)
-        said = {**rig.contradicted, self.name: self.conditions(fitted)}
+        late_by = -lag / self._omega
+        sensors = tuple(replace(s, delay_uncertainty=late_by * (s.quantity == compared)) for s in rig.channels)
         return replace(rig, channels=sensors, out_of_step=sound, contradicted=said)
 
 

@@ -76,7 +76,7 @@ def check(c: Command, campaign: Path) -> None:
         c.next("init", path)
     else:
         dynamic = source is not None and source.of_kind("dynamic")
-        c.next("check" if errors else "identify" if dynamic else "pivot", campaign)
+        c.next("show" if errors and source else "check" if errors else "identify" if dynamic else "pivot", campaign)
     if errors:
         findings = c.target / "check.json"
         raise BadInputError(
