@@ -146,10 +146,11 @@ class _Search:
         plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
         if proposal.coarse:
             return plain
-        simpler = [
-            self._log_probability(f) for f in self.fits.values() if f.labels < proposal.labels and self._is_tenable(f)
-        ]
-        if proposal.estimate < max(simpler, default=-math.inf) + math.log(1.0 - Deciding.included):
+        least = -math.inf
+        for fit in self.fits.values():
+            if fit.labels < proposal.labels and self._is_tenable(fit):
+                least = max(least, self._log_probability(fit) + math.log(1.0 - Deciding.included))
+        if proposal.estimate < least:
             return False
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
             return proposal.estimate > total + math.log(1.0 - Deciding.included)
@@ -192,7 +193,8 @@ class _Search:
         if stopped and fit.faults and proposal.labels not in self.begun:  # its end lies astray
             self.begun[proposal.labels] = -math.inf
             coarse = self._reached(replace(proposal, coarse=True))
-            fit = max((f for f in (fit, coarse) if f is not None), key=lambda f: f.posterior.total)
+            if coarse is not None and coarse.posterior.total > fit.posterior.total:
+                fit = coarse
         earlier = self.fits.get(proposal.labels)
         if earlier is not None and earlier.posterior.total >= fit.posterior.total:
             return
