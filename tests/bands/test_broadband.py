@@ -454,7 +454,7 @@ def test_lines_are_driven_where_the_command_is_or_else_what_moves():
 
 def test_a_shaft_on_a_line_of_the_period_hides_no_other_line():
     rng = np.random.default_rng(9)
-    D = 1e-3 * complex_normal(rng, (8, 60, 2))
+    D = 1e-3 * complex_normal(rng, 8, 60, 2)
     D[:, 20:40] += 1.0
     D[:, [24, 48]] += 30.0
     run = spectra(D, D, period=1.0)
