@@ -41,9 +41,10 @@ class ErrorModel:
         """S + s^2 M at a scale's index, (n, n)."""
         return self.noise + self.scales[index] ** 2 * self.model
 
-    def coarse(self, size: float = 1.0) -> ErrorModel:
-        """Every element off by itself, by a share of its own sigma."""
-        return ErrorModel(self.noise + size**2 * np.eye(len(self.noise)), 0.0 * self.model, np.ones(1))
+    @property
+    def coarse(self) -> ErrorModel:
+        """Every element off by itself, by its own sigma."""
+        return ErrorModel(self.noise + np.eye(len(self.noise)), 0.0 * self.model, np.ones(1))
 
     def white(self, vectors: FloatArray, index: int) -> FloatArray:
         """Vectors in units of the standard deviation at a scale, decorrelated."""

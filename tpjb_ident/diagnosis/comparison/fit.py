@@ -212,14 +212,12 @@ def _solved(run: Map, unknowns: Unknowns, start: Start) -> Linear | None:
 
 def _past_jumps(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
     """A coarse start: every element off by itself, tolerances held at first."""
-    held, errors = unknowns.width.copy(), unknowns.problem.errors
+    held, coarse = unknowns.width.copy(), unknowns.problem.errors.coarse
     held[unknowns.tolerances] = Deciding.held
     # those from before the jump say nothing behind it; of tolerances that are held little is asked
     linear = _renewed(run, unknowns, linear, unknowns.of_faults)
-    linear = replace(_stepped(run, unknowns, replace(linear, width=held), errors.coarse()), width=unknowns.width)
-    for size in (1.0, 0.3, 0.1):
-        linear = _stepped(run, unknowns, linear, errors.coarse(size))
-    return linear
+    linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
+    return _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
 
 
 def refined(run: Map, fit: Fit) -> Fit:

@@ -75,7 +75,7 @@ class _Search:
         self.run, self.problem, self.report = run, problem, report
         self.fits: dict[frozenset[str], Fit] = {}
         self.tried = 0
-        self.estimates: dict[frozenset[str], float] = {}  #: by the first score, or the start that led to the fit
+        self.estimates: dict[frozenset[str], float] = {}
         self.proposals: dict[frozenset[str], Start] = {}
         self.begun: dict[frozenset[str], float] = {}  #: estimates of coarse starts that were fitted
         self.paths: tuple[Path, ...] = ()
@@ -154,9 +154,7 @@ class _Search:
             return False
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
             return proposal.estimate > total + math.log(1.0 - Deciding.included)
-        # past a jump of K and C scores miss by whatever they miss the leader by
-        most = math.inf if leader.labels in self.begun else mistaken
-        rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, most))
+        rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
         if proposal.risen or (len(proposal.faults) != len(leader.faults) and not plain):
             rise = 0.0
         return proposal.estimate > total - near - rise
@@ -199,8 +197,7 @@ class _Search:
         if earlier is not None and earlier.posterior.total >= fit.posterior.total:
             return
         self.fits[proposal.labels] = fit
-        if not proposal.coarse:
-            self.estimates[proposal.labels] = proposal.estimate
+        self.estimates[proposal.labels] = math.inf if proposal.coarse else proposal.estimate
         # one cause that does most of it is far behind until what stands beside it is there too
         if proposal.coarse or self._near(fit, fit.posterior.total, Deciding.near):
             self._propose_neighbours(fit)
@@ -267,7 +264,7 @@ class _Search:
         """Scores of every fault beside the baseline as stated; coarse: every element off by itself, tolerances held."""
         errors, linear = self.problem.errors, self._stated
         if coarse:
-            errors, linear = errors.coarse(), replace(linear, width=Deciding.held * linear.width)
+            errors, linear = errors.coarse, replace(linear, width=Deciding.held * linear.width)
         return scores(errors, linear, self.paths, self.fits[frozenset()].strain)
 
     def _propose_alone(self) -> float:
@@ -363,7 +360,6 @@ class _Search:
     def _offer(self, proposal: Start) -> None:
         """Keep the likeliest start of every explanation that was not fitted yet, or less well than from there."""
         queued, fit = self.proposals.get(proposal.labels), self.fits.get(proposal.labels)
-        self.estimates.setdefault(proposal.labels, proposal.estimate)
         if proposal.coarse:
             better = proposal.estimate > self.begun.get(proposal.labels, -math.inf)
         else:
