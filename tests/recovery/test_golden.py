@@ -125,6 +125,18 @@ def test_the_hidden_effect_is_named_with_an_interval_that_holds_it(diagnosed):
     assert given["hi"] - given["lo"] < 0.1 * true
 
 
+def test_two_effects_past_a_jump_of_stiffness_and_damping_are_named(tmp_path):
+    # growth of 9 um empties pads: a search that ends before that jump finds neither
+    ended(0, "diagnose", sample("mixture-b"), "--workers", 1, "--out", tmp_path / "out")
+    verdict = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    sizes = dict[str, dict[str, float]]()
+    for effect in verdict["effects"]:
+        sizes |= effect["parameters"]
+    assert {effect["name"] for effect in verdict["effects"]} == {"thermal_growth", "oil_viscosity"}
+    assert sizes["clearance_change"]["lo"] < 9e-6 < sizes["clearance_change"]["hi"]
+    assert sizes["factor"]["lo"] < 0.88 < sizes["factor"]["hi"]
+
+
 def test_the_gap_shrinks_on_points_that_no_fit_has_seen(diagnosed):
     gap = json.loads((diagnosed / "diagnosis.json").read_text())["gap"]
     assert gap["heldout_after"] < 0.5 * gap["heldout_before"]
