@@ -138,7 +138,7 @@ def test_a_model_may_be_wrong_by_what_it_is_trusted_to(scale, without, with_name
     # a rig that the model misses by half of its stated error is not unexplained, but a name is not the whole story
     held = held_out(5.0)
     held.fit.needs_more = lambda limit: scale > limit
-    held.fit.p, held.fit.posterior, held.fit.label = 0.5, SimpleNamespace(scale=scale), "x"
+    held.fit.p, held.fit.leftover, held.fit.label = 0.5, "something", "x"
     held.fit.faults, held.fit.names = (SimpleNamespace(is_term=False, label="x", candidate=None),), frozenset({"x"})
     assert _without_effects(held).name == without
     held = HeldOut(held.fit, np.full(2, 1.0), (Touched("x", 8.0, 0.5, True),))

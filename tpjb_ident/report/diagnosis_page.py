@@ -61,6 +61,7 @@ def verdict_sentences(
             verdict=verdict,
             deviations=deviations,
             direct=DIRECT,
+            not_excluded=Deciding.not_excluded,
             rivals=list(itertools.chain(*(group[1:] for group in verdict.indistinguishable))),
             checks=dict.fromkeys(word.check for word in words if word),
             worse=worse,

@@ -98,7 +98,7 @@ class Fit:
         out[self.unknowns.tolerances] = self.posterior.mean[self.unknowns.tolerances]
         return out[self.unknowns.amplitudes :]
 
-    @property
+    @functools.cached_property
     def on_bound(self) -> bool:
         """Whether an amplitude is on its bound: the linear form counts the forbidden side too."""
         unknowns, theta = self.unknowns, self.linear.theta
@@ -106,7 +106,7 @@ class Fit:
         out = (theta <= unknowns.low + near) | (theta >= unknowns.high - near)
         return any(out[at].any() for at in unknowns.slices)
 
-    @property
+    @functools.cached_property
     def unsized(self) -> tuple[str, ...]:
         """Labels of faults whose size is not told from none: its 95 % interval holds where nothing happens."""
         rows = zip(self.faults, self.amplitudes, self.unknowns.slices, self.errors, strict=True)
@@ -115,6 +115,11 @@ class Fit:
             if not np.any(np.abs(size - self.unknowns.origin[at]) > HALF_INTERVAL * error):
                 labels.append(fault.label)
         return tuple(labels)
+
+    @property
+    def leftover(self) -> str:
+        """In words: the model error that it leaves."""
+        return f"a model error of {self.posterior.scale:.2f} times the stated one"
 
     def needs_more(self, scale: float) -> bool:
         """Whether the data speak for a larger model error than this: more than its prior does."""
@@ -136,7 +141,7 @@ class Fit:
         _, rows = _combinations(self.unknowns)
         return Strain(rows, 1.0 - np.sum((rows @ self.posterior.covariance) * rows, axis=1))
 
-    @property
+    @functools.cached_property
     def p(self) -> float:
         """Probability that a tolerance is as far out as the farthest one, all of them considered."""
         return self.strain.p(self.posterior.mean)

@@ -12,9 +12,6 @@ from tpjb_ident.diagnosis.verdict.behaviour import Drift, drifts
 from tpjb_ident.diagnosis.verdict.held_out import HeldOut, held_out_gap
 from tpjb_ident.diagnosis.verdict.verdict import VerdictName
 
-#: Names that are said to be the likeliest where none can be named.
-_LISTED = 5
-
 
 @dataclass(frozen=True)
 class Judgement:
@@ -49,8 +46,7 @@ def _of_model(comparison: Comparison, sure: frozenset[str], held: HeldOut, drift
     """What is said of the model that counts: the one with exactly the sure names, or the most probable one."""
     model = held.fit
     if model.needs_more(Deciding.trusted):
-        size = f"a model error of {model.posterior.scale:.2f} times the stated one"
-        reason = f"the best explanation ({model.label}) leaves {size}, more than the model is trusted to"
+        reason = f"the best explanation ({model.label}) leaves {model.leftover}, more than the model is trusted to"
     elif model not in comparison.tenable:
         reason = _untenable(model)
     elif model.names != sure:
@@ -67,10 +63,7 @@ def _without_effects(held: HeldOut) -> Judgement:
     if not nothing.needs_more(Deciding.trusted):
         reason = f"no disagreement beyond noise and stated tolerances (p = {nothing.p:.2g})"
         return Judgement("consistent", held, (reason,))
-    reason = (
-        f"something is the matter (a model error of {nothing.posterior.scale:.2f} times the stated one), and no effect "
-        "of the library explains it"
-    )
+    reason = f"something is the matter ({nothing.leftover}), and no effect of the library explains it"
     return Judgement("unexplained", held, (reason,))
 
 
@@ -110,7 +103,7 @@ def _places(comparison: Comparison, model: Fit) -> tuple[str, ...]:
 def look_alikes(held: HeldOut, family: tuple[str, ...], shares: Mapping[str, float]) -> Judgement:
     """The most probable model with what a campaign cannot tell from it, which sentences count from the second on."""
     if not family or held.fit.has_terms:
-        likeliest = ", ".join(sorted(shares, key=lambda name: -shares[name])[:_LISTED])
+        likeliest = ", ".join(sorted(shares, key=lambda name: -shares[name])[: Deciding.likeliest])
         reason = f"no effect, and no group of three, reaches the probability that a name takes (likeliest: {likeliest})"
         return Judgement("unexplained", held, (reason,))
     listed_first = tuple(sorted(family, key=lambda name: name not in held.fit.names))
@@ -124,8 +117,9 @@ def _named(held: HeldOut, drift: Sequence[Drift], places: tuple[str, ...]) -> Ju
         return Judgement("ambiguous" if places else "named", held, (_shrunk(held),), places)
     reason = f"{_shrunk(held)}: a name leaves half of the first above noise at the most, and the second no larger"
     if wrong:
-        size = f"a model error of {held.fit.posterior.scale:.2f} times the stated one"
-        reason = f"{_shrunk(held)}; what is left is {size}: the model may be trusted to that, or it is another cause"
+        reason = (
+            f"{_shrunk(held)}; left is {held.fit.leftover}: the model may be trusted to that, or it is another cause"
+        )
     if drift:
         reason = f"the size of {drift[0].effect} {drift[0].words}, so its name is not the whole story"
     if terms:
