@@ -146,14 +146,13 @@ class _Search:
         plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
         if proposal.coarse:
             return plain
-        least = -math.inf
-        for fit in self.fits.values():
-            if fit.labels < proposal.labels and self._is_tenable(fit):
-                least = max(least, self._log_probability(fit) + math.log(1.0 - Deciding.included))
-        if proposal.estimate < least:
-            return False
-        if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
-            return proposal.estimate > total + math.log(1.0 - Deciding.included)
+        spare = math.log(1.0 - Deciding.included)
+        for fit in self.fits.values():  # the leader too: what cannot take a simpler one's certainty changes nothing
+            is_simpler = fit.labels < proposal.labels and self._is_tenable(fit)
+            if is_simpler and proposal.estimate < self._log_probability(fit) + spare:
+                return False
+        if leader.labels & proposal.labels and not plain:
+            return proposal.estimate > total + spare
         rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
         if proposal.risen or (len(proposal.faults) != len(leader.faults) and not plain):
             rise = 0.0
