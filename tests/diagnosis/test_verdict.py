@@ -256,18 +256,18 @@ def test_an_interval_beyond_what_is_solved_or_jumps(answer, times):
 
 
 @pytest.mark.parametrize(
-    ("ends", "words"),
+    ("ends", "unit", "words"),
     [
-        ([-2e-6, 0.0], "changes from -2e-06 to 0"),  # at its bound
-        ([0.0, 1.0], "changes from 0 to 1"),
-        ([-1.0, 1.0], "changes from -1 to 1"),
-        ([math.inf, 1e9], "changes from inf to 1e+09"),  # a spring that gives at one end alone
-        ([1.0, 2.0], "grows in proportion"),
-        ([-4.0, -1.0], "falls"),
+        ([-2e-6, 0.0], "m", "changes from -2 to 0 µm over the static load"),  # at its bound
+        ([0.0, 1.0], "K", "changes from 0 to 1 K"),
+        ([-1.0, 1.0], "1", "changes from -100 to 100 %"),
+        ([math.inf, 1e9], "N/m", "changes from inf to 1e+03 MN/m"),  # a spring that gives at one end alone
+        ([1.0, 2.0], "K", "grows in proportion"),
+        ([-4.0, -1.0], "K", "falls"),
     ],
 )
-def test_a_drift_has_words_whatever_its_ends(ends, words):
-    assert _words(ends, [1000.0, 2000.0], "static_load").startswith(words)
+def test_a_drift_has_words_whatever_its_ends(ends, unit, words):
+    assert _words(ends, [1000.0, 2000.0], "static_load", unit).startswith(words)
 
 
 def test_a_group_of_look_alikes_begins_with_the_effect_that_is_listed():

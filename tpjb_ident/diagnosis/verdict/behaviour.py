@@ -11,7 +11,7 @@ import numpy as np
 
 from model.effects import kind_of
 from rigdata.arrays import FloatArray
-from tpjb_ident.compare.effect_words import Estimate, finding
+from tpjb_ident.compare.effect_words import Estimate, finding, shown_unit
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Fault
@@ -122,14 +122,14 @@ def drifts(fit: Fit) -> tuple[Drift, ...]:
     for fault, at in zip(fit.faults, fit.unknowns.slices, strict=True):
         if fault.is_term:
             continue
-        rows = [_over(fit, fault, at.start, row) for row in Deciding.over]
+        rows = [_over(fit, fault, at, row) for row in Deciding.over]
         best = max((row for row in rows if row is not None), key=lambda row: row[0], default=None)
         if best is not None and best[0] > Deciding.drifting:
             out.append(best[1])
     return tuple(out)
 
 
-def _over(fit: Fit, fault: Fault, index: int, row: tuple[str, str, int]) -> tuple[float, Drift] | None:
+def _over(fit: Fit, fault: Fault, at: slice, row: tuple[str, str, int]) -> tuple[float, Drift] | None:
     """Rise of the log evidence where an amplitude may grow over a coordinate, and how it does."""
     name, coordinate, levels = row
     elements = fit.problem.observations.elements
@@ -140,31 +140,31 @@ def _over(fit: Fit, fault: Fault, index: int, row: tuple[str, str, int]) -> tupl
         return None
     middle = float(np.mean(finite_values))
     slope = np.nan_to_num(coordinates / middle - 1.0)
-    linear, moved, errors = fit.linear, float(fit.posterior.mean[index]), fit.problem.errors
+    linear, moved, errors = fit.linear, float(fit.posterior.mean[at.start]), fit.problem.errors
     # per unit of relative growth; a prior of one: up to twice, down to nothing
     wider = Linear(
         linear.residual, np.append(linear.theta, 0.0),
-        np.column_stack([linear.jacobian, linear.jacobian[:, index] * slope * moved]), np.append(linear.width, 1.0),
+        np.column_stack([linear.jacobian, linear.jacobian[:, at.start] * slope * moved]), np.append(linear.width, 1.0),
     )  # fmt: skip
     state = posterior(errors, wider)
-    at, first = fit.unknowns.slices[fit.faults.index(fault)], fault.candidate.parameter.name
-    ends = []
+    parameter, ends = fault.candidate.parameter, []
     for level in (finite_values[0], finite_values[-1]):
         amplitudes = fit.posterior.mean[at].copy()
         amplitudes[0] = moved * (1.0 + float(state.mean[-1]) * (level / middle - 1.0))
-        ends.append(fault.values(amplitudes + fit.unknowns.origin[at])[first])
+        ends.append(fault.values(amplitudes + fit.unknowns.origin[at])[parameter.name])
     if abs(ends[1] - ends[0]) < Deciding.same * max(*map(abs, ends), 1e-300):
         return None
     rise = state.promised - posterior(errors, linear).promised
-    return rise, Drift(fault.label, first, name, ends[0], ends[1], _words(ends, finite_values, name))
+    words = _words(ends, finite_values, name, parameter.unit)
+    return rise, Drift(fault.label, parameter.name, name, ends[0], ends[1], words)
 
 
-def _words(ends: list[float], levels: list[float], over: str) -> str:
-    spoken = over.replace("_", " ")
+def _words(ends: list[float], levels: list[float], over: str, unit: str) -> str:
+    spoken, (unit, scale) = over.replace("_", " "), shown_unit(unit)
     if not 0.0 < ends[0] * ends[1] < math.inf:
-        return f"changes from {ends[0]:.3g} to {ends[1]:.3g} over the {spoken}"
+        return f"changes from {ends[0] / scale:.3g} to {ends[1] / scale:.3g} {unit} over the {spoken}"
     power = math.log(ends[1] / ends[0]) / math.log(levels[-1] / levels[0])
     if 0.8 < power < 1.2:
         return f"grows in proportion to the {spoken}"
-    how = "grows" if abs(ends[1]) > abs(ends[0]) else "falls"
+    how = "grows" if power > 0.0 else "falls"
     return f"{how} over the {spoken}, about as its power {power:.1f}"
