@@ -70,13 +70,15 @@ def test_clearance_and_centre_with_one_pad_off(whole):
 
 
 def test_pads_that_stand_further_out_than_they_are_bored_have_negative_preload(whole):
-    """Pad #3 stands 6 um further out than the others."""
+    """Pad #3 stands 6 um further out than the others, and is bored 5 um smaller."""
     source, curves = whole
     bored = [SimpleNamespace(pivot_angle=angle, pad_clearance=83e-6, assembled_clearance=80e-6) for angle in ANGLES]
+    bored[2].pad_clearance = 78e-6
     bearing = SimpleNamespace(pads=bored, pivot_angles=ANGLES, clearances=(80e-6,) * len(ANGLES))
     named = [p for p in bearing_problems(source, bearing) if p.place == "preload"]
     assert [p.severity for p in named] == ["warning", "warning"]
-    assert all(re.search(r"negative preload: #3 -0\.03\d$", p.what) for p in named)
+    for problem in named:
+        assert re.search(r"negative preload: #3 -0\.(10|09)\d$", problem.what)
     polygon = measure_clearance(source, ANGLES, curves)
     assert polygon.negative_preloads([80e-6, 80e-6, 86e-6, 80e-6, 80e-6]) == ""
 
@@ -315,10 +317,10 @@ def test_of_four_pads_any_may_be_off_and_the_error_reaches_to_each(degrees, pad)
 @pytest.mark.parametrize(
     ("off", "is_open"),
     [
-        ([0.0, 0.0, 6.0, 0.0, 0.0], False),
+        ([0.0, 0.0, 25.0, 0.0, 0.0], False),
         ([0.3, -0.2, 0.1, -0.3, 0.2], False),
         ([0.0, 3.0, -1.0, 1.0, -2.0], True),
-        ([0.0, 9.0, 0.0, 0.0, -7.0], True),
+        ([0.0, 3.0, 0.0, 2.0, -2.0], True),
     ],
 )
 @pytest.mark.parametrize("ratio", [1.0, 0.998])
@@ -328,8 +330,8 @@ def test_pads_of_which_none_alone_explains_the_sweep_leave_the_centre_in_doubt(o
     n, share = directions(angles), np.cos(angles[:, None] - np.radians([45.0, 135.0])) ** 2
     distance = (100e-6 + 1e-6 * np.array(off)) * (share @ [ratio, 1.0])
     found = find_centre(angles, distance, np.eye(len(off)) * 1e-16, 0.5e-6 * share)
-    assert found.doubt.any() == is_open
     half = 1.96 * np.sqrt(np.sum(n @ found.doubt * n, axis=1))
+    assert (half.max() > 1e-6) == is_open
     if is_open:  # the bearing's own centre is at zero
         assert np.all(np.abs(n @ found.position) < half)
 

@@ -299,8 +299,9 @@ def test_what_a_law_is_fitted_to_has_all_its_variances():
     covariance = root @ root.T
     moved = SCALE * 4500.0
     own = (SCALE * 30.0) ** 2 + (LAG * SCALE * 200.0) ** 2 + (MODEL_ERROR * moved) ** 2
+    own += (SCALE * 20.0**2 / 72.0 * np.cbrt(5000.0) / np.cbrt(blocks.load) ** 4) ** 2  # a law of W^(2/3) bends
     one_hold = 3e-8**2 * (blocks.hold[:, None] == blocks.hold[None, :])
-    expected = NOISE.covariance(blocks.time, blocks.duration) + own * np.eye(60) + one_hold
+    expected = NOISE.covariance(blocks.time, blocks.duration) + np.diag(own) + one_hold
     np.testing.assert_allclose(covariance, expected, rtol=1e-6, atol=1e-22)
     assert data.reference_load == pytest.approx(REFERENCE_SHARE * 5000.0)
     assert data.friction == (FRICTION_SHARE, FRICTION_SE)

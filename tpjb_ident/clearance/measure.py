@@ -333,7 +333,7 @@ def _inseparable(fit: SideFit, centre: Centre, gains: FloatArray) -> Conditions:
     if len(fit.pads) == 3:
         text = "three pads fit every centre: equal clearances are assumed, only their mean is measured"
     elif centre.doubt.any():
-        text = "fewer than four pads are alike: a centre elsewhere, with other deviations, fits the sweep as well"
+        text = "all pads may be off as they are made: a centre elsewhere, with other deviations, fits the sweep as well"
     elif np.abs(centre.suspects).max() > max(_IRREGULAR * error, 0.5e-6):
         text = f"one of four is off, and nothing tells which: {_offsets(fit.pads, centre.suspects)}"
     return holding((text, "pads-not-separable", text))

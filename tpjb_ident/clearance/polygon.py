@@ -12,39 +12,38 @@ the sweep correct its size and its shape, the same for all pads. Generalised lea
 *Centre.* The sweep gives one distance per pad from the probes' zero. Five distances hold five clearances and two
 coordinates of the centre: two too many. A shift of the centre by c changes the clearances by -n_k . c, and
 nothing in the polygon tells such a change from real differences between the pads. So the centre is a
-convention: the one that makes the clearances as equal as possible in the sense of the sum of absolute differences
-from their common value. A single pad that stands off is then found exactly, and all of its offset shows on that pad,
-which is what `physics.md` means by ``pad_offset``. Differences within the measurement error are averaged. (By least
-squares a single pad off by D would show as 0.6 D on that pad, 0.32 D on the two opposite and -0.12 D on the two beside
-it, of five.)
+convention: that of the pads which are alike, by least squares, once the few that most probably stand off are left out.
+A single pad that stands off is then found exactly, and all of its offset shows on that pad, which is what `physics.md`
+means by ``pad_offset``. (By least squares over all a single pad off by D would show as 0.6 D on that pad, 0.32 D on the
+two opposite and -0.12 D on the two beside it, of five.)
 
 Of four pads any one may be the one that stands off, and nothing tells which: the centre is that of least squares, and
-its error reaches to every such explanation. Three pads fit any centre: their differences are lost. Of more, where fewer
-than four lie on one polygon as well as gains and sides are known, all may stand off by what they do on the mean: the
-doubt of the centre reaches to that.
+its error reaches to every such explanation. Three pads fit any centre: their differences are lost. Of more, all may
+stand off by some per cent, as they are made, and of five four lie on one polygon by chance now and then: the doubt of
+the centre reaches to that, as far as it is probable next to few pads that stand off.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
+from scipy import special, stats
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.vector import directions
 from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals
 from tpjb_ident.errors import ArgumentError
-from tpjb_ident.estimate.statistics import huber_weight, reweighted
 from tpjb_ident.phasors.line_fit import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.pivot.curve import PivotCurve
 
-_EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
-_DEVIATES = 2.0  # such widths from which a pad stands off clearly
-#: Errors within which pads are alike, of this at least [m]; probability of chance; difference of consequence [m].
-_ALIKE, _LEAST_ERROR, _BY_CHANCE, _NOTABLE = 3.0, 1e-7, 0.05, 5e-7
+#: Deviations of the clearance, as shares: of the few pads that stand off, and of all as they are made, of unknown care.
+_FEW, _OFF, _MADE = 3, 0.1, (0.0125, 0.025, 0.05)
+#: Error of a side [m], difference of consequence [m], and probability that no 95 % interval has to hold.
+_LEAST_ERROR, _NOTABLE, _UNLIKELY = 1e-7, 5e-7, 0.05
 TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
 _SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
 _SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
@@ -75,38 +74,51 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
     design = np.column_stack([directions(angles), np.ones(len(angles))])
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
         raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
-    error = _EQUAL_WITHIN * np.sqrt(np.maximum(np.diag(covariance), 1e-20))
-    weights = np.ones(len(angles))
-    if len(angles) > 4:  # Huber's, with the bend at the measurement error: absolute beyond it, square within
-        weights = reweighted(design, distances, lambda u: huber_weight(u, 1.0), error, 1e-12, 400)[1]
-        residual = np.abs(distances - design @ _gain(design, weights) @ distances)
-        equal = np.where(residual > _DEVIATES * error, 0.0, weights)
-        # the pull of a pad that clearly stands off, however bounded, would shift the others
-        weights = equal if np.linalg.matrix_rank(design * equal[:, None], 1e-3) == 3 else weights
-    gain = _gain(design, weights)
-    solution = gain @ distances
-    suspects, doubt = np.zeros(len(angles)), np.zeros((2, 2))
-    even = _gain(design, np.ones(len(angles)))
-    free = np.eye(len(angles)) - design @ even
-    apart, moved = free @ distances, (solution - even @ distances)[:2]
-    if len(angles) == 4:  # any one may be what stands off: each explains all that no centre does
+    number, suspects, doubt = len(angles), np.zeros(len(angles)), np.zeros((2, 2))
+    gain = even = _gain(design, np.ones(number))
+    free = np.eye(number) - design @ even
+    apart = free @ distances
+    if number == 4:  # any one may be what stands off: each explains all that no centre does
         suspects = apart / np.diag(free)
-    elif not _explained(design, distances, solution, covariance + gains @ gains.T):
-        doubt = apart @ apart / (len(angles) - 4) * even[:2] @ even[:2].T + np.outer(moved, moved)
+    elif number > 4:
+        off, share = _pads_off(design, distances, even[2] @ distances, covariance + gains @ gains.T)
+        gain = _gain(design, np.where(np.isin(np.arange(number), off), 0.0, 1.0))
+        moved = (gain - even)[:2] @ distances
+        if share > _UNLIKELY and np.linalg.norm(distances - design @ gain @ distances) > _NOTABLE:
+            square = (apart @ apart + (np.mean(_MADE) * np.mean(distances)) ** 2) / (number - 3)
+            doubt = share * (square * even[:2] @ even[:2].T + np.outer(moved, moved))
     # of pads at right angles two of the four lie along each axis
     shifts = _AS_DEVIATION * gain[:2] * suspects
-    return Centre(solution[:2], solution[2], gain, 0.5 * shifts @ shifts.T, suspects, doubt)
+    position, clearance = np.split(gain @ distances, [2])
+    return Centre(position, float(clearance[0]), gain, 0.5 * shifts @ shifts.T, suspects, doubt)
 
 
-def _explained(design: FloatArray, distances: FloatArray, solution: FloatArray, covariance: FloatArray) -> bool:
-    """Whether four sides or more lie on one polygon by a covariance (n, n), or all do but for what is of no matter."""
-    covariance = covariance + _LEAST_ERROR**2 * np.eye(len(distances))
-    off = distances - design @ solution
-    alike = np.abs(off) < _ALIKE * np.sqrt(np.diag(covariance))
-    root = np.linalg.cholesky(covariance[np.ix_(alike, alike)])
-    sides = np.linalg.solve(root, np.column_stack([design, distances])[alike])
-    square = np.linalg.lstsq(sides[:, :3], sides[:, 3], rcond=None)[1]  # none of three sides
-    return bool(np.linalg.norm(off) < _NOTABLE or np.any(special.chdtrc(len(sides) - 3, square) > _BY_CHANCE))
+def _pads_off(
+    design: FloatArray, distances: FloatArray, clearance: float, covariance: FloatArray
+) -> tuple[tuple[int, ...], float]:
+    """The few pads that most probably stand off, or none, and how probable it is that all do, as they are made.
+
+    By the part of the distances (n,) that no centre explains, with a covariance (n, n) of measurement.
+    """
+    number = len(distances)
+    free = np.linalg.svd(design)[0][:, 3:]
+
+    def evidence(share: float, pads: Sequence[int]) -> float:
+        spread = np.bincount(pads, minlength=number) * (share * clearance) ** 2 + _LEAST_ERROR**2
+        normal = stats.multivariate_normal(cov=free.T @ (covariance + np.diag(spread)) @ free)
+        return float(normal.logpdf(free.T @ distances))
+
+    few = dict[tuple[int, ...], float]()
+    most = min(number - 4, _FEW)
+    for count in range(most + 1):
+        prior = -np.log(special.comb(number, count) * (most + 1))
+        for pads in itertools.combinations(range(number), count):
+            few[pads] = prior + evidence(_OFF, pads)
+    every = []
+    for share in _MADE:
+        every.append(evidence(share, range(number)))
+    odds = special.logsumexp(every) - np.log(len(every)) - special.logsumexp(list(few.values()))
+    return max(few, key=few.__getitem__), float(special.expit(odds))
 
 
 def _gain(design: FloatArray, weights: FloatArray) -> FloatArray:
