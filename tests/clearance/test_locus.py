@@ -205,6 +205,15 @@ def test_a_position_behind_the_wall_is_named(opened):
     assert "outside-polygon" in found.status
 
 
+@pytest.mark.parametrize("rate", [11.0, 22.0])
+def test_a_logger_too_slow_for_what_turns_with_the_shaft_shows_no_positions_of_metres(campaign_of, rate):
+    """A line at a multiple of the rate stands still, as the mean does: both at once were of any size."""
+    truth = RigTruth.constant(K, np.diag([4e5, 6e5]))
+    plan = RigPlan(locus=locus_points(3), dynamic_rate=rate, locus_seconds=9.0)
+    for point in measure_locus(load_campaign(campaign_of(rig(plan, truth=truth, seed=9)))).points:
+        assert np.hypot(*point.position) < 0.01  # from the probes' zero, a gap away
+
+
 def test_no_locus_is_an_error(opened):
     source = opened(())
     with pytest.raises(RigDataError, match="no runs of kind locus"):

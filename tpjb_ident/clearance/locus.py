@@ -222,10 +222,10 @@ def _read(run: Run, channels: Channels) -> _Record:
         raise refusal(run, "record", what, "Repeat this direction")
     time, place = time[good], place[good]
     span = time[-1] - time[0]
-    # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
-    speed = run.point.shaft_speed_hz
-    turning = [speed, 2 * speed] if speed * span > 2.0 else []
-    design = line_design(time, np.array(turning), drift_order=0)
+    # what turns with the shaft (runout, unbalance) averages out only over whole turns, as sampled: take it off
+    lines, rate = run.point.shaft_speed_hz * np.array([1.0, 2.0]), (len(time) - 1) / span
+    sampled = np.abs(lines - rate * np.round(lines / rate))
+    design = line_design(time, lines[sampled * span > 2.0], drift_order=0)
     mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
     load = mean[-1, 2:]
     steady = place - design[:, :-1] @ mean[:-1, :2]
