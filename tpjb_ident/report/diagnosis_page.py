@@ -261,7 +261,7 @@ def _sections(result: CampaignDiagnosis, coefficients: list[Section]) -> list[Se
         if words := words_of(effect.name):
             texts = [
                 words.physics,
-                f"By itself it shows as follows: {words.on_the_rig}",
+                f"By itself it shows so: {words.on_the_rig}",
                 f"Check first: {words.check}.",
             ]
             effects.append(Section(f"What it means: {finding(effect.name, effect.parameters)}", texts))
