@@ -196,8 +196,10 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
     """One law per pad from what a user may say."""
     n = len(bearing.pads)
     if isinstance(choice, str) and choice in NAMED_LAWS:
-        contacts = [Pivot() if choice == "rigid" else bearing.pivot_of(pad) for pad in bearing.pads]
-        return tuple(formula_pivot(contact, choice == "kirk-secant") for contact in contacts)
+        return tuple(
+            formula_pivot(Pivot() if choice == "rigid" else bearing.pivot_of(pad), choice == "kirk-secant")
+            for pad in bearing.pads
+        )
     if isinstance(choice, (str, Path)):
         if not Path(choice).suffix:
             advice = hint(str(choice), NAMED_LAWS, "Give a pivots.toml or use one of")

@@ -113,6 +113,7 @@ def test_a_path_does_where_a_bearing_is_wanted(rocker_file):
     assert ti.predict(str(rocker_file), load=5000.0, speed=138.0, excitation=157.0, thermal="isothermal").converged
 
 
+DEMO = str(ROOT / "rigdata" / "samples" / "demo.h5")
 ROCKER = str(ROOT / "model" / "bearings" / "rocker.toml")
 
 
@@ -128,9 +129,19 @@ ROCKER = str(ROOT / "model" / "bearings" / "rocker.toml")
         (lambda: ti.write_report(3, 4), "write_report: folder: must be a path, got int"),
         (lambda: ti.write_report("r", 4), "write_report: comparison: must be what compare_campaign gives, got int"),
         (lambda: ti.export(3, "csv", "r"), "export: source: must be a result, a table or the path of one, got int"),
+        (lambda: ti.export(ROCKER, "ros", "r"), "export: format 'ros' is not known. Did you mean 'ross'"),
+        (lambda: ti.export(ti.load_bearing(ROCKER), "ross", ROCKER), f"export: {ROCKER}: File exists. Give a place"),
+        (lambda: ti.write_pivots("/none/x.toml", [curve()], "x"), "write_pivots: /none/x.toml: No such file or "),
+        (
+            lambda: ti.fit_pivots(DEMO, "kirk"),
+            "fit_pivots: pivot_angles: must hold the direction of every pad .*, got str",
+        ),
+        (lambda: ti.fit_pivots(DEMO, [np.zeros(2)]), "fit_pivots: pivot_angles: must hold the direction of every pad"),
+        (lambda: ti.load_bearing(""), "load_bearing: .: is a folder. Give the path of a"),
         (lambda: ti.identify(5), "identify: campaign: must be a Campaign or the path of one, got int"),
         (lambda: ti.predict(5, load=5e3, speed=138.0), "predict: bearing: must be a Bearing or the path of"),
-        (lambda: ti.predict(ROCKER, 5000.0), "predict: "),
+        (lambda: ti.predict(ROCKER, 5000.0), "predict: speed is missing"),
+        (lambda: ti.predict(ROCKER, 5e3, speed=138.0, pivots=None), "predict: pivots: need 5 pivot laws"),
         (lambda: ti.plan(ROCKER, []), "plan: .*no dynamic runs"),
         (lambda: ti.plan(3, ()), "plan: "),
         (lambda: ti.r_matrix(3, 4), "r_matrix: "),
