@@ -74,8 +74,8 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
     head, quantity, is_like = f"[channels.{_key(name)}]", guess.quantity.value, model != name
     if not quantity or quantity == "ignore":
         suffices = pairs(surveyed.channels, "displacement") and pairs(surveyed.channels, "force")
-        guess = 'ignore"   # (guess)' if suffices else f'{MARK}"   #'
-        return [head, f'quantity = "{guess} name and unit are not known: displacement, force, .. or ignore']
+        value = 'ignore"   # (guess)' if suffices else f'{MARK}"   #'
+        return [head, f'quantity = "{value} name and unit are not known: displacement, force, .. or ignore']
     # what it is like bears the mark for both
     lines = [head, _line("quantity", Entry(quantity) if is_like else guess.quantity)]
     if quantity in VECTOR_QUANTITIES:

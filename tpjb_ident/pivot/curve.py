@@ -335,13 +335,14 @@ class PivotCurve(Presented):
 
     def __str__(self) -> str:
         parameters = []
-        for name, value, variance in zip(self.law.names, self.law.theta, np.diag(self.law.covariance), strict=True):
+        for name, value, variance in zip(self.law.names, self.law.theta, np.diag(self.law.covariance)):
             parameters.append(f"{name} = {value:.4g} (se {math.sqrt(variance):.2g})")
         middle = 0.5 * self.valid_to
-        size = with_interval(float(self.stiffness(middle)), *self.stiffness_band(middle), STIFFNESS.display_scale)
-        stiffness = f"{size} {STIFFNESS.display_unit} at {amount(middle, 'force', '.4g')}"
+        low, high = map(float, self.stiffness_band(middle))
+        stiffness = with_interval(float(self.stiffness(middle)), low, high, STIFFNESS.display_scale)
         lines = [
-            f"pad {self.pad} at {math.degrees(self.angle):g} deg: {stiffness} (tangent, 95 %)",
+            f"pad {self.pad} at {math.degrees(self.angle):g} deg: {stiffness} {STIFFNESS.display_unit} (tangent, 95 %) "
+            f"at {amount(middle, 'force', '.4g')}",
             f"  law {self.law.name} ({100 * self.weights[0]:.0f} %): {', '.join(parameters[SCALE:])}",
             f"  holds from {self.valid_from:.0f} to {self.valid_to:.0f} N; load {self.load_direction}",
         ]
