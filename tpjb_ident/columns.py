@@ -97,7 +97,7 @@ def words(*titles: str) -> list[Column | str]:
     return [Column(title, words=True) for title in titles]
 
 
-def amount(value: float, quantity: str, form: str = ".6g") -> str:
+def amount(value: float, quantity: str, form: str = ".4g") -> str:
     """A quantity with its unit, in a sentence.
 
     >>> amount(2500.0, "load")
