@@ -15,6 +15,7 @@ from model.predict import predict
 from rigdata import OperatingPoint
 from tests.good_campaigns import BEARINGS
 from tests.report.plot_cases import curve, locus, polygon
+from tpjb_ident.columns import place_of
 from tpjb_ident.errors import TpjbError
 
 ROOT = Path(__file__).parents[2]
@@ -177,6 +178,7 @@ SHOWN = (
         (repr(ti.IdentifySettings(method="ols")), "IdentifySettings(method='ols')"),
         (repr(ti.CompareSettings(thermal="tehd")), "CompareSettings(thermal='tehd')"),
         (str(POINT), "5000 N at -90 deg, shaft 22 Hz, excited at 25 Hz"),
+        (place_of(4448.2216, 47.0), "4.448 kN, 47 Hz"),
         (str(OperatingPoint(500.0)), "500 N at -90 deg, shaft at rest"),
     ],
 )
