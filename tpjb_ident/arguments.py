@@ -115,7 +115,7 @@ def checked(
                 bound.arguments["settings"] = chosen
             return function(*bound.args, **bound.kwargs)
         except OSError as error:  # reading refuses in words of its own
-            place = bound.arguments.get("path", bound.arguments.get("folder"))
+            place = bound.arguments.get("path", bound.arguments.get("folder", error.filename or "a file"))
             raise BadInputError(f"{called}: {place}: {error.strerror}. Give a place that can be written.") from error
         except ValueError as error:
             text = str(error)
