@@ -177,8 +177,6 @@ def _check_pads(bearing: Bearing, name: str) -> None:
         choices = hint(bearing.rotation, ROTATIONS, "Use one of")
         raise BearingError(f"{name}, [bearing] rotation: {bearing.rotation!r} is no sense of turning. {choices}")
     for pad in bearing.pads:
-        if not 0 < pad.pivot_offset < 1:
-            raise BearingError(f"{name}, [pads] pivot_offset: must lie between 0 and 1 (0.5 is the middle).")
         if not pad.babbitt_thickness < pad.elastic_thickness <= pad.thickness:
             raise BearingError(f"{name}, [pads]: need babbitt_thickness < elastic_thickness <= thickness.")
     for number, neighbour, room in pad_rooms(bearing):

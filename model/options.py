@@ -34,5 +34,5 @@ class Options:
         for name in ("perturbed_bending", "axial_tilt"):
             if getattr(self, name) and not (plain and not self.perturbed_heat):
                 raise OptionError(f"{name} is for laminar films that rupture by swift-stieber, without perturbed_heat")
-        if not (self.growth is None or isinstance(self.growth, Growth)):
+        if not isinstance(self.growth, Growth | None):
             raise OptionError(f"growth must be a Growth or None, got {self.growth!r}")

@@ -6,7 +6,7 @@ vibrations too, which is what the paper compares.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -196,9 +196,10 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
     """One law per pad from what a user may say."""
     n = len(bearing.pads)
     if isinstance(choice, str) and choice in NAMED_LAWS:
-        if choice == "rigid":
-            return (RIGID_PIVOT,) * n
-        return tuple(formula_pivot(bearing.pivot_of(pad), choice == "kirk-secant") for pad in bearing.pads)
+        return tuple(
+            formula_pivot(Pivot() if choice == "rigid" else bearing.pivot_of(pad), choice == "kirk-secant")
+            for pad in bearing.pads
+        )
     if isinstance(choice, (str, Path)):
         if not Path(choice).suffix:
             advice = hint(str(choice), NAMED_LAWS, "Give a pivots.toml or use one of")
@@ -207,12 +208,14 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
     if isinstance(choice, (int, float)) and not isinstance(choice, bool):
         if not (math.isfinite(choice) and choice > 0):
             raise BearingError(f"pivots: a constant stiffness must be positive, got {choice!r} N/m.")
-        return (constant_pivot(float(choice)),) * n
+        choice = constant_pivot(float(choice))
     if isinstance(choice, PivotLaw):
         return (choice,) * n
-    laws = tuple(choice)
+    laws = tuple(choice) if isinstance(choice, Iterable) else ()
     if len(laws) != n or not all(isinstance(law, PivotLaw) for law in laws):
-        raise BearingError(f"pivots: need {n} pivot laws, one per pad, such as constant_pivot(5e8); got {laws!r:.90}.")
+        raise BearingError(
+            f"pivots: need {n} pivot laws, one per pad, such as constant_pivot(5e8), or a name; got {choice!r:.90}."
+        )
     return laws
 
 
@@ -286,7 +289,7 @@ _PAD_KEYS = (
 
 def _read_pad(table: Any, name: str, housing: bool) -> tuple[int, MeasuredPivot]:
     number = table.get("pad") if isinstance(table, dict) else None
-    if not isinstance(number, int) or isinstance(number, bool) or not 1 <= number <= 40:
+    if type(number) is not int or not 1 <= number <= 40:
         raise BearingError(f"{name}, [[pads]]: pad must be a number from 1, got {number!r}.")
     place = f"{name}, pad {number}"
     _refuse_unknown(table, _PAD_KEYS, place)
@@ -297,7 +300,7 @@ def _read_pad(table: Any, name: str, housing: bool) -> tuple[int, MeasuredPivot]
             if not _number(value, "stiffness_N_per_m") > 0.0:
                 raise ValueError(f"stiffness_N_per_m: entry {entry} is {value!r}, no stiffness")
         low = _number(table.get("valid_from_N", 0.0), "valid_from_N")
-        high = _number(table.get("valid_to_N", force[-1]), "valid_to_N")
+        high = _number(table.get("valid_to_N", table["force_N"][-1]), "valid_to_N")
         if not 0.0 <= low < high:
             raise ValueError(f"valid from {low:g} to {high:g} N")
         law = MeasuredPivot(force, points, str(table.get("law", "measured")), housing, high)
@@ -308,7 +311,7 @@ def _read_pad(table: Any, name: str, housing: bool) -> tuple[int, MeasuredPivot]
 
 def _number(value: Any, key: str) -> float:
     """A number of the file: neither text nor a truth value, and none that is not there."""
-    number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
+    number = float(value) if type(value) in (int, float) else math.nan
     if math.isnan(number):
         raise ValueError(f"{key}: {value!r} is no number")
     return number

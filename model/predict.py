@@ -38,7 +38,7 @@ def predict(
     bearing: Bearing,
     load: Any,
     load_direction: Any = -math.pi / 2,
-    speed: Any = 0.0,
+    speed: Any = None,
     excitation: Any = None,
     pivots: Any = "kirk",
     thermal: str = "adiabatic",
@@ -92,15 +92,17 @@ def predict(
     >>> print(f"kyy {p.kyy / 1e6:.1f} MN/m, thinnest film {1e6 * p.min_film:.1f} um")
     kyy 202.5 MN/m, thinnest film 33.5 um
     """
-    if not (options is None or isinstance(options, Options)):
+    if not isinstance(options, Options | None):
         raise OptionError(f"options must be an Options object, got {options!r}")
     check_possible(bearing)
     plain = Setup(bearing, pivot_laws(pivots, bearing), thermal, _mesh(mesh), options=options or Options())
     setup = apply_effects(plain, effects)
     rotation = rotation or bearing.rotation or ROTATIONS[0]
     check_known("rotation", rotation, ROTATIONS)
+    if speed is None:
+        raise _OperatingPointError("speed is missing. Give the shaft's [rad/s], such as 2 * pi * 22 for 22 Hz")
     speed_si = _number(speed, "speed", "speed")
-    if not speed_si > 0.0:
+    if not 0.0 < speed_si < math.inf:
         raise _OperatingPointError(
             f"speed must be positive [rad/s], got {speed_si!r}; `rotation` says which way the shaft turns"
         )
@@ -112,7 +114,7 @@ def predict(
 
 
 def _mesh(mesh: Any) -> Mesh:
-    if mesh is None or isinstance(mesh, Mesh):
+    if isinstance(mesh, Mesh | None):
         return mesh or Mesh()
     try:
         along, across = (operator.index(n) for n in mesh)
@@ -145,7 +147,7 @@ def predict_setup(
         omega = np.asarray(excitation, float)
     except TypeError as error:
         raise _OperatingPointError(f"excitation must be numbers [rad/s], got {excitation!r}") from error
-    _check_point(load, load_direction, speed, omega)
+    _check_point(load, load_direction, omega)
     # A load near the smallest float is none: its quotients would not be numbers.
     pushing = load if load > _NO_LOAD else 0.0
     force = pushing * np.array([math.cos(load_direction), math.sin(load_direction)])
@@ -214,15 +216,13 @@ def in_rig(setup: Setup, vector: FloatArray) -> FloatArray:
     return np.asarray(MIRROR @ vector) if setup.mirrored else vector
 
 
-def _check_point(load: float, direction: float, speed: float, omega: FloatArray) -> None:
+def _check_point(load: float, direction: float, omega: FloatArray) -> None:
     if not (math.isfinite(load) and load >= 0):
         raise _OperatingPointError(
             f"load must be zero or positive [N], got {load!r}; give its direction as load_direction"
         )
     if not math.isfinite(direction):
         raise _OperatingPointError(f"load_direction must be finite [rad], got {direction!r}")
-    if not (math.isfinite(speed) and speed != 0.0):
-        raise _OperatingPointError(f"speed must be a number of rad/s other than zero, got {speed!r}")
     if omega.ndim > 1 or omega.size == 0 or not np.all((omega > 0) & (omega < _FASTEST)):
         raise _OperatingPointError(
             f"excitation must be a positive number below {_FASTEST:g} rad/s or a 1-D array of them, "

@@ -81,7 +81,7 @@ class Prediction:
     solver: Callable[..., Prediction] = field(repr=False, compare=False)
 
     def __str__(self) -> str:
-        x, y = 1e6 * self.position
+        x, y = np.round(1e6 * self.position, 4) + 0.0  # a thousandth of a nanometre is none
         return (
             f"{self.load:g} N at {math.degrees(self.load_direction):.4g} deg, {self.speed / math.tau:.4g} Hz: "
             f"shaft at ({x:.4g}, {y:.4g}) um, thinnest film {1e6 * self.min_film:.3g} um, "

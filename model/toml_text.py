@@ -12,8 +12,9 @@ def read_page(path: Path, refuse: type[ModelError], kind: str, missing: str, meg
     try:
         if path.stat().st_size <= 1_000_000 * megabytes:
             return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise refuse(f"{path}: no such file. {missing}") from error
+    except (FileNotFoundError, IsADirectoryError) as error:
+        fault = "is a folder" if path.is_dir() else "no such file"
+        raise refuse(f"{path}: {fault}. {missing}") from error
     except (OSError, UnicodeDecodeError) as error:
         raise refuse(f"{path}: cannot be read ({error}). Give a file of UTF-8 text.") from error
     raise refuse(f"{path.name}: larger than {megabytes} MB. {kind}; check the path.")

@@ -7,6 +7,7 @@ products, quotients and powers between them are worked out here.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import re
@@ -84,7 +85,9 @@ def from_pint(name: str) -> Unit:
         powers = {str(n): int(p) for n, p in units._units.items()}
         factor = float(magnitude)
     except Exception as error:  # pint raises a dozen kinds for a bad name; all mean the same to a user
-        raise UnitError(f"unit {name!r} is not known") from error
+        units = (*LISTED["aliases"]["any"], *common_units())
+        near = {known.casefold(): f"; did you mean {known}?" for known in units}
+        raise UnitError(f"unit {name!r} is not known{near.get(name.casefold(), '')}") from error
     return Unit(factor, tuple(sorted(powers.items())))
 
 
@@ -140,8 +143,18 @@ def unit_factor(unit: str, dimension: str) -> float:
     elif dimension == "angle":  # a slope: 0.2 mm/m
         is_usable = is_usable or ("/" in unit and not parsed.powers)
     if not is_usable:
-        raise UnitError(f"unit {unit!r} is not one of {dimension}; expected something like {example_of(dimension)!r}")
+        other, cure = LISTED["mistaken"].get(dimension, ("", ""))
+        fault = f"unit {unit!r} is not one of {dimension}; expected something like {example_of(dimension)!r}"
+        raise UnitError(fault + cure * (parsed.powers == parse_unit(other).powers))
     return parsed.factor
+
+
+def measured_in(unit: str) -> str:
+    """What a rig records in a unit: a "signal" or a quantity of a manifest; "" where that is nothing."""
+    for quantity, dimension in LISTED["quantities"].items():
+        with contextlib.suppress(UnitError):
+            return "signal" if is_signal(unit) else quantity * bool(unit_factor(unit, dimension))
+    return ""
 
 
 def example_of(dimension: str) -> str:
@@ -165,7 +178,8 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
             raise UnitError(f"{shown(value)} is not a number with a unit{hint}")
         number, unit = match[0], text[match.end() :].strip()
     if not unit and dimension != "ratio":
-        raise UnitError(f"{shown(value)} has no unit, such as {example}")
+        size = shown(number).strip("'")
+        raise UnitError(f'{shown(value)} has no unit, as in "{size} {example}"')
     return _finite(number), unit
 
 

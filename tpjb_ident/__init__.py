@@ -56,7 +56,8 @@ _HOMES = {
 
 #: Arguments that are looked at before a function is called: the path of a campaign or a bearing does as well.
 _CHECKED = {
-    "identify": "campaign", "fit_pivots": "campaign", "measure_locus": "campaign", "measure_clearance": "campaign",
+    "identify": "campaign", "fit_pivots": "campaign pivot_angles", "measure_locus": "campaign",
+    "measure_clearance": "campaign pivot_angles",
     "compare_campaign": "campaign bearing", "predict": "bearing", "load_campaign": "path", "load_bearing": "source",
     "load_effects": "path", "load_pivots": "path", "pivot_table": "curves", "write_pivots": "path curves",
     "write_report": "folder comparison",

@@ -8,10 +8,11 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable, Iterable
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.errors import ArgumentError
+from tpjb_ident.errors import ArgumentError, BadInputError
 
 if TYPE_CHECKING:
     from model.bearing import Bearing
@@ -50,11 +51,16 @@ def _path(value: Any, name: str) -> Any:
     return _required(isinstance(value, (str, os.PathLike)), value, name, "be a path")
 
 
-def _curves(value: Any, name: str) -> Any:
-    curves = tuple(value) if isinstance(value, Iterable) else (value,)
-    for curve in curves:
-        _required(hasattr(curve, "stiffness_band"), curve, name, "hold what fit_pivots gives")
-    return curves
+def _each(fits: Callable[[Any], bool], expected: str) -> Callable[[Any, str], Any]:
+    """Make the check of an argument that holds several."""
+
+    def check(value: Any, name: str) -> Any:
+        items = tuple(value) if isinstance(value, Iterable) else (value,)
+        for item in items:
+            _required(fits(item), item, name, expected)
+        return items
+
+    return check
 
 
 def carried_bearing(campaign: Campaign, warn: Callable[[str], Any]) -> Bearing | None:
@@ -73,7 +79,9 @@ def carried_bearing(campaign: Campaign, warn: Callable[[str], Any]) -> Bearing |
 #: What arguments of these names may be.
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     "campaign": as_campaign, "bearing": as_bearing, "source": _path, "path": _path,
-    "folder": lambda value, name: Path(_path(value, name)), "curves": _curves,
+    "folder": lambda value, name: Path(_path(value, name)),
+    "curves": _each(lambda curve: hasattr(curve, "stiffness_band"), "hold what fit_pivots gives"),
+    "pivot_angles": _each(lambda angle: isinstance(angle, Real), "hold the direction of every pad [rad]"),
     "comparison": lambda v, name: _required(hasattr(v, "predictions"), v, name, "be what compare_campaign gives"),
 }  # fmt: skip
 
@@ -106,6 +114,9 @@ def checked(
                     chosen = dataclasses.replace(chosen, clearance=bearing and min(bearing.clearances))
                 bound.arguments["settings"] = chosen
             return function(*bound.args, **bound.kwargs)
+        except OSError as error:  # reading refuses in words of its own
+            place = bound.arguments.get("path", bound.arguments.get("folder", error.filename or "a file"))
+            raise BadInputError(f"{called}: {place}: {error.strerror}. Give a place that can be written.") from error
         except ValueError as error:
             text = str(error)
             if error.args == (text,) and not text.startswith(called):  # else its text is made of more than one

@@ -5,42 +5,20 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from rigdata.operating_point import ROTATIONS, OperatingPoint
+from rigdata.problem import tables_beside
 from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.rounding import significant
 
-#: Pounds and inches in SI.
-_LBF, _INCH = 4.4482216152605, 0.0254
+#: Tables of `columns.toml`.
+UNIT_TABLES = tables_beside(__file__, "columns.toml")
 #: Symbol and size (in SI, degrees, Hz) of the unit in which a quantity is shown, by system.
-_SI = {
-    "load": ("kN", 1e3),
-    "force": ("N", 1.0),
-    "stiffness": ("MN/m", 1e6),
-    "damping": ("kN s/m", 1e3),
-    "mass": ("kg", 1.0),
-    "length": ("µm", 1e-6),
-    "size": ("mm", 1e-3),
-    "pressure": ("MPa", 1e6),
-    "acceleration": ("m/s²", 1.0),
-    "angle": ("deg", 1.0),
-    "frequency": ("Hz", 1.0),
-    "speed": ("Hz", 1.0),
-    "share": ("%", 0.01),
+SYSTEMS: dict[str, dict[str, tuple[str, float]]] = {
+    "si": UNIT_TABLES["si"],
+    "us": UNIT_TABLES["si"] | UNIT_TABLES["us"],
 }
-_US = {
-    "load": ("lbf", _LBF),
-    "force": ("lbf", _LBF),
-    "stiffness": ("lbf/in", _LBF / _INCH),
-    "damping": ("lbf s/in", _LBF / _INCH),
-    "mass": ("lb", 0.45359237),
-    "length": ("mil", 1e-3 * _INCH),
-    "size": ("in", _INCH),
-    "pressure": ("psi", _LBF / _INCH**2),
-    "speed": ("rpm", 1 / 60.0),
-}
-SYSTEMS = {"si": _SI, "us": _SI | _US}
 #: The system in use, which `use_units` sets.
-UNITS = dict(_SI)
+UNITS = dict(SYSTEMS["si"])
 
 
 def use_units(system: str) -> None:
@@ -119,7 +97,7 @@ def words(*titles: str) -> list[Column | str]:
     return [Column(title, words=True) for title in titles]
 
 
-def amount(value: float, quantity: str, form: str = ".6g") -> str:
+def amount(value: float, quantity: str, form: str = ".4g") -> str:
     """A quantity with its unit, in a sentence.
 
     >>> amount(2500.0, "load")

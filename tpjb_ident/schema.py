@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from tpjb_ident.columns import size, symbol
+from tpjb_ident.columns import UNIT_TABLES, size, symbol
 
 ENTRIES = ("xx", "xy", "yx", "yy")
 
@@ -75,11 +75,7 @@ def with_endings(*endings: str) -> list[str]:
 
 
 #: Quantity of the unit that a name ends in.
-_QUANTITIES = {
-    "N_per_m": "stiffness", "Ns_per_m": "damping", "N": "force", "kg": "mass", "m3_per_s": "flow", "m": "length",
-    "deg": "angle", "rad": "angle", "degC": "temperature", "K": "temperature", "Pa": "pressure", "Hz": "frequency",
-    "s": "time", "J": "energy", "W": "power",
-}  # fmt: skip
+_QUANTITIES: dict[str, str] = UNIT_TABLES["endings"]
 _NAME = re.compile(rf".+?_({'|'.join(_QUANTITIES)})(?:_predicted)?")
 #: Least value of a quantity in a table, and endings that are widths; anything else may be negative.
 _LEAST = {"force": 0.0, "frequency": 0.0, "count": 0.0}

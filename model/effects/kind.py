@@ -9,7 +9,7 @@ from model.bearing import Bearing
 from model.errors import ModelError
 from model.setup import Setup
 from rigdata.near_names import hint
-from rigdata.units import UnitError, parse_quantity
+from rigdata.units import UnitError, to_si
 
 #: A bearing file lists no more pads.
 MAX_PADS = 40
@@ -220,11 +220,10 @@ def effect_on(
 
 
 def _number(value: Any, parameter: Parameter, place: str) -> float:
-    if isinstance(value, str):
-        try:
-            value = parse_quantity(value, parameter.dimension, place)
-        except UnitError as error:
-            raise EffectError(f"{error}.") from error
+    try:
+        value = to_si(value, parameter.dimension, place)
+    except UnitError as error:
+        raise EffectError(f"{error}.") from error
     if isinstance(value, bool) or not hasattr(value, "__float__"):
         raise EffectError(f"{place}: must be a number [{parameter.unit}], got {value!r}.")
     try:

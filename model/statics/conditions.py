@@ -20,6 +20,8 @@ from rigdata.problem import Condition
 
 #: Below this film the surfaces touch: three times the combined roughness, 1 um, of ground journal and bored pad [m].
 _THINNEST_FILM = 3e-6
+#: Below this preload a pad's ends come nearer to the journal than its pivot, by more than bores of none scatter.
+_LEAST_PRELOAD = -0.1
 #: Above this pressure tin babbitt yields, cold (0.2 % proof stress of SnSb8Cu4, ISO 4381) [Pa].
 _HIGHEST_PRESSURE = 45e6
 #: Above this local Reynolds number rho U h / mu a film begins to leave the laminar regime.
@@ -69,6 +71,7 @@ def status_of(
     ends = "and their films start where it suffices" if films[0].rupture == "jfo" else "and run as if it did"
     # pads in the journal's way, or in each other's, stand in bearings built in code: a file is refused
     narrow = [k for k, p in enumerate(pads, 1) if not p.assembled_clearance + setup.clearance_change > 0.0]
+    hollow = [k for k, p in enumerate(pads, 1) if p.preload < _LEAST_PRELOAD]
     meeting = []
     for number, neighbour, room in pad_rooms(setup.bearing):
         gap = room - pads[number - 1].arc
@@ -88,6 +91,7 @@ def status_of(
         (back > 0.0, "flow back at a leading edge"),
         (short, "pads {pads} are short of oil", short, ends),
         (narrow, "interference: no clearance at pads {pads}", narrow),
+        (hollow, "negative preload of pads {pads}", hollow),
         *meeting,
         (swirls, "film not laminar: Re {number:.0f}", (), reynolds),
         (extreme < _OIL_DATA[0] or extreme > _OIL_DATA[1], "oil beyond its data: {number:.0f} degC", (), extreme),

@@ -23,7 +23,7 @@ from rigdata.units import TIME_FACTORS
 IN_MEMORY = 2**23
 _WORDS = (
     r"date[ /_-]*time|date and time|datum[ /_+-]*(?:und )?(?:uhr)?zeit|time|zeit(?:stempel)?|temps|tempo|tiempo|uhrzeit"
-    r"|timestamps?|elapsed ?time|relative ?time"
+    r"|timestamps?|elapsed ?time|relative ?time|时间|時間|時刻|时刻"
 )
 _UNITS = "|".join(TIME_FACTORS)
 # a lone t is a time, T and T1 are thermometers

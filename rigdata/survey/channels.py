@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.calibration import DIMENSIONS, VECTOR_QUANTITIES, reading_gain
+from rigdata.calibration import VECTOR_QUANTITIES, reading_gain
 from rigdata.manifest.fields import MARK
 from rigdata.problem import tables_beside
 from rigdata.readers.series import Series, is_time
-from rigdata.units import UnitError, is_signal, parse_quantity, parse_unit
+from rigdata.units import UnitError, measured_in, parse_quantity
 
 #: Tables of `words.toml`.
 WORDS: dict[str, dict[str, str]] = tables_beside(__file__, "words.toml")
@@ -103,24 +103,13 @@ def usable_unit(unit: str) -> str:
     """Write a logger's unit so that a manifest can hold it; "" if it is none."""
     text = re.sub(r"\s*/\s*", "/", unit.strip().translate(_SPELLINGS))
     text = WORDS["units"].get(text.lower(), text)
-    try:
-        parse_unit(text)
-    except UnitError:
-        return ""
-    return text
+    return text if measured_in(text) else ""
 
 
 def quantity_of_unit(unit: str) -> str:
     """Quantity that an engineering unit belongs to; "" for volts and for nothing known."""
-    with contextlib.suppress(UnitError):
-        if not unit or is_signal(unit):
-            return ""
-    for quantity in DIMENSIONS:
-        with contextlib.suppress(UnitError):
-            reading_gain(quantity, unit, None)
-            if quantity != "time":
-                return quantity
-    return ""
+    quantity = measured_in(unit)
+    return "" if quantity in ("signal", "time") else quantity
 
 
 def _hinted(name: str, quantity: str) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError, parse_toml, refuse, toml_value
-from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, quantity_of_unit, usable_unit
+from rigdata.survey.channels import OPEN, PAD, WORDS, Entry, pairs, quantity_of_unit, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
 from rigdata.survey.survey import Survey, survey
@@ -73,7 +73,9 @@ def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
     guess = surveyed.channels[name]
     head, quantity, is_like = f"[channels.{_key(name)}]", guess.quantity.value, model != name
     if not quantity or quantity == "ignore":
-        return [head, 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, ..']
+        suffices = pairs(surveyed.channels, "displacement") and pairs(surveyed.channels, "force")
+        value = 'ignore"   # (guess)' if suffices else f'{MARK}"   #'
+        return [head, f'quantity = "{value} name and unit are not known: displacement, force, .. or ignore']
     # what it is like bears the mark for both
     lines = [head, _line("quantity", Entry(quantity) if is_like else guess.quantity)]
     if quantity in VECTOR_QUANTITIES:

@@ -65,6 +65,19 @@ def model(name: str, what: str) -> str:
     return f"Bokeh.documents[0].get_model_by_name('{name}').{what}"
 
 
+def test_beside_a_channel_stand_those_of_its_quantity():
+    from tpjb_ident.view.records_tab import records_tab
+
+    tab = records_tab(ti.load_campaign(DEMO))
+    channel, others, plot = (tab.select_one({"name": name}) for name in ("channel", "others", "time-plot"))
+    assert (channel.value, others.options) == ("X1A", ["X1B"])
+    others.value = ["X1B"]
+    assert plot.renderers[0].data_source.data["name"] == ["X1A", "X1B"]
+    channel.value = "L1H"
+    assert others.options == ["L1V"]
+    assert plot.renderers[0].data_source.data["name"] == ["L1H"]
+
+
 def test_a_campaign_can_be_browsed_and_the_model_moved(chromium, view_of_demo):
     address, _ = view_of_demo
     with chromium() as tab:

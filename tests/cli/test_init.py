@@ -67,8 +67,8 @@ def test_columns_without_names_are_named_by_hand_and_guessed_anew(folder):
 
 def test_a_channel_that_was_given_its_quantity_gets_the_entries_that_it_lacks(folder):
     manifest = drafted(folder, "test-5kN.csv", ("Time", "Dev1_ai0", "Dev1_ai1", "FH [N]", "FV [N]"))
-    why = 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, ..'
-    edit(manifest, (why, 'quantity = "displacement"'))
+    why = 'quantity = "??"   # name and unit are not known: displacement, force, .. or ignore'
+    edit(manifest, (why, 'quantity = "displacement"'), ('quantity = "??"', 'quantity = "displacement"'))
     result = tpjb("init", folder, "--update")
     assert "channel Dev1_ai0: axis '?? deg' added" in result.stdout
     text = manifest.read_text("utf-8")

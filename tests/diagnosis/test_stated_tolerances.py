@@ -8,6 +8,7 @@ import pytest
 
 from model.bearing_file import load_bearing
 from model.effects import Effect, apply_effects, kind_of
+from model.possible import KEYS
 from tests.diagnosis.rocker_case import ROCKER, points, rocker_setup
 from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, nuisances, shifted
@@ -26,12 +27,14 @@ def test_the_command_line_wins_over_the_bearing_file_and_that_over_defaults():
     found = typed.layered(bearing_with('viscosity = "2 %"\nclearance_scatter = "3 um"'))
     assert (found["viscosity"], found.stated["viscosity"].source) == (pytest.approx(0.04), "command line")
     assert (found["clearance_scatter"], found.stated["clearance_scatter"].source) == (3e-6, "bearing file")
-    assert (found["film_heat"], found.stated["film_heat"].source) == (DEFAULTS["film_heat"][0], "default")
+    assert (found["film_heat"], found.stated["film_heat"].source) == (DEFAULTS["film_heat"], "default")
 
 
 def test_a_bearing_file_states_every_tolerance():
     texts = {"ratio": "2 %", "length": "3 um", "temperature difference": "1 K", "angle": "0.1 deg"}
-    lines = [f'{name} = "{texts[dimension]}"' for name, (_, dimension) in DEFAULTS.items()]
+    kinds = KEYS["keys"]["tolerances"]
+    assert list(kinds) == sorted(DEFAULTS, key=list(kinds).index)
+    lines = [f'{name} = "{texts[kinds[name].partition(",")[0]]}"' for name in DEFAULTS]
     stated = Tolerances().layered(bearing_with("\n".join(lines))).stated
     assert {tolerance.source for tolerance in stated.values()} == {"bearing file"}
 

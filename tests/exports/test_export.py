@@ -179,7 +179,9 @@ def test_without_a_choice_ross_is_what_is_installed_else_3(monkeypatch, installe
     assert ross_version(2) == (2, "as chosen")
 
 
-@pytest.mark.parametrize(("to", "version", "says"), [("ross", 4, "Use 2 or 3"), ("mat", 3, "belongs to --to ross")])
+@pytest.mark.parametrize(
+    ("to", "version", "says"), [("ross", 4, "Use 2 or 3"), ("mat", 3, "belongs to the format ross")]
+)
 def test_a_version_of_ross_that_is_none_is_refused(tmp_path, to, version, says):
     with pytest.raises(ExportError, match=says):
         export(table(SERIES), to, tmp_path / "o", ross=version)
@@ -256,7 +258,7 @@ def test_matlab_gets_matrices(tmp_path, points):
         (lambda f: chosen_rows(f.drop(columns="kxy_N_per_m")), "no column kxy_N_per_m"),
         (lambda f: chosen_rows(pd.concat([f, f])), "stands twice"),
         (lambda f: chosen_rows(f.assign(kxx_N_per_m=math.nan)), "finite"),
-        (lambda f: check_format("dyrobe"), "Did you mean 'dyrobes'"),
+        (lambda f: check_format("dyrobe"), "^format 'dyrobe' is not known. Did you mean 'dyrobes'"),
     ],
 )
 def test_what_cannot_be_exported_is_refused(change, says):
@@ -308,6 +310,14 @@ def test_nothing_leaves_where_nothing_can_be_trusted_or_has_converged(tmp_path):
     assert not (tmp_path / "o").exists()
     frame = table(SERIES).assign(converged=[True, False, True, True], status="")
     assert "did not converge" in export(frame, "csv", tmp_path).chosen.doubtful[0]
+
+
+@pytest.mark.parametrize("to", ["csv", "ross"])
+def test_a_prediction_leaves_as_what_was_identified_does(to, tmp_path, rocker_file):
+    prediction = ti.predict(rocker_file, 5000.0, speed=138.0, excitation=[157.0, 200.0], thermal="isothermal")
+    written = ti.export(prediction, to, tmp_path / "o")
+    assert written.chosen.table["kyy_N_per_m"].tolist() == prediction.kyy.tolist()
+    assert "a prediction" in (tmp_path / "o" / written.files[-1]).read_text() or to == "csv"
 
 
 def test_the_command_line_says_what_stayed_behind_and_exits_with_three(tmp_path):
@@ -398,7 +408,7 @@ def rows_of_a_rotor_program(path, to):
 def test_every_format_writes_us_units_or_refuses_them_by_name(to, tmp_path):
     frame = doubtful_table()
     if to == "ross":
-        with pytest.raises(ExportError, match="--units us: --to ross writes SI"):
+        with pytest.raises(ExportError, match="US units: the format ross is SI"):
             export(frame, to, tmp_path / "o")
         assert not (tmp_path / "o").exists()
         return
@@ -441,7 +451,7 @@ def test_tables_stay_si_beside_those_in_us_units(to, tmp_path):
 def test_the_command_line_exports_us_units_and_refuses_them_for_ross(tmp_path):
     table(SERIES).to_csv(tmp_path / "coefficients.csv", index=False)
     refused = ended(2, "export", tmp_path, "--to", "ross", "--units", "us", "--out", tmp_path / "r")
-    assert "Leave --units us out" in " ".join(refused.stderr.split())
+    assert "Leave US units out" in " ".join(refused.stderr.split())
     done = ended(0, "export", tmp_path, "--to", "parquet", "--units", "us", "--out", tmp_path / "o")
     assert "bearing_coefficients_us.csv" in " ".join(done.output.split())
     frame = pd.read_csv(tmp_path / "o" / "bearing_coefficients_us.csv")

@@ -125,7 +125,10 @@ def test_missing_sections_are_named(text, section):
         ("pads", "pivot_angles", 'pivot_angles = "12 deg"', ("pivot_angles", "must be a list")),
         ("pads", "pivot_angles", 'pivot_angles = ["0 deg", "30 deg"]', ("overlaps", "of arc", "of room")),
         ("pads", "arc", 'arc = "80 deg"', ("overlaps",)),
-        ("pads", "pivot_offset", "pivot_offset = 1.2", ("pivot_offset", "between 0 and 1")),
+        ("bearing", "assembled_clearance", 'assembled_clearance = "0.080 um"', ("(1.4979e-06 to 0.0014979 m)", "unit")),
+        ("bearing", "pad_clearance", 'pad_clearance = "13 mm"', ("pad_clearance is 0.013", "unit")),
+        ("oil", "viscosity_40C", 'viscosity_40C = "39.6 Pa s"', ("viscosity_40 is 39.6", "5e-06 to 5 Pa s", "unit")),
+        ("pads", "pivot_offset", "pivot_offset = 1.2", ("pivot_offset", "0.001 to 0.999 of the arc")),
         ("pads", "babbitt_thickness", 'babbitt_thickness = "20 mm"', ("babbitt_thickness < elastic_thickness",)),
         ("pivot", "kind", 'kind = "roker"', ("kind", "Did you mean 'rocker'")),
         ("pivot", "kind", "kind = 3", ("kind", "must be text")),
@@ -149,8 +152,9 @@ def test_other_schema_not_toml_too_large_and_no_file_are_refused_and_a_byte_orde
     refused(text + "\n= 3\n", "not valid TOML")
     with pytest.raises(BearingError, match="no such file"):
         load_bearing(tmp_path / "none.toml")
-    with pytest.raises(BearingError, match="cannot be read"):
-        load_bearing(tmp_path)
+    for folder in (tmp_path, ""):
+        with pytest.raises(BearingError, match=r"is a folder\. Give the path of a tpjb-bearing/1"):
+            load_bearing(folder)
     large = tmp_path / "large.toml"
     large.write_bytes(b"#" * 1_000_001)
     with pytest.raises(BearingError, match="larger than 1 MB"):

@@ -162,6 +162,8 @@ def test_pads_in_each_others_way_are_named(rocker):
         return "; ".join(predict(rocker.with_pads(pads), LOAD, DOWN, SPEED).status)
 
     assert "interference: no clearance at pads 1" in status(assembled_clearance=-2e-6)
+    assert "negative preload of pads 1" in status(assembled_clearance=180e-6)
+    assert "negative preload" not in status(assembled_clearance=130e-6)
     assert "pads 5 and 1 overlap" in status(arc=math.radians(110.0))
     ring = changed_pads(rocker, arc=math.radians(72.0))
     assert "pads 1 and 2 touch" in predict(ring, LOAD, DOWN, SPEED).status

@@ -222,7 +222,7 @@ def test_broken_files_say_what_and_where(tmp_path, text, message):
 
 def test_a_list_of_numbers_is_no_list_of_laws_and_the_message_says_what_is(rocker):
     """It said "need one pivot law per pad (5), got 5 entries"."""
-    with pytest.raises(BearingError, match=r"need 5 pivot laws, one per pad, such as constant_pivot.*; got \(500"):
+    with pytest.raises(BearingError, match=r"need 5 pivot laws, one per pad, such as constant_pivot.*; got \[500"):
         pivot_laws([5e8] * 5, rocker)
 
 

@@ -99,6 +99,21 @@ def test_spellings_that_real_exports_have(tmp_path, text):
     expect_good(make(tmp_path, text))
 
 
+@pytest.mark.parametrize(("decimal", "marks"), [(".", ",."), (",", ".,")])
+@pytest.mark.parametrize(("delimiter", "cell"), [(";", "{}"), (",", '"{}"')])
+def test_marks_between_thousands_are_read_beside_a_decimal_mark_else_named(tmp_path, decimal, marks, delimiter, cell):
+    lines = ["Zeit;X1A;X1B".replace(";", delimiter)]
+    for time, first, second in ROWS:
+        numbers = [f"{v:,.3f}".translate(str.maketrans(",.", marks)) for v in (time, 700 * first, 1e5 * second)]
+        lines.append(delimiter.join(map(cell.format, numbers)))
+    run = make(tmp_path, "\n".join(lines) + "\n")
+    assert run.record("X1A").values == pytest.approx([700e-6 * r[1] for r in ROWS])
+    assert run.record("X1B").values == pytest.approx([0.1 * r[2] for r in ROWS])
+    lines[9] = lines[9].replace(f"{decimal}000", "")
+    if marks == ",.":  # 3,500 may be three and a half
+        refused(make(tmp_path, "\n".join(lines) + "\n"), "line 10", "thousands have no mark between them")
+
+
 DIALECT = 'delimiter = ";"\ndecimal = ","\nencoding = "cp1252"\nheader_line = 5\nunits_line = 6'
 
 

@@ -102,6 +102,18 @@ def test_a_sign_of_an_accelerometer_is_a_guess_as_long_as_nobody_says_how_the_st
     assert text.count("polarity = -1\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("names", "line"), [("XXFF", 'quantity = "ignore"   # (guess)'), ("X?F?", 'quantity = "??"   #')]
+)
+def test_what_nothing_tells_is_left_out_where_the_others_suffice_else_asked_for(names, line):
+    kinds = {"X": "displacement", "F": "force"}
+    channels = {"spare": ChannelGuess(Entry(), "")}
+    for number, name in enumerate(names):
+        channels[f"{name}{number}"] = ChannelGuess(Entry(kinds.get(name), "file"), "V")
+    head = draft_manifest(Survey(channels, (), {}), "x", None).partition("[channels.spare]\n")[2]
+    assert head.startswith(line)
+
+
 def _calibrations(manifest: str) -> dict[str, str]:
     """Everything but the quantity that the rig's own manifest says of each channel."""
     out = {}
@@ -129,6 +141,16 @@ def _calibrations(manifest: str) -> dict[str, str]:
         ("time_ms", "", "time", ""),
         ("Kraft waagrecht", "kN", "force", "0 deg"),
         ("Stützkraft senkrecht", "N", "force", "90 deg"),
+        ("Kraft längs (H)", "", "force", ""),
+        ("转速", "", "speed", ""),
+        ("温度1", "", "temperature", ""),
+        ("加速度Y", "", "acceleration", "90 deg"),
+        ("力X", "", "force", "0 deg"),
+        ("压力", "", "pressure", ""),
+        ("荷重", "", "force", ""),
+        ("位移1", "", "displacement", ""),
+        ("变位".replace("变", "変"), "", "displacement", ""),
+        ("时间", "", "time", ""),
         ("spare", "V", "", ""),
         ("=cmd|' /C calc'!A0", "sheep", "", ""),
     ],
@@ -186,7 +208,8 @@ def test_loads_in_names_of_files_have_any_unit_of_force(stem, newtons, text, sou
 
 
 @pytest.mark.parametrize(
-    ("label", "unit"), [("µm", "um"), ("U/min", "rpm"), ("Volts", "V"), ("Newtons", "N"), ("mils", "mil"), ("g/no", "")]
+    ("label", "unit"),
+    [("µm", "um"), ("U/min", "rpm"), ("Volts", "V"), ("Newtons", "N"), ("mils", "mil"), ("g/no", ""), ("H", "")],
 )
 def test_units_are_spelt_as_a_manifest_spells_them(label, unit):
     assert usable_unit(label) == unit
@@ -197,6 +220,9 @@ def test_units_are_spelt_as_a_manifest_spells_them(label, unit):
     [
         ("t;a;b\ns;V;N\n0,0;1,5;2\n0,1;1,6;3\n0,2;1,7;4\n", ("t", "a", "b"), ("s", "V", "N"), ","),
         ("remark\n\nTime [s],a [V]\n0.0,1.5\n0.1,1.6\n0.2,1.7\n", ("Time [s]", "a [V]"), ("s", "V"), "."),
+        ("t;F (H)\ns;lbf\n0.0;1.5\n0.1;1.6\n0.2;1.7\n", ("t", "F (H)"), ("s", "lbf"), "."),
+        ("t;F (kN)\nA;channel 1\n0.0;1.5\n0.1;1.6\n0.2;1.7\n", ("t", "F (kN)"), ("A", "kN"), "."),
+        ("t;K1\n0.0;3,600.5\n0.1;999.5\n0.2;-1,234,567.5e3\n", ("t", "K1"), ("", ""), "."),
         ("0.0\t1.5\n0.1\t1.6\n0.2\t1.7\n", ("column1", "column2"), ("", ""), "."),
         ("t|a\n1|\n2|NaN\n3|7\n", ("t", "a"), ("", ""), "."),
     ],

@@ -101,6 +101,11 @@ def test_units_of_bearing_files(dimension, unit):
 #: What is said, and of which texts and numbers that are to be forces, or another dimension.
 REFUSALS = {
     "no unit": ["5", 5, (5.0, "angle"), 16**5000],
+    "did you mean Hz?": [("25 hz", "speed")],
+    "did you mean degC?": [("40 DegC", "temperature")],
+    "times the density is one": [("39.6 cSt", "viscosity"), ("46 mm^2/s", "viscosity")],
+    "times 9.81 m/s.2 is one": ["500 kg"],
+    'as in "500 N/m"': [("500", "stiffness"), (500, "stiffness")],
     "expected a number": [(True, "ratio"), None, [1]],
     "decimal point": ["7,78 kN"],
     "not a number": ["kN", "nan N", "inf N", "٣ N"],

@@ -95,6 +95,16 @@ def test_python_runs_as_it_stands(language, text, desk, monkeypatch, capsys):
     assert capsys.readouterr().out
 
 
+@pytest.mark.slow
+def test_the_gallery_runs_from_its_first_block_on_and_writes_nothing(desk, monkeypatch):
+    """Each of its calls takes what the first block made of the demo."""
+    monkeypatch.chdir(desk)
+    names: dict = {}
+    for block in (p.values[1] for p in of("python") if p.id.startswith("docs/plots.md")):
+        exec(compile(block, "block", "exec"), names)
+    assert not list(desk.glob("*.png"))
+
+
 @pytest.mark.parametrize(("language", "text"), of("sh"))
 def test_command_lines_have_commands_and_options_that_exist(language, text):
     for line in text.splitlines():

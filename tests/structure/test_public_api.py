@@ -15,6 +15,7 @@ from model.predict import predict
 from rigdata import OperatingPoint
 from tests.good_campaigns import BEARINGS
 from tests.report.plot_cases import curve, locus, polygon
+from tpjb_ident.columns import place_of
 from tpjb_ident.errors import TpjbError
 
 ROOT = Path(__file__).parents[2]
@@ -113,6 +114,7 @@ def test_a_path_does_where_a_bearing_is_wanted(rocker_file):
     assert ti.predict(str(rocker_file), load=5000.0, speed=138.0, excitation=157.0, thermal="isothermal").converged
 
 
+DEMO = str(ROOT / "rigdata" / "samples" / "demo.h5")
 ROCKER = str(ROOT / "model" / "bearings" / "rocker.toml")
 
 
@@ -128,9 +130,19 @@ ROCKER = str(ROOT / "model" / "bearings" / "rocker.toml")
         (lambda: ti.write_report(3, 4), "write_report: folder: must be a path, got int"),
         (lambda: ti.write_report("r", 4), "write_report: comparison: must be what compare_campaign gives, got int"),
         (lambda: ti.export(3, "csv", "r"), "export: source: must be a result, a table or the path of one, got int"),
+        (lambda: ti.export(ROCKER, "ros", "r"), "export: format 'ros' is not known. Did you mean 'ross'"),
+        (lambda: ti.export(ti.load_bearing(ROCKER), "ross", ROCKER), f"export: {ROCKER}: File exists. Give a place"),
+        (lambda: ti.write_pivots("/none/x.toml", [curve()], "x"), "write_pivots: /none/x.toml: No such file or "),
+        (
+            lambda: ti.fit_pivots(DEMO, "kirk"),
+            "fit_pivots: pivot_angles: must hold the direction of every pad .*, got str",
+        ),
+        (lambda: ti.fit_pivots(DEMO, [np.zeros(2)]), "fit_pivots: pivot_angles: must hold the direction of every pad"),
+        (lambda: ti.load_bearing(""), "load_bearing: .: is a folder. Give the path of a"),
         (lambda: ti.identify(5), "identify: campaign: must be a Campaign or the path of one, got int"),
         (lambda: ti.predict(5, load=5e3, speed=138.0), "predict: bearing: must be a Bearing or the path of"),
-        (lambda: ti.predict(ROCKER, 5000.0), "predict: "),
+        (lambda: ti.predict(ROCKER, 5000.0), "predict: speed is missing"),
+        (lambda: ti.predict(ROCKER, 5e3, speed=138.0, pivots=None), "predict: pivots: need 5 pivot laws"),
         (lambda: ti.plan(ROCKER, []), "plan: .*no dynamic runs"),
         (lambda: ti.plan(3, ()), "plan: "),
         (lambda: ti.r_matrix(3, 4), "r_matrix: "),
@@ -166,6 +178,7 @@ SHOWN = (
         (repr(ti.IdentifySettings(method="ols")), "IdentifySettings(method='ols')"),
         (repr(ti.CompareSettings(thermal="tehd")), "CompareSettings(thermal='tehd')"),
         (str(POINT), "5000 N at -90 deg, shaft 22 Hz, excited at 25 Hz"),
+        (place_of(4448.2216, 47.0), "4.448 kN, 47 Hz"),
         (str(OperatingPoint(500.0)), "500 N at -90 deg, shaft at rest"),
     ],
 )

@@ -156,6 +156,6 @@ FORMATS = {
 def check_format(name: str) -> None:
     """Refuse a form that is not known, or that cannot be written in the units in use."""
     if name not in FORMATS:
-        raise ExportError(f"--to: {name!r} is not known. {hint(name, FORMATS, 'Use one of')}")
+        raise ExportError(f"format {name!r} is not known. {hint(name, FORMATS, 'Use one of')}")
     if name == "ross" and in_us_units():
-        raise ExportError(f"--units us: --to {name} writes SI, all that its program reads. Leave --units us out.")
+        raise ExportError(f"US units: the format {name} is SI, all that its program reads. Leave US units out.")

@@ -25,8 +25,6 @@ from tpjb_ident.schema import STATIC_KEY
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.results.identification import Identification
-
 #: Tables of an output folder that hold coefficients.
 _RESULT_TABLES = ("coefficients.csv", "prediction.csv")
 
@@ -56,7 +54,7 @@ class Export:
 
 
 def export(
-    source: Identification | pd.DataFrame | str | Path | Any,
+    source: Any,
     to: str,
     folder: str | Path,
     *,
@@ -70,8 +68,8 @@ def export(
 
     Parameters
     ----------
-    source : Identification, DataFrame, str, Path or Bearing
-        What `identify` gives, a table as coefficients.csv or prediction.csv, such a file, or a folder that holds one.
+    source : Identification, Prediction, DataFrame, str, Path or Bearing
+        What `identify` or `predict` gives, a table as they write it, its CSV file, or a folder that holds one.
     to : str
         ``"ross"``, ``"csv"``, ``"parquet"``, ``"excel"``, ``"mat"``, ``"xltrc"``, ``"dyrobes"`` or ``"ansys"``.
     folder : str or Path
@@ -109,7 +107,7 @@ def export(
     rows = chosen.table
     if rows is None or rows.empty:
         reasons = "\n".join(chosen.doubtful[:5])
-        raise NotTrustedError(f"no point can be trusted, nothing is exported:\n{reasons}\n--force writes them, marked.")
+        raise NotTrustedError(f"no point can be trusted, nothing is exported:\n{reasons}\nBy force they leave, marked.")
     target.mkdir(parents=True, exist_ok=True)
     before = set(target.iterdir())
     _write(target, rows, to, f"tpjb-ident: coefficients of {name or origin}", options)
@@ -133,9 +131,9 @@ def _ross_options(to: str, version: int | None) -> dict[str, int]:
     if version is None:
         return {}
     if to != "ross":
-        raise ExportError(f"--ross {version} belongs to --to ross, not to --to {to}. Leave it out.")
+        raise ExportError(f"version {version} of ROSS belongs to the format ross, not to {to}. Leave it out.")
     if version not in ROSS_VERSIONS:
-        raise ExportError(f"--ross: version {version} is not known. Use {' or '.join(map(str, ROSS_VERSIONS))}.")
+        raise ExportError(f"version {version} of ROSS is not known. Use {' or '.join(map(str, ROSS_VERSIONS))}.")
     return {"version": version}
 
 
@@ -146,7 +144,7 @@ def result_table(path: Path) -> Path | None:
     return next((path / name for name in _RESULT_TABLES if (path / name).is_file()), None)
 
 
-def _table(source: Identification | pd.DataFrame | str | Path) -> tuple[pd.DataFrame, str]:
+def _table(source: Any) -> tuple[pd.DataFrame, str]:
     if isinstance(source, (str, Path)):
         path = result_table(Path(source))
         if path is None:
@@ -154,10 +152,8 @@ def _table(source: Identification | pd.DataFrame | str | Path) -> tuple[pd.DataF
         if reason := contradiction(path):
             raise ExportError(f"{path}: {reason}. Run the command again, or move the file out of its results.")
         return read_table(path), path.parent.resolve().name
-    from tpjb_ident.results.identification import Identification
-
-    if isinstance(source, Identification):
-        return source.to_frame(), source.campaign
+    if hasattr(source, "to_dataframe"):  # of what identify and predict give
+        return source.to_dataframe(), getattr(source, "campaign", "a prediction")
     if not hasattr(source, "columns"):
         raise ExportError(f"source: must be a result, a table or the path of one, got {type(source).__name__}.")
     return source, "a table"

@@ -196,7 +196,7 @@ class Grid:
         """The head: source, what it is, where intervals are, and what is not to be trusted."""
         load, direction = self.place
         parts = ["mirrored, x to -x"] if self.mirrored else []
-        parts.append(f"static load {amount(load, 'force')} at {direction:g} deg")
+        parts.append(f"static load {amount(load, 'force', '.6g')} at {direction:g} deg")
         if len(self.excitation) == 1:
             line = "the running speed" if self.line == "synchronous" else f"{self.excitation[0]:g} Hz"
             parts.append(f"excitation at {line}")

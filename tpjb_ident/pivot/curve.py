@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike
 from scipy import integrate, special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
+from tpjb_ident.columns import amount
 from tpjb_ident.conditions import Conditions, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.dry_record import PadDirection
 from tpjb_ident.pivot.law_fit import FRICTION, OFFSET, SCALE, LawFit
 from tpjb_ident.presentation import Presented
+from tpjb_ident.rounding import with_interval
+from tpjb_ident.schema import STIFFNESS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -332,14 +335,15 @@ class PivotCurve(Presented):
 
     def __str__(self) -> str:
         parameters = []
-        for name, value, variance in zip(self.law.names, self.law.theta, np.diag(self.law.covariance), strict=True):
+        for name, value, variance in zip(self.law.names, self.law.theta, np.diag(self.law.covariance)):
             parameters.append(f"{name} = {value:.4g} (se {math.sqrt(variance):.2g})")
         middle = 0.5 * self.valid_to
-        lo, hi = self.stiffness_band(middle)
-        law = f"{self.law.name} ({100 * self.weights[0]:.0f} %)"
+        low, high = map(float, self.stiffness_band(middle))
+        stiffness = with_interval(float(self.stiffness(middle)), low, high, STIFFNESS.display_scale)
         lines = [
-            f"pad {self.pad} at {math.degrees(self.angle):g} deg: {law}, {', '.join(parameters[SCALE:])}",
-            f"  tangent stiffness at {middle:.0f} N: {self.stiffness(middle):.4g} N/m (95 %: {lo:.4g} to {hi:.4g})",
+            f"pad {self.pad} at {math.degrees(self.angle):g} deg: {stiffness} {STIFFNESS.display_unit} (tangent, 95 %) "
+            f"at {amount(middle, 'force', '.4g')}",
+            f"  law {self.law.name} ({100 * self.weights[0]:.0f} %): {', '.join(parameters[SCALE:])}",
             f"  holds from {self.valid_from:.0f} to {self.valid_to:.0f} N; load {self.load_direction}",
         ]
         if self.onset_load > 0.0:

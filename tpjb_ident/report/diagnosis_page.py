@@ -259,11 +259,7 @@ def _sections(result: CampaignDiagnosis, coefficients: list[Section]) -> list[Se
     effects = []
     for effect in verdict.effects:  # what it is, how it looks on a rig, what to check first
         if words := words_of(effect.name):
-            texts = [
-                words.physics,
-                f"By itself it shows so: {words.on_the_rig}",
-                f"Check first: {words.check}.",
-            ]
+            texts = [words.physics, f"By itself it shows so: {words.on_the_rig}", f"Check first: {words.check}."]
             effects.append(Section(f"What it means: {finding(effect.name, effect.parameters)}", texts))
     places = [
         [observable(d.observable), place(d.where), f"{d.size_sigma:.2f}", f"{100 * d.share:.1f} %"]

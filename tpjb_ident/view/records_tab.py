@@ -37,9 +37,7 @@ def records_tab(campaign: Campaign) -> Any:
     first = campaign.runs[0]
     pick = Select(title="run", options=list(runs), value=first.id, name="run", width=240)
     channel = Select(title="channel", options=list(first.channels), value=next(iter(first.channels)), name="channel")
-    further = MultiSelect(
-        title="beside it (same quantity)", options=list(first.channels), value=[], name="others", width=320
-    )
+    further = MultiSelect(title="beside it (same quantity)", options=[], value=[], name="others", width=320)
     facts = Div(name="run-facts", sizing_mode="stretch_width")
     orbit_of_run = text_element("orbit")
     plots = {
@@ -54,8 +52,11 @@ def records_tab(campaign: Campaign) -> Any:
 
     def update() -> None:
         run = runs[pick.value]
+        quantity = run.channels[channel.value].quantity
+        alike = [name for name, c in run.channels.items() if c.quantity == quantity and name != channel.value]
+        further.options = alike
         try:
-            records = [run.record(channel.value), *(run.record(n) for n in further.value if n != channel.value)]
+            records = [run.record(name) for name in (channel.value, *alike) if name in (channel.value, *further.value)]
             message = _show_channels(records, plots, data)
         except RigDataError as error:
             message = str(error)
@@ -95,7 +96,7 @@ def _show_channels(records: Sequence[Record], plots: dict[str, Any], data: dict[
     """Draw channels of one quantity over time and frequency; what is to be said of them."""
     first = records[0]
     unit, scale, zero = channel_unit(first.quantity)
-    drawn = [r for r in records if r.quantity == first.quantity][: len(_COLOURS)]
+    drawn = records[: len(_COLOURS)]
     plots["time"].yaxis.axis_label = f"{first.name if len(drawn) == 1 else first.quantity}, {unit}"
     plots["spectrum"].yaxis.axis_label = f"amplitude, {unit}"
     paths = [thinned(r.time, (r.values - zero) / scale, _MOST_POINTS) for r in drawn]
@@ -107,11 +108,11 @@ def _show_channels(records: Sequence[Record], plots: dict[str, Any], data: dict[
         data[name].data = {"x": x, "y": y, "colour": _COLOURS[: len(drawn)], "name": [r.name for r in drawn]}
     lines = ", ".join(f"{x.frequency:.4g} Hz ({x.amplitude:.3g} {unit})" for x in strongest(*spectra[0], 3))
     missing = int(np.isnan(first.values).sum())
-    not_shown = ", ".join(r.name for r in records if r not in drawn)
+    not_shown = ", ".join(r.name for r in records[len(_COLOURS) :])
     message = (
         f"{first.name}: {len(first.values)} samples at {first.rate:g} Hz, {missing} missing; lines: {lines or 'none'}"
     )
-    return message + (f"; of another quantity, not drawn: {not_shown}" if not_shown else "")
+    return message + (f"; not drawn: {not_shown}" if not_shown else "")
 
 
 def _orbit(run: Run) -> str:

@@ -118,7 +118,12 @@ _MISSING_WORDS = """
     -Inf INF -INF
 """
 MISSING = dict.fromkeys(["", *_MISSING_WORDS.split()])
-_NUMBER = {sep: re.compile(rf"[+−-]?(?:[0-9]+(?:[{sep}][0-9]*)?|[{sep}][0-9]+)(?:[eE][+-]?[0-9]+)?") for sep in ".,"}
+#: The mark between thousands by the decimal mark: where both are in a number, it can be read in one way.
+THOUSANDS = {".": ",", ",": "."}
+_NUMBER = {}
+for _mark, _between in THOUSANDS.items():
+    _digits = rf"[0-9]{{1,3}}(?:[{_between}][0-9]{{3}})+[{_mark}][0-9]+|[0-9]+(?:[{_mark}][0-9]*)?|[{_mark}][0-9]+"
+    _NUMBER[_mark] = re.compile(rf"[+−-]?(?:{_digits})(?:[eE][+-]?[0-9]+)?")
 
 
 def is_stamp(cell: str) -> bool:

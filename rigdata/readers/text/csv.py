@@ -18,6 +18,7 @@ from rigdata.readers.series import Contents, GrowingChannel, Series, is_time, se
 from rigdata.readers.text.cells import (
     BLOCK,
     MISSING,
+    THOUSANDS,
     is_ascii_based,
     is_number,
     is_stamp,
@@ -180,7 +181,8 @@ def _to_numbers(column: Any, decimal: str) -> tuple[Any, bool]:
     missing = pc.is_in(text, value_set=pa.array(list(MISSING)))
     good = pc.match_substring_regex(text, number_pattern(decimal))
     is_sound = pc.all(pc.or_(missing, good)).as_py() is not False
-    text = pc.replace_substring(pc.replace_substring_regex(text, r"^\+", ""), decimal, ".")
+    text = pc.replace_substring_regex(text, rf"^\+|\{THOUSANDS[decimal]}", "")
+    text = pc.replace_substring(text, decimal, ".")
     return pc.if_else(good, text, None).cast(pa.float64()), is_sound
 
 
@@ -203,7 +205,7 @@ def _judged(head: Head, places: Sequence[int], odd_lines: int) -> tuple[Problem,
         number, cell = cells_of_text[0] if cells_of_text else (head.data_line, "?")
         addition = f", and in {len(cells_of_text) - 1} more lines" if len(cells_of_text) > 1 else ""
         fault = f"{cell!r} is not a {'time stamp' if i in head.stamps else 'number'}{addition}"
-        remedy = "Delete or repair these cells; an empty cell counts as missing"
+        remedy = "Delete or repair these cells; an empty cell is a missing value, thousands have no mark between them"
         problems.append(record.problem("error", f"line {number}, column {i + 1} ({head.names[i]})", fault, remedy))
     if not problems and odd_lines == len(wrong) == 1 and wrong[0][0] == last and wrong[0][1] < width:
         fault = f"the last line is cut off ({wrong[0][1]} of {width} cells); taken without that line"

@@ -27,6 +27,7 @@ from rigdata.readers.text.cells import (
     looks_like,
     text_encoding,
 )
+from rigdata.units import measured_in
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$")
@@ -234,7 +235,7 @@ class _HeadFinder:
         return (*names, *[""] * width)[:width]
 
     def _units(self, header: _NamesLine, first: int, names: tuple[str, ...]) -> tuple[str, ...]:
-        """Units from brackets in the names, or from the line below the names."""
+        """Units from the line below the names, or from brackets in these: "force (H)" may be its direction."""
         below = []
         line = self.spec.units_line or header.line + 1
         if 0 < header.line < line <= first:
@@ -243,8 +244,8 @@ class _HeadFinder:
         for i, name in enumerate(names):
             cell = "".join(header.cells[i : i + 1])
             bracket = (_UNIT if cell == name else _BEHIND).search(cell)
-            text = bracket[1] if bracket else "".join(below[i : i + 1])
-            units.append(text.strip("[]() "))
+            text = "".join(below[i : i + 1]).strip("[]() ")
+            units.append(text if bracket is None or measured_in(text) else bracket[1].strip())
         return tuple(units)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from model.bearing import Bearing
+from model.possible import KEYS
 from rigdata.near_names import hint
 from rigdata.units import UnitError, parse_quantity
 from tpjb_ident.diagnosis.observations.constants import TRUSTED
@@ -25,25 +26,25 @@ class StatedTolerance:
     source: str = "default"
 
 
-#: Defaults of `rig-export.md`: value and the dimension in which a text states another one.
-DEFAULTS: dict[str, tuple[float, str]] = {
-    "viscosity": (0.05, "ratio"),
-    "viscosity_exponent": (0.03, "ratio"),
-    "supply_temperature": (0.5, "temperature difference"),
-    "assembled_clearance": (2e-6, "length"),
-    "pad_clearance": (3e-6, "length"),
-    "clearance_scatter": (2e-6, "length"),
-    "bore_scatter": (2e-6, "length"),
-    "pivot_stiffness_scatter": (0.05, "ratio"),
-    "film_heat": (0.07, "ratio"),
-    "thermometer": (0.5, "temperature difference"),
-    "pivot_offset": (0.005, "ratio"),
-    "pad_arc": (0.01, "ratio"),
-    "pad_length": (0.01, "ratio"),
-    "pivot_angle": (math.radians(0.2), "angle"),
-    "probe_gain": (0.005, "ratio"),
-    "cell_gain": (0.002, "ratio"),
-    "model": (TRUSTED["h"], "ratio"),
+#: Defaults of `rig-export.md`; `bearing_keys.toml` says of which dimension each is.
+DEFAULTS: dict[str, float] = {
+    "viscosity": 0.05,
+    "viscosity_exponent": 0.03,
+    "supply_temperature": 0.5,
+    "assembled_clearance": 2e-6,
+    "pad_clearance": 3e-6,
+    "clearance_scatter": 2e-6,
+    "bore_scatter": 2e-6,
+    "pivot_stiffness_scatter": 0.05,
+    "film_heat": 0.07,
+    "thermometer": 0.5,
+    "pivot_offset": 0.005,
+    "pad_arc": 0.01,
+    "pad_length": 0.01,
+    "pivot_angle": math.radians(0.2),
+    "probe_gain": 0.005,
+    "cell_gain": 0.002,
+    "model": TRUSTED["h"],
 }
 
 
@@ -52,7 +53,7 @@ class Tolerances:
     """Everything that may be off without being a finding."""
 
     stated: Mapping[str, StatedTolerance] = field(
-        default_factory=lambda: {name: StatedTolerance(value) for name, (value, _) in DEFAULTS.items()}
+        default_factory=lambda: {name: StatedTolerance(value) for name, value in DEFAULTS.items()}
     )
     centre: float = 10e-6
 
@@ -66,7 +67,7 @@ class Tolerances:
         for name, value in values.items():
             if name not in DEFAULTS:
                 raise BadInputError(f"tolerance {name!r} ({source}): not known. {hint(name, DEFAULTS)}")
-            dimension = DEFAULTS[name][1]
+            dimension = KEYS["keys"]["tolerances"][name].partition(",")[0]
             try:
                 number = parse_quantity(value, dimension, name) if isinstance(value, str) else float(value)
             except (UnitError, ValueError) as error:
