@@ -164,7 +164,7 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
             hint = "; write a decimal point, not a comma" if re.match(r"[+-]?[0-9]*,[0-9]", text) else ""
             raise UnitError(f"{shown(value)} is not a number with a unit{hint}")
         number, unit = match[0], text[match.end() :].strip()
-    if not unit and dimension != "ratio":
+    if not unit and (dimension != "ratio" or isinstance(value, str)):
         raise UnitError(f"{shown(value)} has no unit, such as {example}")
     return _finite(number), unit
 
@@ -187,7 +187,7 @@ def parse_quantity(value: object, dimension: str, name: str = "") -> float:
     """
     try:
         number, unit = split_quantity(value, dimension)
-        if dimension == "ratio" and not unit:
+        if not unit:
             return number
         offset = temperature_offset(unit) if dimension == "temperature" else 0.0
         return _finite(number * unit_factor(unit, dimension) + offset)

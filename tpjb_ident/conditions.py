@@ -86,6 +86,12 @@ def untrusted(conditions: Iterable[Condition]) -> Conditions:
     return tuple(condition for condition in conditions if condition.severity == "error")
 
 
+def led_by(doubt: str, sentences: Iterable[str]) -> tuple[str, ...]:
+    """Sentences on a result behind the first line of why it is not to be trusted; as they are where it is."""
+    first = doubt.partition("\n")[0].rstrip(":.")
+    return (f"NOT to be trusted: {first}.", *sentences) if doubt else tuple(sentences)
+
+
 def sentences(conditions: Iterable[Condition]) -> tuple[str, ...]:
     """Every condition as one line, name and detail."""
     return tuple(map(Condition.sentence, conditions))

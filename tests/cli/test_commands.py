@@ -176,6 +176,22 @@ def test_compare_writes_the_same_where_the_background_job_is_lost(compared, smal
         pd.testing.assert_frame_equal(read(tmp_path / "lost" / name), read(compared[1] / name), rtol=1e-9)
 
 
+@pytest.mark.slow
+def test_a_campaign_that_is_not_to_be_trusted_leads_with_that(small_campaign, tmp_path):
+    turned = shutil.copy(small_campaign, tmp_path / "turned.h5")
+    with h5py.File(turned, "r+") as file:
+        for name in (name for name in file["runs"] if name.startswith("d-")):
+            file[f"runs/{name}/X1A"][...] *= -1.0
+    result = ended(3, "compare", turned, *COMPARE, "--out", tmp_path / "out")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    lead = "NOT to be trusted: 2 of 2 points (negative-damping, "
+    assert result.stdout.startswith(lead)
+    assert f'<p class="first">{lead}' in page
+    following = f"tpjb check {turned}"
+    assert result.stdout.splitlines()[-1] == f"Next: {following}"
+    assert f"Next: <code>{following}</code>" in page
+
+
 @pytest.mark.parametrize("form", ["ross", "csv", "mat"])
 def test_export_from_results(identified, tmp_path, form):
     ended(0, "export", identified, "--to", form, "--out", tmp_path / "out")
@@ -228,6 +244,11 @@ BAD = [
     (("predict", "{bearing}", "--physics", "growth", "--housing-temperature", "48 bar"), "housing-temperature"),
     (("predict", "{bearing}", "--physics", "growth", "--housing-temperature", "900 degC"), "between -50 and 300"),
     (("compare", "{campaign}", "--pivots", "kirck"), "Did you mean 'kirk'"),
+    (("diagnose", "{campaign}", "--tolerance", "viscosity=4"), "'4' has no unit, such as %"),
+    (("diagnose", "{campaign}", "--tolerance", "viscosity=400 %"), "above 50 %"),
+    (("diagnose", "{campaign}", "--model-tolerance", "0.015"), "has no unit, such as %"),
+    (("diagnose", "{campaign}", "--model-tolerance", "1,5 %"), "write a decimal point"),
+    (("diagnose", "{campaign}", "--model-tolerance", "1.5 %", "--pivots", "krik"), "Did you mean 'kirk'"),
     (("compare", "{campaign}", "--bearing", "nowhere.toml"), "no such file"),
     (("plan", "{bearing}", "--load", "abc"), "not a number with a unit"),
     (("simulate", "{bearing}", "--plan", "long"), "is not known"),

@@ -67,7 +67,8 @@ def test_it_says_yes_no_and_cannot_tell():
     assert unsure["kyy_changed"] == "cannot tell"
     doubtful = difference_of(side("a", TRUE), side("b", moved, quality="ok; baseline-missing"))
     assert set(doubtful.points.filter(like="_changed").iloc[0]) == {"cannot tell"}
-    assert doubtful.untrusted_points() == ["b, 5 kN, 25 Hz: ok; baseline-missing"]
+    assert doubtful.doubt == "1 point with a flag that forbids trust:\nb, 5 kN, 25 Hz: ok; baseline-missing"
+    assert difference_sentences(doubtful)[0] == "NOT to be trusted: 1 point with a flag that forbids trust."
 
 
 def test_sentences_name_the_largest_change_and_points_without_a_partner():
@@ -77,7 +78,8 @@ def test_sentences_name_the_largest_change_and_points_without_a_partner():
         "25 Hz: +18.5\N{NO-BREAK SPACE}% of the mean direct coefficient (120.0 ± 1.9 kN s/m)."
     )
     apart = difference_of(side("a", TRUE), side("b", TRUE, load=6000.0))
-    first, *more = difference_sentences(apart)
+    lead, first, *more = difference_sentences(apart)
+    assert lead == "NOT to be trusted: nothing of the two can be compared."
     assert first == "a and b have no operating point in common."
     assert more[-1].startswith("Without a partner: a: 5 kN at -90°, shaft at 22 Hz (1320 rpm), 25 Hz; b: 6 kN")
     other = side("b", TRUE)

@@ -20,7 +20,7 @@ from tpjb_ident.report.drawing.picture import add_legend, longest_series, new_pi
 from tpjb_ident.report.figure import Panel, save_panels, svg_text
 from tpjb_ident.report.page import Section, Table, render_page, render_section
 from tpjb_ident.report.sections import _run_matrix, coefficient_sections, position_panels
-from tpjb_ident.rounding import fixed, percent, signed, with_interval
+from tpjb_ident.rounding import deviation, fixed, percent, signed, with_interval
 
 ENTRIES = ("xx", "xy", "yx", "yy")
 HOSTILE = "<script>alert(1)</script>\"'& <img src=x onerror=alert(2)> $\\frac{a}{b}$ \x1b[31m\u202e"
@@ -172,6 +172,9 @@ def test_signs():
     assert signed(-1.26) == "−1.3"
     assert signed(math.nan) == "–"
     assert percent(-0.123) == "−12.3\N{NO-BREAK SPACE}%"
+    assert [deviation(share).replace("\N{NO-BREAK SPACE}", " ") for share in (2.9, 3.5, -131.5, math.nan)] == [
+        "+290.0 %", "4.5 times", "−130 times", "–"
+    ]  # fmt: skip
     assert fixed(math.inf) == "–"
 
 

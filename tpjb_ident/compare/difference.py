@@ -18,9 +18,10 @@ from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, symbol
 from tpjb_ident.compare.coefficient_table import described, partners
 from tpjb_ident.compare.static_tests import StaticTests
-from tpjb_ident.conditions import errors_in
+from tpjb_ident.conditions import errors_in, led_by
 from tpjb_ident.results.identification import Identification
-from tpjb_ident.rounding import counted, percent, with_interval
+from tpjb_ident.rounding import counted, listed, percent, with_interval
+from tpjb_ident.runtime.output_folder import former_runs
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, KINDS, POINT_COLUMNS, TANGENT
 
@@ -81,7 +82,9 @@ def recorded_side(folder: Path) -> Side:
     coefficients = read_table(folder / "coefficients.csv", (*POINT_COLUMNS, *COEFFICIENT_COLUMNS))
     paths = [folder / f"{name}.csv" for name in ("pivot_curves", "clearance")]
     pivots, clearance = (read_table(path, ("pad",)) if path.exists() else None for path in paths)
-    return Side(folder.name, coefficients, pivots, clearance)
+    ids = [entry.get("campaign") for entry in former_runs(folder).values()]
+    name = next((text for text in ids if text and isinstance(text, str)), folder.name)
+    return Side(name, coefficients, pivots, clearance)
 
 
 @dataclass(frozen=True)
@@ -102,16 +105,21 @@ class Difference:
         named = {"difference": self.points, "pivot_difference": self.pivots, "clearance_difference": self.clearance}
         return {name: frame for name, frame in named.items() if len(frame)}
 
-    def untrusted_points(self) -> list[str]:
-        """Matched points with a flag that forbids trust, in words."""
-        untrusted = []
+    @property
+    def doubt(self) -> str:
+        """Why it is not to be trusted: no common points, or those with a flag that forbids it; "" where it is."""
+        is_static = self.a.coefficients.empty or self.b.coefficients.empty
+        if self.points.empty and not (is_static and self.tables):
+            return "nothing of the two can be compared."
+        bad = []
         for row in self.points.to_dict("records"):
             for end, side in (("a", self.a), ("b", self.b)):
                 quality = row.get(f"quality_{end}")
                 if errors_in(quality):
                     place = place_of(row["static_load_N"], row["excitation_Hz"])
-                    untrusted.append(f"{side.name}, {place}: {quality}")
-        return untrusted
+                    bad.append(f"{side.name}, {place}: {quality}")
+        count = f"{counted(len(bad), 'point')} with a flag that forbids trust:"
+        return "\n".join([count, listed(bad, between="\n")]) if bad else ""
 
 
 def difference_of(a: Side, b: Side) -> Difference:
@@ -271,7 +279,7 @@ def difference_sentences(difference: Difference) -> tuple[str, ...]:
         sentences.append(f"At {counted(len(points), 'common operating point')}: {statement}{unsure}.")
     elif not (a.coefficients.empty and b.coefficients.empty):
         sentences.append(f"{a.name} and {b.name} have no operating point in common.")
-    return (*sentences, *_sentences_beside(difference))
+    return led_by(difference.doubt, (*sentences, *_sentences_beside(difference)))
 
 
 def _largest_change(points: pd.DataFrame) -> str:

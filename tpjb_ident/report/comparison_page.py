@@ -13,7 +13,7 @@ from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.columns import amount, size, symbol
 from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.compare.predictions import printed_formula
-from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
+from tpjb_ident.compare.summary import agreements, closest, farthest, number_inside, summary_sentences
 from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.tables import Formula
@@ -32,7 +32,7 @@ from tpjb_ident.report.sections import (
     values_table,
 )
 from tpjb_ident.results.identification import Identification
-from tpjb_ident.rounding import fixed, percent, signed, with_interval
+from tpjb_ident.rounding import deviation, fixed, signed, with_interval
 from tpjb_ident.schema import DAMPING, KINDS, STIFFNESS, coefficient_column
 
 
@@ -75,7 +75,7 @@ def write_report(
     """
     frame = comparison.table
     points, flagged = comparison.identification.points, _flagged(comparison)
-    campaign = comparison.campaign
+    campaign, best = comparison.campaign, closest(agreements(frame))
     page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
         subtitle=campaign.description,
@@ -84,7 +84,7 @@ def write_report(
         key_table=deviations_table(frame),
         values=values_table(points),
         flags=flags_line([[flag for _, flag in flagged]], len(points)),
-        lead="kyy-over-",
+        lead="kyy" if best is None else farthest(best),
         then=then,
         sections=_sections(comparison, frame, flagged),
         settings=settings or {"campaign": campaign.id, **vars(comparison.settings)},
@@ -97,7 +97,8 @@ def deviations_table(table: pd.DataFrame) -> Table:
     """How far predictions of a table of comparison.csv are off, by pivot model."""
     rows = []
     for name, agreement in agreements(table).iterrows():
-        cells = [f"{percent(median)} ({percent(agreement['worst', k])})" for k, median in agreement["median"].items()]
+        medians = agreement["median"].items()
+        cells = [f"{deviation(median)} ({deviation(agreement['worst', k])})" for k, median in medians]
         rows.append([MODEL_LABELS.get(str(name), str(name)), *cells, number_inside(agreement)])
     return Table(
         "Predicted / measured - 1: median (largest); inside: predictions within the measured 95 % interval",
@@ -169,7 +170,7 @@ def _predicted_table(frame: pd.DataFrame) -> Table:
     for name in DIRECT:
         kind, column = KINDS[name[0]], coefficient_column(name)
         cells[f"{name}, {kind.display_unit}"] = (ordered[f"{column}_predicted"] / kind.display_scale).map(fixed)
-        cells[f"{name} off by"] = (ordered[f"{column}_ratio"] - 1.0).map(percent)
+        cells[f"{name} off by"] = (ordered[f"{column}_ratio"] - 1.0).map(deviation)
     extrapolated = ordered["pivot_extrapolated"].astype(bool)
     cells["remark"] = ordered["status"].mask(extrapolated, "beyond the measured pivot load")
     return table_of("Predicted", cells)

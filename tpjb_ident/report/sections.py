@@ -125,11 +125,15 @@ def flags_line(flags: Iterable[Iterable[Condition]], points: int) -> str:
     """The flags of a result with how often each is there, gravest first; "" where it has no points."""
     counts = Counter(itertools.chain(*flags))
     gravest_first = sorted(counts, key=lambda flag: SEVERITIES.index(flag.severity))
-    texts = [f"{flag} ({counts[flag]})" if counts[flag] > 1 else flag for flag in gravest_first]
-    bad = sum(counts[flag] for flag in untrusted(counts))
-    head = f"{counted(bad, 'flag')} against trust" if bad else "Flags, none of which forbids trust"
+    texts = {flag: f"{flag} ({counts[flag]})" if counts[flag] > 1 else flag for flag in gravest_first}
+    serious = untrusted(gravest_first)
+    number = counted(sum(counts[flag] for flag in serious), "flag")
+    against = ", ".join(map(texts.pop, serious))
+    others = ", ".join(texts.values())
+    if serious:
+        return f"{number} against trust: {against}{others and '; others: '}{others}."
     none = f"No flags on {counted(points, 'point')}." if points else ""
-    return f"{head}: {', '.join(texts)}." if texts else none
+    return f"Flags, none of which forbids trust: {others}." if others else none
 
 
 def set_up_section(comparison: Comparison) -> Section:
