@@ -180,6 +180,7 @@ def load_campaign(path: str | Path) -> Campaign:
 
 def campaign_place(path: Path) -> Path:
     """`path`, or the one campaign that is in it, as in the output folder of `tpjb simulate`."""
+    path = path if path.name else path.resolve()  # "." has no name for messages
     campaigns = _campaigns_in(path) if path.is_dir() and not (path / MANIFEST_NAME).exists() else []
     return campaigns[0] if len(campaigns) == 1 else path
 

@@ -70,7 +70,7 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
     findings = []
     for observation in observations:
         findings.extend(observation.report.findings)
-    merged = merge(findings, campaign.path.name, campaign.runs)
+    merged = merge(findings, campaign.runs)
     for condition in conditions:
         severity: Severity = "error" if condition.severity == "error" else "warning"
         merged.append(Problem(severity, campaign.path.name, str(condition), condition.detail, condition.meaning))

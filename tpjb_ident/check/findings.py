@@ -148,14 +148,14 @@ def grouped(findings: Iterable[Finding], runs: Sequence[Run]) -> Iterator[tuple[
         yield group, concerned if is_shared(len(concerned), sum(run.kind in kinds for run in runs)) else []
 
 
-def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[Problem]:
-    """Tell a finding once that many runs share."""
+def merge(findings: Sequence[Finding], runs: Sequence[Run]) -> list[Problem]:
+    """Tell a finding once that many runs share, with the file of the first."""
     merged: list[Problem] = []
     for group, concerned in grouped(findings, runs):
         first = group[0].problem
         if concerned:
             text = f"{first.what}; and so in {len(concerned)} runs ({listed(concerned)})"
-            merged.append(Problem(first.severity, file, first.place, text, first.cure))
+            merged.append(Problem(first.severity, first.file, first.place, text, first.cure))
         else:
             merged.extend(finding.problem for finding in group)
     return merged

@@ -81,6 +81,7 @@ def show_identification(c: Command, result: Identification) -> None:
         c.print(line)
     frame = c.frames.get("coefficients")
     if frame is not None and len(frame):
+        frame = frame.replace({"quality": {"ok": "-"}})
         point = f"{POINT} rotation" if "clockwise" in set(frame["rotation"]) else POINT
         title = f"{result.campaign}: {result.method}, 95 % intervals"
         c.show_frame(title, frame, f"{point} {DIRECT} outlier_fraction quality", "coefficients.csv")

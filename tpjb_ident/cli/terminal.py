@@ -119,11 +119,13 @@ class Terminal:
         shown, title = texts[:MOST_ROWS] if file else texts, printable(title)
         is_wide = len(shown) > 1 and _total(_sizes([headings, *shown])) > _width()
         varying = []
+        constant: dict[str, None] = {}
         for i, column in enumerate(columns):
             if not is_wide or column.words or len({row[i] for row in shown}) > 1:
                 varying.append(i)
             elif shown[0][i].strip(" -"):  # constant numbers go to the title
-                title += f"; {readable(column.with_unit(shown[0][i].strip()))}"
+                constant[readable(column.with_unit(shown[0][i].strip()))] = None
+        title = "; ".join([title, *constant])
         body = []
         for row in [headings, *shown]:
             body.append([row[i] for i in varying])

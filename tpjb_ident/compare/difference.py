@@ -275,7 +275,7 @@ def difference_sentences(difference: Difference) -> tuple[str, ...]:
             f"From {a.name} to {b.name} {yes} of {number} coefficients changed beyond what both intervals allow{most}."
         )
         unsure = f", of {number - yes - no} the records cannot tell" if number > yes + no else ""
-        statement = f"{no} coefficients are the same within {100 * _NO_CHANGE:g} %"
+        statement = f"{counted(no, 'coefficient')} the same within {100 * _NO_CHANGE:g} %"
         sentences.append(f"At {counted(len(points), 'common operating point')}: {statement}{unsure}.")
     elif not (a.coefficients.empty and b.coefficients.empty):
         sentences.append(f"{a.name} and {b.name} have no operating point in common.")

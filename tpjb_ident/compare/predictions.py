@@ -21,6 +21,7 @@ from model.predict import predict
 from model.prediction import Prediction
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import parse_toml
+from tpjb_ident.columns import amount
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
@@ -108,7 +109,7 @@ def predict_points(
         for index, point in enumerate(group):
             rows[point] = _row(point, prediction, index)
         if progress is not None:
-            progress(f"{static.static_load / 1e3:g} kN", done, len(groups))
+            progress(amount(static.static_load, "load"), done, len(groups))
     return [rows[point] for point in excited]
 
 

@@ -163,10 +163,10 @@ def _pivot_sentence(comparison: Comparison) -> list[str]:
         ratios.append((curve.stiffness(load) / formula(curve.pad, load)[1], curve.pad))
     (low, soft), (high, stiff) = min(ratios), max(ratios)
     load = 0.8 * comparison.curves[0].valid_to
-    return [
-        f"At {amount(load, 'load', '.3g')} the measured pivots have {100 * low:.0f} % (pad #{soft}) to "
-        f"{100 * high:.0f} % (pad #{stiff}) of the tangent stiffness by Kirk's formula."
-    ]
+    least, most = f"{100 * low:.0f} %", f"{100 * high:.0f} %"
+    reach = least if least == most else f"{least} (pad #{soft}) to {most} (pad #{stiff})"
+    stiffness = f"{reach} of the tangent stiffness by Kirk's formula"
+    return [f"At {amount(load, 'load', '.3g')} the measured pivots have {stiffness}."]
 
 
 def _extrapolation_sentence(comparison: Comparison) -> list[str]:

@@ -13,6 +13,7 @@ from scipy import special
 from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign, Run
 from rigdata.problem import Problem, RigDataError, refuse
+from tpjb_ident.columns import amount
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import refused_runs
@@ -199,7 +200,7 @@ def _slips(records: Sequence[DryRecord], law: LawFit) -> str:
     for before, after in itertools.pairwise(records):
         if before.run.id == after.run.id:
             size, load = _zero(after, law) - _zero(before, law), after.used.load[0]
-            slips.append(f"by {1e6 * size:+.2g} um at {load:.0f} N of {after.run.id}")
+            slips.append(f"by {amount(size, 'length', '+.2g')} at {amount(load, 'force', '.0f')} of {after.run.id}")
     return ", ".join(slips)
 
 
@@ -250,7 +251,7 @@ def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> 
         (abs(curve.load_direction.angle) > _ANGLE_WARNING, "load-off-pad", str(curve.load_direction)),
         (structure, "structure-gives", structure),
         (aside and not structure, "moves-aside", f"the shaft goes {curve.displacement_direction}"),
-        (onset > 0.0, "contact-incomplete", f"the shaft is not fully in contact below {onset:.0f} N"),
+        (onset > 0.0, "contact-incomplete", f"the shaft is not fully in contact below {amount(onset, 'force', '.0f')}"),
         (onset >= np.max(curve.steps.load), "contact-never-complete", ""),
         (shares[law.name] < _CLEAR_CHOICE, "law-undecided", listed),
         (records[0].untared, "cells-not-tared", records[0].untared),

@@ -70,7 +70,7 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
         return facts | {"Source": campaign.description}
     counts = Counter(KINDS_IN_WORDS.get(run.kind, run.kind) for run in campaign.runs)
     kinds = ", ".join(f"{count} {kind}" for kind, count in counts.items())
-    measured = ", ".join(filter(None, (campaign.date, campaign.by))) or "date and by are not stated"
+    measured = ", ".join(filter(None, (campaign.date, campaign.by))) or "when and by whom is not stated"
     return facts | {"Runs": f"{len(campaign.runs)} ({kinds})", "Measured": measured}
 
 

@@ -249,7 +249,7 @@ def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:
     pads = {run.pad for run in runs if run.kind == "dry_pivot"}
     without = [f"#{pad}" for pad in range(1, n_pads + 1) if pad not in pads]
     if without:
-        lacks.append(f"No dry load steps on pad {', '.join(without)}: its pivot's stiffness stays unknown.")
+        lacks.append(f"No dry load steps on pad {', '.join(without)}: the pivot stiffness there stays unknown.")
     if not any(run.kind == "clearance" for run in runs):
         lacks.append("No clearance sweep: positions count from the probes' zero, and clearances stay the drawing's.")
     return lacks

@@ -26,7 +26,7 @@ def span(*values: float) -> str:
     return finite[0] if len(finite) == 1 else f"{finite[0]}..{finite[-1]}"
 
 
-RANGES = ("rate {frequency}", "load {load}", "direction {angle}", "speed {frequency}", "excitation {frequency}")
+RANGES = ("rate {frequency}", "load {load}", "direction {angle}", "speed {speed}", "excitation {frequency}")
 
 
 @command("tpjb check {DEMO}", "tpjb check {DEMO} --json > findings.json")

@@ -190,11 +190,12 @@ def label(axes: Axes, x_label: str, y_label: str, heading: str = "") -> None:
 
 
 def from_zero(axes: Axes) -> None:
-    """Begin the vertical axis at zero, unless a value is below it, with room for the highest mark."""
+    """Begin the vertical axis at zero, unless a value is below it, with room for the highest and the lowest mark."""
     bottom, top = axes.dataLim.intervaly
-    low, high = min(0.0, 1.1 * bottom), max(0.0, 1.1 * top)
-    if low < high:
-        axes.set_ylim(low, high)
+    low, high = min(0.0, bottom), max(0.0, top)
+    room = 0.1 * (high - low)
+    if room > 0.0:
+        axes.set_ylim(low - room * (bottom < 0.3 * room), high + room * (top > -0.3 * room))
 
 
 def logarithmic(axes: Axes) -> None:
