@@ -128,15 +128,6 @@ def amount(value: float, quantity: str, form: str = ".6g") -> str:
     return f"{significant(value / size(quantity), form)} {symbol(quantity)}"
 
 
-def amounts(low: float, high: float, quantity: str, form: str = ".0f") -> str:
-    """From which to which amount of a quantity, in a sentence.
-
-    >>> amounts(200.4, 1000.0, "force")
-    '200 to 1000 N'
-    """
-    return f"{significant(low / size(quantity), form)} to {amount(high, quantity, form)}"
-
-
 def spinning(speed: float, rotation: str = ROTATIONS[0]) -> str:
     """A shaft speed [Hz] with both its units, and its sense where that is not the usual one.
 

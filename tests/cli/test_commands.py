@@ -190,6 +190,11 @@ def test_a_campaign_that_is_not_to_be_trusted_leads_with_that(small_campaign, tm
     following = f"tpjb check {turned}"
     assert result.stdout.splitlines()[-1] == f"Next: {following}"
     assert f"Next: <code>{following}</code>" in page
+    (name,) = re.findall(
+        r"with .*? pivots.*? (?:in|measured) ([kc][xy]{2}) \(median\)", " ".join(result.stdout.split())
+    )
+    assert f'<figure id="{name}-over-load"' in page.partition("<nav")[0]
+    assert f'<a href="#{name}-over-load">' in page
 
 
 @pytest.mark.parametrize("form", ["ross", "csv", "mat"])
@@ -215,6 +220,8 @@ def test_simulate_tests_every_pad_at_the_speed_and_load_asked_for(rocker_file, t
     assert turning == {50.0}
     assert json.loads((tmp_path / "o" / "truth.json").read_text())["seed"] == 5
     assert tpjb("check", tmp_path / "o", "--out", tmp_path / "c").exit_code == 0  # no cell at its limit
+    again = ended(0, "simulate", four, *words[:-2], "--seed", "6", "-q", "--out", tmp_path / "o")
+    assert "the campaign that is there is replaced" in again.stderr
 
 
 BAD = [
@@ -245,7 +252,7 @@ BAD = [
     (("predict", "{bearing}", "--physics", "growth", "--housing-temperature", "900 degC"), "between -50 and 300"),
     (("compare", "{campaign}", "--pivots", "kirck"), "Did you mean 'kirk'"),
     (("diagnose", "{campaign}", "--tolerance", "viscosity=4"), "'4' has no unit, such as %"),
-    (("diagnose", "{campaign}", "--tolerance", "viscosity=400 %"), "above 50 %"),
+    (("diagnose", "{campaign}", "--tolerance", "viscosity=400 %"), "50 % and more"),
     (("diagnose", "{campaign}", "--model-tolerance", "0.015"), "has no unit, such as %"),
     (("diagnose", "{campaign}", "--model-tolerance", "1,5 %"), "write a decimal point"),
     (("diagnose", "{campaign}", "--model-tolerance", "1.5 %", "--pivots", "krik"), "Did you mean 'kirk'"),

@@ -170,7 +170,7 @@ def test_five_programs_stand_on_one_page_without_a_bearing(tmp_path, measured):
 def test_a_prediction_that_did_not_converge_ends_with_three(tmp_path, measured):
     head = MEASURED.replace("cyy_Ns_per_m\n", "cyy_Ns_per_m,converged\n")
     result = compared(measured, written(tmp_path, head.replace("e5\n", "e5,False\n")))
-    assert "did not converge at 3 points" in result.doubt
+    assert "did not converge at 3 predicted points" in result.doubt
     assert result.summary().startswith(f"NOT to be trusted: {result.doubt}")
 
 

@@ -43,7 +43,7 @@ def test_a_bearing_file_states_every_tolerance():
         ("viscosity", "4 um", "ratio"),
         ("viscosity", "-4 %", "below zero"),
         ("viscosity", "4", "no unit, such as %"),
-        ("viscosity", 4.0, "above 50 %"),
+        ("viscosity", 4.0, "50 % and more"),
         ("clearance_scatter", "-1 um", "below zero"),
     ],
 )

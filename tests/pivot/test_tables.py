@@ -135,7 +135,7 @@ def test_a_curve_says_its_contact_loop_and_status():
     loop = Hysteresis(0.0123, 0.001, 0.0456, 0.002, (500.0, 4500.0))
     text = str(curve((law(contact=True), law()), (0.6, 0.4), onset_load=812.0, onset_load_se=31.0, hysteresis=loop))
     assert "linear (60 %), ln scale = -19.34 (se 0), contact gap [m] = 3e-06" in text
-    assert "tangent stiffness at 2500 N: 250 MN/m (95 %)" in text
+    assert "tangent stiffness at 2500 N: 2.5e+08 N/m (95 %: 2." in text
     assert "holds from 400 to 5000 N; load +1.15 deg (se 0.06 deg) from the pad" in text
     assert "fully in contact from 812 N (se 31 N)" in text
     assert "loop from 500 to 4500 N: 0.0123 J (se 0.001), loss factor 0.0456 (se 0.002)" in text

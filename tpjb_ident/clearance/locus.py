@@ -16,7 +16,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, wrapped, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon, probe_gains
-from tpjb_ident.columns import amount, amounts
+from tpjb_ident.columns import amount
 from tpjb_ident.conditions import Conditions, holding, sentences
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.lines import line_design
@@ -121,9 +121,9 @@ class Locus(Presented):
 
     def __str__(self) -> str:
         radii = [float(np.hypot(*p.position)) for p in self.points]
-        reach = amounts(min(radii), max(radii), "length", ".3g")
+        nearest, farthest = (amount(radius, "length", ".3g") for radius in (min(radii), max(radii)))
         origin = "probes' zero" if "no-centre" in self.status else "centre"
-        text = f"{len(self.points)} positions, {reach} from the {origin}"
+        text = f"{len(self.points)} positions, {nearest} to {farthest} from the {origin}"
         return text + (f"; {', '.join(sentences(self.status))}" if self.status else "")
 
 
@@ -170,7 +170,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     noise = _noise(records)
     walk = _walk(records, orders, noise, centre)
     points, on_its_way = [], [walk.jump] if walk.jump else []
-    for record, moved, walked in zip(records, walk.moved, walk.covariance, strict=True):
+    for record, moved, walked in zip(records, walk.moved, walk.covariance):
         if size := _moved(record, noise):
             on_its_way.append(f"halves of {record.run.id} stand {amount(size, 'length', '.2g')} apart")
         position = record.position - moved - centre

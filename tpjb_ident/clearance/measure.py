@@ -152,17 +152,15 @@ class ClearancePolygon(Presented):
         return clearance_and_locus(self, **options)
 
     def __str__(self) -> str:
-        figures = np.array([self.clearance, self.clearance_se]).T / size("length")
-        pads = ", ".join(f"{value:.4g} ({error:.2g})" for value, error in figures)
+        unit = size("length")
+        pads = ", ".join(f"{c / unit:.4g} ({s / unit:.2g})" for c, s in zip(self.clearance, self.clearance_se))
         push = amount(self.push_load, "force", ".0f")
         text = f"clearance polygon {self.run}: per pad {pads} {symbol('length')} (se), pushed by {push}"
         return "; ".join([text, *sentences(self.status)])
 
 
 def measure_clearance(
-    campaign: Campaign,
-    pivot_angles: Sequence[float],
-    curves: Sequence[PivotCurve] | None = None,
+    campaign: Campaign, pivot_angles: Sequence[float], curves: Sequence[PivotCurve] | None = None
 ) -> ClearancePolygon:
     """Measure the cold clearance polygon: the first clearance run at rest with the smallest push load.
 
@@ -327,7 +325,7 @@ def _status(fit: SideFit, polygon: ClearancePolygon, curves: Sequence[PivotCurve
 
 def _offsets(pads: IntArray, offsets: FloatArray) -> str:
     """How far pads (k,) from 0 stand off, (k,) [m], in words."""
-    return ", ".join(f"pad #{pad + 1} {1e6 * offset:+.1f} µm" for pad, offset in zip(pads, offsets, strict=True))
+    return ", ".join(f"pad #{pad + 1} {1e6 * offset:+.1f} µm" for pad, offset in zip(pads, offsets))
 
 
 def _inseparable(fit: SideFit, centre: Centre, gains: FloatArray) -> Conditions:

@@ -397,7 +397,7 @@ def _places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
 
     Several of one option are numbered: ``prediction.0``.
     """
-    values: dict[str, Any] = {}
+    values = {}
     for name, value in settings.items():
         values[name] = value
         for number, item in enumerate(value) if isinstance(value, list | tuple) else ():

@@ -82,9 +82,8 @@ def recorded_side(folder: Path) -> Side:
     coefficients = read_table(folder / "coefficients.csv", (*POINT_COLUMNS, *COEFFICIENT_COLUMNS))
     paths = [folder / f"{name}.csv" for name in ("pivot_curves", "clearance")]
     pivots, clearance = (read_table(path, ("pad",)) if path.exists() else None for path in paths)
-    ids = [entry.get("campaign") for entry in former_runs(folder).values()]
-    name = next((text for text in ids if text and isinstance(text, str)), folder.name)
-    return Side(name, coefficients, pivots, clearance)
+    ids = [str(entry["campaign"]) for entry in former_runs(folder).values() if "campaign" in entry]
+    return Side(ids[0] if ids else folder.name, coefficients, pivots, clearance)
 
 
 @dataclass(frozen=True)
@@ -111,13 +110,8 @@ class Difference:
         is_static = self.a.coefficients.empty or self.b.coefficients.empty
         if self.points.empty and not (is_static and self.tables):
             return "nothing of the two can be compared."
-        bad = []
-        for row in self.points.to_dict("records"):
-            for end, side in (("a", self.a), ("b", self.b)):
-                quality = row.get(f"quality_{end}")
-                if errors_in(quality):
-                    place = place_of(row["static_load_N"], row["excitation_Hz"])
-                    bad.append(f"{side.name}, {place}: {quality}")
+        flagged = self.points.filter(like="quality_").map(errors_in).astype(bool).any(axis=1)
+        bad = described(self.points[flagged])
         count = f"{counted(len(bad), 'point')} with a flag that forbids trust:"
         return "\n".join([count, listed(bad, between="\n")]) if bad else ""
 
@@ -199,8 +193,8 @@ def _judged(
     freedom = freedom.fillna(_MOST_FREEDOM).clip(1.0, _MOST_FREEDOM)  # without scatter there is nothing to count
     half = stdtrit(freedom, 0.5 + 0.5 * _LEVEL) * np.sqrt(variance)
     sure = stdtrit(freedom, 1 - 0.5 * (1 - _LEVEL) / max(number, 1)) * np.sqrt(variance)
-    columns: dict[str, Any] = {}
-    for side, frame in zip("ab", frames, strict=True):
+    columns = {}
+    for side, frame in zip("ab", frames):
         for end in _ENDS:
             columns[f"{name}_{side}{end}"] = frame[name + end]
     gap = columns[f"{name}_b"] - columns[f"{name}_a"]
@@ -228,7 +222,7 @@ def _pivots(a: Side, b: Side) -> pd.DataFrame:
         pair = [side[pad] for side in curves]
         low, high = max(curve["force_N"].min() for curve in pair), min(curve["force_N"].max() for curve in pair)
         force = np.linspace(low, high, _PIVOT_LOADS if low < high else 0)
-        for curve, tables in zip(pair, frames, strict=True):
+        for curve, tables in zip(pair, frames):
             scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve else 0.0
             columns = {TANGENT + end: np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS}
             columns["systematic"] = scale * columns[TANGENT]
@@ -263,7 +257,7 @@ def _shown(row: Mapping[Any, Any], name: str, scale: float) -> str:
     return with_interval(row[name], row[f"{name}_lo"], row[f"{name}_hi"], scale)
 
 
-def difference_sentences(difference: Difference) -> tuple[str, ...]:
+def difference_sentences(difference: Difference) -> Sequence[str]:
     """Say what changed from A to B, the answer first."""
     a, b, points = difference.a, difference.b, difference.points
     judged = points.filter(like="_changed").to_numpy()

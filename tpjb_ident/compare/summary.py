@@ -1,6 +1,7 @@
 """The comparison in words and in one small table: what is how far off, with which pivots."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.compare.effect_words import Estimate, finding
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.conditions import led_by
-from tpjb_ident.rounding import counted, deviation, signed
+from tpjb_ident.rounding import deviation, signed
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 #: Direct coefficients, and their columns.
@@ -79,10 +80,6 @@ def is_off(agreement: pd.Series) -> bool:
     return bool((far & missed).any())
 
 
-def _medians(agreement: pd.Series) -> str:
-    return ", ".join(f"{name} {deviation(value)}" for name, value in agreement["median"].items())
-
-
 def farthest(agreement: pd.Series) -> str:
     """The direct coefficient that one model misses most, by its median."""
     return agreement["median"].abs().idxmax()
@@ -130,16 +127,14 @@ def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
     )
 
 
-def summary_sentences(comparison: Comparison) -> tuple[str, ...]:
+def summary_sentences(comparison: Comparison) -> Sequence[str]:
     """Say what the comparison found, the answer first."""
     agreement = agreements(comparison.table)
     best = closest(agreement)
     sentences = [_verdict_sentence(comparison, best), *_effects_sentences(comparison)]
-    if best is not None:
-        closest_words = f"The prediction comes closest with {_in_words(best.name)}: {_medians(best)}"
-        sentences.append(f"{closest_words} (median over {counted(int(best['n'].max()), 'point')}).")
-        agreement = agreement.drop(index=best.name)
-    sentences += [f"With {_in_words(name)}: {_medians(row)}." for name, row in agreement.iterrows()]
+    for name, row in agreement.iterrows() if best is not None else ():
+        medians = ", ".join(f"{coefficient} {deviation(value)}" for coefficient, value in row["median"].items())
+        sentences.append(f"With {_in_words(name)}: {medians} (median).")
     sentences += _pivot_sentence(comparison) + _extrapolation_sentence(comparison)
     sentences += _clearance_sentence(comparison)
     loci = comparison.loci

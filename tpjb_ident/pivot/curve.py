@@ -12,13 +12,11 @@ from numpy.typing import ArrayLike
 from scipy import integrate, special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
-from tpjb_ident.columns import amount, amounts, size, symbol
 from tpjb_ident.conditions import Conditions, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.dry_record import PadDirection
 from tpjb_ident.pivot.law_fit import FRICTION, OFFSET, SCALE, LawFit
 from tpjb_ident.presentation import Presented
-from tpjb_ident.rounding import with_interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,8 +44,9 @@ class Hysteresis:
     load_range: tuple[float, float]
 
     def __str__(self) -> str:
+        low, high = self.load_range
         return (
-            f"loop from {amounts(*self.load_range, 'force')}: {self.energy:.3g} J (se {self.energy_se:.1g}), "
+            f"loop from {low:.0f} to {high:.0f} N: {self.energy:.3g} J (se {self.energy_se:.1g}), "
             f"loss factor {self.loss_factor:.3g} (se {self.loss_factor_se:.1g})"
         )
 
@@ -273,7 +272,7 @@ class PivotCurve(Presented):
         """Values (n,) of the leading law, and their covariance (n, n) by all laws about it."""
         leading, _ = quantity(self.law)
         covariance = np.zeros((len(leading), len(leading)))
-        for fit, weight in zip(self.fits, self.weights, strict=True):
+        for fit, weight in zip(self.fits, self.weights):
             value, gradient = quantity(fit)
             difference = value - leading
             covariance += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))
@@ -333,20 +332,18 @@ class PivotCurve(Presented):
 
     def __str__(self) -> str:
         parameters = []
-        for name, value, variance in zip(self.law.names, self.law.theta, np.diag(self.law.covariance), strict=True):
+        for name, value, variance in zip(self.law.names, self.law.theta, np.diag(self.law.covariance)):
             parameters.append(f"{name} = {value:.4g} (se {math.sqrt(variance):.2g})")
         middle = 0.5 * self.valid_to
-        low, high = self.stiffness_band(middle)
-        tangent = with_interval(float(self.stiffness(middle)), float(low), float(high), size("stiffness"))
+        lo, hi = self.stiffness_band(middle)
         law = f"{self.law.name} ({100 * self.weights[0]:.0f} %)"
         lines = [
             f"pad {self.pad} at {math.degrees(self.angle):g} deg: {law}, {', '.join(parameters[SCALE:])}",
-            f"  tangent stiffness at {amount(middle, 'force', '.0f')}: {tangent} {symbol('stiffness')} (95 %)",
-            f"  holds from {amounts(self.valid_from, self.valid_to, 'force')}; load {self.load_direction}",
+            f"  tangent stiffness at {middle:.0f} N: {self.stiffness(middle):.4g} N/m (95 %: {lo:.4g} to {hi:.4g})",
+            f"  holds from {self.valid_from:.0f} to {self.valid_to:.0f} N; load {self.load_direction}",
         ]
         if self.onset_load > 0.0:
-            onset, error = amount(self.onset_load, "force", ".0f"), amount(self.onset_load_se, "force", ".0f")
-            lines.append(f"  fully in contact from {onset} (se {error})")
+            lines.append(f"  fully in contact from {self.onset_load:.0f} N (se {self.onset_load_se:.0f} N)")
         if self.hysteresis is not None:
             lines.append(f"  {self.hysteresis}")
         if self.status:

@@ -168,10 +168,7 @@ _SERIES = (
 
 
 def write_diagnosis_report(
-    folder: Path,
-    campaign: Campaign | TableSource,
-    result: CampaignDiagnosis,
-    origin: Mapping[str, Any],
+    folder: Path, campaign: Campaign | TableSource, result: CampaignDiagnosis, origin: Mapping[str, Any]
 ) -> None:
     """Write report.html and its figures into an existing folder."""
     verdict = result.diagnosis.verdict

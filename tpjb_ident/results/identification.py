@@ -13,7 +13,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.columns import amount, place_of
+from tpjb_ident.columns import amount
 from tpjb_ident.conditions import Conditions, sentences, untrusted
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
@@ -153,10 +153,7 @@ class Identification(Presented):
     @functools.cached_property
     def places(self) -> list[tuple[str, Conditions, bool]]:
         """Operating points, and bands without one: in words, their conditions, and whether there is an answer."""
-        places = []
-        for p in self.points:
-            place = place_of(p.point.static_load, p.point.excitation_hz)
-            places.append((place, p.quality, math.isfinite(abs(p.stiffness.h.sum()))))
+        places = [(p.place, p.quality, math.isfinite(abs(p.stiffness.h.sum()))) for p in self.points]
         for band in self.bands:
             if not band.points:
                 place = f"{amount(band.point.static_load, 'load')}, {band.kind}"
@@ -179,13 +176,13 @@ class Identification(Presented):
     def doubt(self) -> str:
         """Why it is not to be trusted: how many points and their flags, then place by place; "" where it is."""
         lost, bad = sentences(untrusted(self.conditions)), []
-        flags: dict[str, None] = {}
+        flags: list[str] = []
         for place, quality, has_answer in self.places:
             serious = untrusted(quality)
             if serious or not has_answer:
-                flags |= dict.fromkeys(serious or ["no answer"])
+                flags += serious or ["no answer"]
                 bad.append(f"{place}: {'; '.join(sentences(serious)) or 'no answer'}")
-        count = f"{len(bad)} of {counted(len(self.places), 'point')} ({', '.join(flags)}):"
+        count = f"{len(bad)} of {counted(len(self.places), 'point')} ({', '.join(dict.fromkeys(flags))}):"
         return "\n".join([count, *lost, listed(bad, between="\n")]) if bad else "; ".join(lost)
 
 

@@ -1,5 +1,6 @@
 """What a campaign says about one operating point, and the figures and flags that say how far it can be trusted."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -95,10 +96,14 @@ class PointResult:
     budget: dict[str, FloatArray] = field(default_factory=dict)
     scattering: tuple[str, ...] = ("random", "load miss", "load direction", "mains")
 
+    @property
+    def place(self) -> str:
+        """Load and excitation in words."""
+        return place_of(self.point.static_load, self.point.excitation_hz)
+
     def __str__(self) -> str:
         flags = f" ({', '.join(str(q) for q in self.quality)})" if self.quality else ""
-        place = place_of(self.point.static_load, self.point.excitation_hz)
-        return f"{place}: {self.stiffness.direct_coefficients()}{flags}"
+        return f"{self.place}: {self.stiffness.direct_coefficients()}{flags}"
 
     def __repr__(self) -> str:
         return f"<PointResult: {self}>"
@@ -106,10 +111,10 @@ class PointResult:
 
 def by_static_point(points: Sequence[PointResult]) -> list[list[int]]:
     """Places of the points that have a stiffness, those of one load and speed together."""
-    groups: dict[tuple[object, ...], list[int]] = {}
+    groups = defaultdict(list)
     for i, p in enumerate(points):
         if np.isfinite(p.stiffness.h).all():
-            groups.setdefault(p.point.static_key, []).append(i)
+            groups[p.point.static_key].append(i)
     return list(groups.values())
 
 

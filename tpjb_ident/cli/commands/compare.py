@@ -94,7 +94,7 @@ def _compare_two(c: Command, *paths: Path) -> None:
     with c.results():
         sides = [_side(c, path) for path in paths]
         if sides[0].name == sides[1].name:
-            sides = [replace(side, name=f"{side.name} ({path})") for side, path in zip(sides, paths, strict=True)]
+            sides = [replace(side, name=f"{side.name} ({path})") for side, path in zip(sides, paths)]
         difference = difference_of(*sides)
         for name, frame in difference.tables.items():
             c.table(name, frame)

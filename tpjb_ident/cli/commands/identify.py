@@ -10,11 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.identification import (
-    identify_settings,
-    show_identification,
-    write_identification,
-)
+from tpjb_ident.cli.identification import identify_settings, show_identification, write_identification
 from tpjb_ident.cli.inputs import parse_value, parse_values
 from tpjb_ident.cli.options import refuse_unknown
 from tpjb_ident.errors import BadInputError

@@ -32,11 +32,7 @@ _COLUMNS = (
 )
 
 
-@command(
-    "tpjb show {DEMO}",
-    "tpjb show {DEMO} --run d-05000-25-01 --picture",
-    "tpjb show exports/run1.csv",
-)
+@command("tpjb show {DEMO}", "tpjb show {DEMO} --run d-05000-25-01 --picture", "tpjb show exports/run1.csv")
 def show(c: Command, source: Path, run: str | None = None, picture: bool = False) -> None:
     """Show channels, statistics and spectra of a file.
 
@@ -125,7 +121,7 @@ def _run_series(run: Run) -> tuple[list[Series], list[Series]]:
         try:
             record = run.record(name)
         except RigDataError as error:
-            problems.extend(error.problems)
+            problems += error.problems
         else:
             unit = SI_UNITS.get(DIMENSIONS.get(channel.quantity, ""), "")
             series.append(Series(name, unit, record.values, record.time))

@@ -87,7 +87,7 @@ def files_of(results: Path, name: str, entry: Mapping[str, Any], inputs: Sequenc
     for place in inputs or [results / place for place in texts_of(entry, "inputs_at").values()]:
         inner = campaign_place(place)
         folders += [inner if inner.is_dir() else inner.parent, *([place] if place.is_dir() else ())]
-    around: list[Path] = []
+    around = []
     for folder in folders:
         around += folder.resolve().parents
     for file, recorded_hash in texts_of(entry, "inputs_sha256").items():

@@ -7,7 +7,6 @@ They come from the bearing file's ``[tolerances]``, from ``--tolerance NAME=VALU
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -75,10 +74,10 @@ class Tolerances:
                 number = parse_quantity(value, dimension, name) if isinstance(value, str) else float(value)
             except (UnitError, ValueError) as error:
                 raise BadInputError(f"tolerance {name} ({source}): {error}") from error
-            if not 0.0 <= number <= (_LARGEST if dimension == "ratio" else sys.float_info.max):
+            if not 0.0 <= number < (_LARGEST if dimension == "ratio" else math.inf):
                 raise BadInputError(
-                    f"tolerance {name} ({source}): {value!r} is below zero, or above {100 * _LARGEST:g} %. Write, for "
-                    f'instance, "2 {example_of(dimension)}".'
+                    f"tolerance {name} ({source}): {value!r} is below zero, or {100 * _LARGEST:g} % and more. "
+                    f'Write, for instance, "2 {example_of(dimension)}".'
                 )
             table[name] = StatedTolerance(number, source)
         return Tolerances(table, self.centre)

@@ -166,11 +166,7 @@ def direct_coefficients(
 
 
 @plot
-def frf(
-    source: BandResult | Identification | pd.DataFrame,
-    *,
-    entries: tuple[str, ...] = ("xx", "yy"),
-) -> Figure:
+def frf(source: BandResult | Identification | pd.DataFrame, *, entries: tuple[str, ...] = ("xx", "yy")) -> Figure:
     """Draw the real and the imaginary part of h over frequency with 95 % intervals, over a band the coherence below.
 
     Parameters
@@ -196,7 +192,7 @@ def frf(
     if over_band and table.filter([*STATIC_KEY, "excitation"]).nunique().max() > 1:
         raise ValueError("the table holds several operating points; give the rows of one")
     figure, grid = new_pictures(3 if over_band else 2, 1, height=2.3)
-    for axes, part in zip(grid[:2, 0], ("real", "imag"), strict=True):
+    for axes, part in zip(grid[:2, 0], ("real", "imag")):
         label(axes, "frequency, Hz", f"{part.capitalize()[:2]} h, {symbol('stiffness')}")
         for entry in entries:
             value, errors = with_errors(table, f"h{entry}_{part}_N_per_m", size("stiffness"))
