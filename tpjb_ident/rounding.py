@@ -78,8 +78,8 @@ def percent(share: float) -> str:
 def deviation(share: float) -> str:
     """How far a prediction is off what was measured: a signed percentage; far off, how many times that it is.
 
-    >>> deviation(13.152), deviation(-131.5)
-    ('14 times', '−130 times')
+    >>> deviation(13.152).split(), deviation(0.25).split()
+    (['14', 'times'], ['+25.0', '%'])
     """
     if not _TIMES < abs(share) < math.inf:
         return percent(share)

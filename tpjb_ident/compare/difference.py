@@ -82,8 +82,10 @@ def recorded_side(folder: Path) -> Side:
     coefficients = read_table(folder / "coefficients.csv", (*POINT_COLUMNS, *COEFFICIENT_COLUMNS))
     paths = [folder / f"{name}.csv" for name in ("pivot_curves", "clearance")]
     pivots, clearance = (read_table(path, ("pad",)) if path.exists() else None for path in paths)
-    ids = [str(entry["campaign"]) for entry in former_runs(folder).values() if "campaign" in entry]
-    return Side(ids[0] if ids else folder.name, coefficients, pivots, clearance)
+    name = folder.name
+    for entry in former_runs(folder).values():
+        name = str(entry.get("campaign", name))
+    return Side(name, coefficients, pivots, clearance)
 
 
 @dataclass(frozen=True)
