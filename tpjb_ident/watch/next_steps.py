@@ -244,7 +244,7 @@ def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:
     lonely = [p for p, directions in directions_of.items() if len(directions) == 1 and None not in directions]
     if lonely:
         first = listed([place_of(p.static_load, p.excitation_hz) for p in lonely], 3, "; ")
-        lacks.append(f"{len(lonely)} operating points have one excitation direction ({first}): K and C need two.")
+        lacks.append(f"{counted(len(lonely), 'operating point')} shaken in one direction ({first}): K and C need two.")
     pads = {run.pad for run in runs if run.kind == "dry_pivot"}
     without = [f"#{pad}" for pad in range(1, n_pads + 1) if pad not in pads]
     if without:
