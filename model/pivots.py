@@ -264,7 +264,7 @@ def measured_pivots(
     tables: Sequence[Any], source: str, pads: int | None = None, includes_housing: bool = True
 ) -> tuple[PivotLaw, ...]:
     """Make pivot laws of the pads' tables, pad #1 first."""
-    laws: dict[int, PivotLaw] = {}
+    laws = {}
     for table in tables:
         number, law = _read_pad(table, source, includes_housing)
         if number in laws:

@@ -127,7 +127,7 @@ class Prediction:
         """One row per excitation frequency: point, K, C, position, conditions; SI, names as in prediction.csv."""
         import pandas as pd
 
-        table: dict[str, Any] = {
+        table = {
             "static_load_N": self.load,
             "static_load_direction_deg": math.degrees(self.load_direction),
             "shaft_speed_Hz": self.speed / math.tau,
@@ -135,7 +135,7 @@ class Prediction:
             "excitation_Hz": self._frequencies,
         }
         for values, kind, unit in ((self.k, "k", "N_per_m"), (self.c, "c", "Ns_per_m")):
-            for at, column in zip(("xx", "xy", "yx", "yy"), values.reshape(-1, 4).T, strict=True):
+            for at, column in zip(("xx", "xy", "yx", "yy"), values.reshape(-1, 4).T):
                 table[f"{kind}{at}_{unit}"] = column
         x, y = self.position
         return pd.DataFrame(table | {"x_m": x, "y_m": y, "status": "; ".join(self.status)})

@@ -83,7 +83,7 @@ class Campaign(Description):
         rows: list[tuple[str, ...]] = [("kind", "runs", "load, kN", "shaft, Hz", "excitation, Hz")]
         for kind in dict.fromkeys(run.kind for run in self.runs):
             points = [run.point for run in self.of_kind(kind)]
-            columns = zip(*((p.static_load / 1e3, p.shaft_speed_hz, p.excitation_hz) for p in points), strict=True)
+            columns = zip(*((p.static_load / 1e3, p.shaft_speed_hz, p.excitation_hz) for p in points))
             spans = [(f"{min(values):.4g}", f"{max(values):.4g}") for values in columns]
             rows.append((kind, str(len(points)), *(" to ".join(dict.fromkeys(span)) for span in spans)))
         body = "".join(f"<tr><td>{'</td><td>'.join(row)}</td></tr>" for row in rows)
@@ -180,6 +180,7 @@ def load_campaign(path: str | Path) -> Campaign:
 
 def campaign_place(path: Path) -> Path:
     """`path`, or the one campaign that is in it, as in the output folder of `tpjb simulate`."""
+    path = path if path.name else path.resolve()  # "." has no name for messages
     campaigns = _campaigns_in(path) if path.is_dir() and not (path / MANIFEST_NAME).exists() else []
     return campaigns[0] if len(campaigns) == 1 else path
 

@@ -201,7 +201,7 @@ def parse_quantity(value: object, dimension: str, name: str = "") -> float:
     """
     try:
         number, unit = split_quantity(value, dimension)
-        if dimension == "ratio" and not unit:
+        if not unit:
             return number
         offset = temperature_offset(unit) if dimension == "temperature" else 0.0
         return _finite(number * unit_factor(unit, dimension) + offset)

@@ -7,7 +7,7 @@ warning the number holds as far as its interval goes, and somebody should look. 
 
 import csv
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Self, get_args
 
@@ -84,6 +84,12 @@ def holding(*rows: tuple[object, str, str]) -> Conditions:
 def untrusted(conditions: Iterable[Condition]) -> Conditions:
     """Those that forbid trust in the number that they belong to: a command that has one ends with exit code 3."""
     return tuple(condition for condition in conditions if condition.severity == "error")
+
+
+def led_by(doubt: str, sentences: Sequence[str]) -> Sequence[str]:
+    """Sentences on a result behind the first line of why it is not to be trusted; as they are where it is."""
+    first = doubt.partition("\n")[0].rstrip(":.")
+    return (f"NOT to be trusted: {first}.", *sentences) if doubt else sentences
 
 
 def sentences(conditions: Iterable[Condition]) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ def _in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
     names = list(frame.columns)
     if STIFFNESS.columns[0] in frame:
         names = [name for name in names if _FOR_PEOPLE.fullmatch(name)]
-    table: dict[str, Any] = {}
+    table = {}
     for name in names:
         match = _NAMES.fullmatch(name)
         words, unit, end = match.groups() if match else (name, "", "")

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 MINUS = "\N{MINUS SIGN}"
 #: An interval that reaches this many times further to one side than to the other is told by its ends.
 _ASKEW = 1.5
+#: A deviation of a larger share is told as a ratio.
+_TIMES = 3.0
 
 
 def counted(number: int, thing: str) -> str:
@@ -71,6 +73,17 @@ def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> 
 def percent(share: float) -> str:
     """A share as a signed percentage; a dash if there is none."""
     return f"{signed(100 * share)}\N{NO-BREAK SPACE}%" if math.isfinite(share) else "–"
+
+
+def deviation(share: float) -> str:
+    """How far a prediction is off what was measured: a signed percentage; far off, how many times that it is.
+
+    >>> deviation(13.152).split(), deviation(0.25).split()
+    (['14', 'times'], ['+25.0', '%'])
+    """
+    if not _TIMES < abs(share) < math.inf:
+        return percent(share)
+    return f"{fixed(1.0 + share, 0 if abs(share) > 10.0 else 1)}\N{NO-BREAK SPACE}times"
 
 
 def signed(value: float, digits: int = 1) -> str:

@@ -68,7 +68,7 @@ def coefficient_column(name: str) -> str:
 
 def with_endings(*endings: str) -> list[str]:
     """Columns of K and C, row by row, each with every ending in turn: an interval's ends, a standard error."""
-    names: list[str] = []
+    names = []
     for name in COEFFICIENT_COLUMNS:
         names += [name + ending for ending in endings]
     return names

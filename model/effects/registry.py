@@ -16,7 +16,7 @@ _registered: dict[str, EffectKind] = {}
 
 @functools.cache
 def _bundled() -> dict[str, EffectKind]:
-    kinds: dict[str, EffectKind] = {}
+    kinds = {}
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
         for kind in _defined(importlib.import_module(f"model.effects.{module.name}")):
             kinds[kind.name] = kind

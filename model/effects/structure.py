@@ -26,7 +26,7 @@ def _add_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
     it gives way towards that pad.
     """
     pivots = []
-    for law, pad in zip(setup.pivots, setup.bearing.pads, strict=True):
+    for law, pad in zip(setup.pivots, setup.bearing.pads):
         x, y = pad.normal
         pivots.append(_alone(law, xx * x * x + 2.0 * xy * x * y + yy * y * y))
     return _added(setup.change(pivots=tuple(pivots)), "series_compliance", xx, xy, yy)

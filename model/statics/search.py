@@ -32,7 +32,6 @@ from model.statics.pad_film import pad_films
 from model.statics.pad_flow import through_flow
 from model.statics.physics import bodies_of, case_of, running_of
 from rigdata.arrays import BoolArray, FloatArray
-from rigdata.problem import Condition
 
 _FAILURES = {
     iteration.FILM_LOST: "film lost",
@@ -211,9 +210,9 @@ class Search:
         # where a pad has no curve, here or there, nothing is moved; pads that friction holds stay where they are held
         has_curves = not np.isnan(self.begun.position - start.begun.position).any()
         moved = self.begun if has_curves and not self.setup.friction else start.begun
-        pairs = zip(moved, start.begun, strict=True)
+        pairs = zip(moved, start.begun)
         shift = Begun(*(np.where(np.isnan(new - old), 0.0, new - old) for new, old in pairs))
-        for m, (film, neighbour) in enumerate(zip(self.films, start.films, strict=True)):
+        for m, (film, neighbour) in enumerate(zip(self.films, start.films)):
             if self.case.mixing and math.isfinite(self.case.fresh):
                 pads["passed"][m] = through_flow(neighbour)[1]
             as_curves_say = neighbour.idle == math.isnan(start.begun.tilt[m])
@@ -271,7 +270,7 @@ class Search:
         flatter too; what these carry tells them, without the heat that follows.
         """
         moved = False
-        for pad, film, curve in zip(self.pads.view(np.recarray), self.films, self.stack.curves, strict=True):
+        for pad, film, curve in zip(self.pads.view(np.recarray), self.films, self.stack.curves):
             if not pad.solved or not is_doubtful(self.case, pad, curve):
                 continue
             stiffness = pad.stiffness
@@ -290,7 +289,7 @@ class Search:
         """Leave the films where the arrays stand."""
         pads = self.pads
         for name in ("tilt", "deflection", "axial", "idle", "inlet", "supplied"):
-            for film, value in zip(self.films, pads[name].tolist(), strict=True):
+            for film, value in zip(self.films, pads[name].tolist()):
                 setattr(film, name, value)
         names = ("solved", "resting", "clearance", "wedge", "least", "steps")
         solved, resting, clearances, wedges, least, steps = (pads[name].tolist() for name in names)
@@ -310,7 +309,7 @@ class Search:
     def _ended(self, code: int, memory: iteration.Memory) -> Equilibrium:
         """The state as an answer."""
         films, figures = self.films, self.state.figures
-        names: list[Condition] = []
+        names = []
         if code in _FAILURES:
             names.append(named(_FAILURES[code]))
         elif code != iteration.SETTLED and self.setup.friction:  # those that the last step moved most swing

@@ -242,19 +242,19 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     pads = _sides(truth)
     angles = np.array(truth.pivot_angles)[pads]
     shares, places = [], []
-    for pad, after in zip(pads, [*pads[1:], pads[0]], strict=True):
+    for pad, after in zip(pads, [*pads[1:], pads[0]]):
         angle, next_angle = truth.pivot_angles[pad], truth.pivot_angles[after]
         gap = (next_angle - angle) % (2 * np.pi)
         passed, remaining = wrapped(direction - angle - lag), wrapped(next_angle + lag - direction)
         share = 0.25 * (1 + np.tanh(passed / _SLIDE_WIDTH)) * (1 + np.tanh(remaining / _SLIDE_WIDTH))
         turned = np.clip(wrapped(direction - angle), 0.0, gap)
         forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
-        reach = np.stack([_reach(truth, k, force) for k, force in zip((pad, after), forces, strict=True)])
+        reach = np.stack([_reach(truth, k, force) for k, force in zip((pad, after), forces)])
         shares.append(share)
         places.append(np.linalg.solve(directions([angle, next_angle]), reach).T)
     weight = np.array(shares) / np.sum(shares, axis=0)
     position = np.einsum("kn,knj->nj", weight, np.array(places))
-    for i, (pad, normal) in enumerate(zip(pads, directions(angles), strict=True)):
+    for i, (pad, normal) in enumerate(zip(pads, directions(angles))):
         # between two corners a blend of both would share the load among three pads
         alone = 4.0 * weight[i - 1] * weight[i]
         side = _reach(truth, pad, push * np.cos(direction - angles[i]))

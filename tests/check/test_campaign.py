@@ -168,10 +168,10 @@ def test_what_many_runs_share_is_told_once():
         report.note("dead X", "error", "channel X", "is dead", "Check it")
         findings += report.findings
     findings.append(Finding(Problem("note", "f", "p", "other", "cure", "d-1"), "other"))
-    merged = merge(findings, "c.h5", runs)
-    assert [(p.run, p.file) for p in merged] == [(None, "c.h5"), ("d-1", "f")]
+    merged = merge(findings, runs)
+    assert [(p.run, p.file) for p in merged] == [(None, runs[0].file), ("d-1", "f")]
     assert "in 4 runs (d-0, d-1, d-2, d-3)" in merged[0].what
-    assert len(merge(findings[:2], "c.h5", runs)) == 2
+    assert len(merge(findings[:2], runs)) == 2
 
 
 #: Nine short runs.

@@ -183,7 +183,7 @@ def test_a_repeat_under_a_turned_load_is_no_drift(campaign, monkeypatch):
 def test_a_zero_that_moved_since_the_sweep_is_named_and_in_the_interval(campaign, polygon):
     moved = measure_locus(Repeated(campaign, [], np.full((6, 2), [12e-6, 9e-6])), polygon)
     (words,) = [s.detail for s in moved.status if s == "misfit"]
-    assert "go around a place 15 µm from the polygon's centre" in words
+    assert "go around a place 15 µm from the centre" in words
     for point in moved.points:
         error = np.abs(point.position - true_position(point.load_direction, point.load))
         assert np.all(error < 1.96 * np.sqrt(np.diag(point.covariance)))

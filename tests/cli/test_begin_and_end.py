@@ -44,7 +44,7 @@ def run(error):
         (OSError(28, "No space left on device"), 2, "No space left on device"),
         (MemoryError(), 2, "not enough memory"),
         (ImportError("another package named 'model' hides"), 2, "named 'model'"),
-        (KeyboardInterrupt(), 130, "nothing was written"),
+        (KeyboardInterrupt(), 130, "no results were written"),
     ],
 )
 def test_codes_and_messages(error, code, says):

@@ -176,6 +176,27 @@ def test_compare_writes_the_same_where_the_background_job_is_lost(compared, smal
         pd.testing.assert_frame_equal(read(tmp_path / "lost" / name), read(compared[1] / name), rtol=1e-9)
 
 
+@pytest.mark.slow
+def test_a_campaign_that_is_not_to_be_trusted_leads_with_that(small_campaign, tmp_path):
+    turned = shutil.copy(small_campaign, tmp_path / "turned.h5")
+    with h5py.File(turned, "r+") as file:
+        for name in (name for name in file["runs"] if name.startswith("d-")):
+            file[f"runs/{name}/X1A"][...] *= -1.0
+    result = ended(3, "compare", turned, *COMPARE, "--out", tmp_path / "out")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    lead = "NOT to be trusted: 2 of 2 points (negative-damping, "
+    assert result.stdout.startswith(lead)
+    assert f'<p class="first">{lead}' in page
+    following = f"tpjb check {turned}"
+    assert result.stdout.splitlines()[-1] == f"Next: {following}"
+    assert f"Next: <code>{following}</code>" in page
+    (name,) = re.findall(
+        r"with .*? pivots.*? (?:in|measured) ([kc][xy]{2}) \(median\)", " ".join(result.stdout.split())
+    )
+    assert f'<figure id="{name}-over-load"' in page.partition("<nav")[0]
+    assert f'<a href="#{name}-over-load">' in page
+
+
 @pytest.mark.parametrize("form", ["ross", "csv", "mat"])
 def test_export_from_results(identified, tmp_path, form):
     ended(0, "export", identified, "--to", form, "--out", tmp_path / "out")
@@ -199,6 +220,8 @@ def test_simulate_tests_every_pad_at_the_speed_and_load_asked_for(rocker_file, t
     assert turning == {50.0}
     assert json.loads((tmp_path / "o" / "truth.json").read_text())["seed"] == 5
     assert tpjb("check", tmp_path / "o", "--out", tmp_path / "c").exit_code == 0  # no cell at its limit
+    again = ended(0, "simulate", four, *words[:-2], "--seed", "6", "-q", "--out", tmp_path / "o")
+    assert "the campaign that is there is replaced" in again.stderr
 
 
 BAD = [
@@ -228,6 +251,11 @@ BAD = [
     (("predict", "{bearing}", "--physics", "growth", "--housing-temperature", "48 bar"), "housing-temperature"),
     (("predict", "{bearing}", "--physics", "growth", "--housing-temperature", "900 degC"), "between -50 and 300"),
     (("compare", "{campaign}", "--pivots", "kirck"), "Did you mean 'kirk'"),
+    (("diagnose", "{campaign}", "--tolerance", "viscosity=4"), "50 % and more"),
+    (("diagnose", "{campaign}", "--tolerance", "viscosity=400 %"), "50 % and more"),
+    (("diagnose", "{campaign}", "--model-tolerance", "1.5"), "50 % and more"),
+    (("diagnose", "{campaign}", "--model-tolerance", "1,5 %"), "write a decimal point"),
+    (("diagnose", "{campaign}", "--model-tolerance", "1.5 %", "--pivots", "krik"), "Did you mean 'kirk'"),
     (("compare", "{campaign}", "--bearing", "nowhere.toml"), "no such file"),
     (("plan", "{bearing}", "--load", "abc"), "not a number with a unit"),
     (("simulate", "{bearing}", "--plan", "long"), "is not known"),

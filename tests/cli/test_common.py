@@ -86,6 +86,30 @@ def test_a_mistyped_command_or_option_is_answered_with_the_nearest(typed, meant)
     assert meant in result.stderr
 
 
+@pytest.mark.parametrize(
+    ("typed", "fault"),
+    [
+        ("predict x.toml --lood 4", "--lood"),
+        ("simulate x.toml --seed -1", "'--seed'"),
+        ("plan x.toml --locus 2.5", "'--locus'"),
+        ("predict x.toml --load 1kN --load 2kN", "--load: 2 times. Give it once"),
+    ],
+)
+def test_words_that_cannot_be_read_end_as_other_errors_do(typed, fault):
+    result = ended(2, *typed.split(), "--json")
+    document = json.loads(result.stdout)
+    (remark,) = document["remarks"]
+    assert (document["command"], document["exit_code"]) == (typed.split()[0], 2)
+    assert fault in remark["text"]
+    assert f"`tpjb {document['command']} -h` tells" in remark["text"]
+    assert f"tpjb: error: {remark['text']}" in result.stderr
+
+
+def test_a_flag_twice_and_a_repeatable_option_are_no_mistake():
+    words = ("--fault", "dead channel=X1A", "--fault", "dead channel=Y1A", "-q", "-q")
+    assert "no such file" in ended(2, "simulate", "x.toml", *words).stderr
+
+
 def asked_by_shell(what: str, **environment: str) -> str:
     """What the program says to a shell that asks for completion, in this process."""
     result = CliRunner().invoke(app, [], env={"_TPJB_COMPLETE": what, **environment}, prog_name="tpjb")

@@ -41,6 +41,7 @@ def test_rejected_windows_and_what_they_mean_are_told(disturbed):
     assert hit["reason"].str.contains("displacement").all()
     assert "directional-rejection" in result.stdout
     assert f"{DISTURBED} at 30 deg" in result.stdout
+    assert "flags: ok" not in result.stdout
 
 
 @pytest.mark.slow

@@ -102,8 +102,8 @@ PER_PAD = [
 ]
 
 
-def predicted(bearing, out, *options):
-    ended(0, "predict", bearing, *POINT, *FILM, "--load-direction", "-60 deg", *options, "--out", out)
+def predicted(bearing, out, *options, direction="-60 deg"):
+    ended(0, "predict", bearing, *POINT, *FILM, "--load-direction", direction, *options, "--out", out)
     (row,) = csv.DictReader((out / "prediction.csv").read_text("utf-8").splitlines())
     return row
 
@@ -113,13 +113,13 @@ def test_predict_turns_the_shaft_the_way_that_is_asked_for_or_that_the_bearing_s
     text = rocker_file.read_text("utf-8").replace("pivot_offset = 0.5", "pivot_offset = 0.6")
     drawing.write_text(text, "utf-8")
     usual = predicted(drawing, tmp_path / "usual")
-    asked = predicted(drawing, tmp_path / "asked", "--rotation", "clockwise", "--load-direction", "-120 deg")
+    asked = predicted(drawing, tmp_path / "asked", "--rotation", "clockwise", direction="-120 deg")
     assert (usual["rotation"], asked["rotation"]) == ("counter-clockwise", "clockwise")
     for name, sign in (("kxx", 1), ("kxy", -1), ("kyx", -1), ("kyy", 1)):
         column = f"{name}_N_per_m"
         assert float(asked[column]) == pytest.approx(sign * float(usual[column]), rel=1e-6)
     drawing.write_text(text.replace("[bearing]", '[bearing]\nrotation = "clockwise"'), "utf-8")
-    stated = predicted(drawing, tmp_path / "stated", "--load-direction", "-120 deg")
+    stated = predicted(drawing, tmp_path / "stated", direction="-120 deg")
     # where arrays lie in memory chooses a loop's vector or plain form: equal to rounding
     other = {name: cell for name, cell in stated.items() if name != "status" and cell != asked[name]}
     assert {name: float(cell) for name, cell in other.items()} == pytest.approx(

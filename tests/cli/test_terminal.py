@@ -162,6 +162,12 @@ def test_what_is_printed_fits_80_columns_in_a_pipe(capsys):
     assert lines[-1] == "Next: tpjb check 'a folder'"
 
 
+def test_what_is_the_same_in_every_row_is_told_once_though_two_columns_have_it(capsys):
+    columns = [*words("pad"), Column("load"), Column("of the formula"), Column("of the formula"), *words("remark")]
+    Terminal().show("pads", columns, [["#1", 1.0, 2.0, 2.0, "x" * 60], ["#2", 1.5, 2.0, 2.0, "x" * 60]])
+    assert capsys.readouterr().out.replace("\n  ", " ").count("of the formula 2") == 1
+
+
 def test_numbers_that_have_no_room_are_below_their_row(capsys):
     c = Terminal()
     columns = ["load kN", *(Column(f"c{entry} kN s/m") for entry in "abcdef"), *words("verdict")]

@@ -86,6 +86,14 @@ def test_channels_are_shown_in_us_units_and_written_in_si(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["locus", "pivot", "check"])
+def test_what_is_said_in_us_units_holds_no_other(name, tmp_path):
+    said = ended(0, name, "rigdata/samples/demo.h5", "--units", "us", "--out", tmp_path / "o").output
+    assert not re.search(r"\d (µm|um|N|kN)\b|MN/m|speed +Hz", said.replace("\n", " "))
+    assert re.search(r"\blbf\b", said)
+
+
+@pytest.mark.slow
 def test_a_report_in_us_units_holds_no_other(campaign_of, tmp_path):
     ended(0, "compare", campaign_of(rocker_rig(3)), "--pivots", "measured", "--units", "us", "--out", tmp_path / "o")
     page = (tmp_path / "o" / "report.html").read_text(encoding="utf-8")

@@ -10,8 +10,11 @@ import pytest
 
 from rigdata.calibration import Channel
 from rigdata.operating_point import ROTATIONS
+from tests.command_line import ended
+from tpjb_ident.compare import summary
 from tpjb_ident.compare.difference import Side, difference_of, difference_sentences, recorded_side
 from tpjb_ident.report.difference_page import write_difference_report
+from tpjb_ident.runtime.output_folder import record_text
 from tpjb_ident.runtime.tables import write_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS
 
@@ -67,7 +70,8 @@ def test_it_says_yes_no_and_cannot_tell():
     assert unsure["kyy_changed"] == "cannot tell"
     doubtful = difference_of(side("a", TRUE), side("b", moved, quality="ok; baseline-missing"))
     assert set(doubtful.points.filter(like="_changed").iloc[0]) == {"cannot tell"}
-    assert doubtful.untrusted_points() == ["b, 5 kN, 25 Hz: ok; baseline-missing"]
+    assert doubtful.doubt == "1 point with a flag that forbids trust:\n5 kN at -90°, shaft at 22 Hz (1320 rpm), 25 Hz"
+    assert difference_sentences(doubtful)[0] == "NOT to be trusted: 1 point with a flag that forbids trust."
 
 
 def test_sentences_name_the_largest_change_and_points_without_a_partner():
@@ -77,7 +81,8 @@ def test_sentences_name_the_largest_change_and_points_without_a_partner():
         "25 Hz: +18.5\N{NO-BREAK SPACE}% of the mean direct coefficient (120.0 ± 1.9 kN s/m)."
     )
     apart = difference_of(side("a", TRUE), side("b", TRUE, load=6000.0))
-    first, *more = difference_sentences(apart)
+    lead, first, *more = difference_sentences(apart)
+    assert lead == "NOT to be trusted: nothing of the two can be compared."
     assert first == "a and b have no operating point in common."
     assert more[-1].startswith("Without a partner: a: 5 kN at -90°, shaft at 22 Hz (1320 rpm), 25 Hz; b: 6 kN")
     other = side("b", TRUE)
@@ -123,6 +128,34 @@ def test_pivots_and_clearances_come_from_folders_of_results(tmp_path):
     texts = difference_sentences(difference)
     assert "Clearance changed: pad #1 by 4.00 ± 0.55 µm." in texts
     assert texts[-1] == "No calibration is known to be common to both: the intervals hold that of each."
+
+
+@pytest.mark.parametrize("ids", [("before", "after"), ("rig", "rig"), ()])
+def test_folders_of_results_are_called_by_their_campaigns(ids, tmp_path):
+    folders = [tmp_path / name / "identify" for name in ("one", "two")]
+    for number, folder in enumerate(folders):
+        folder.mkdir(parents=True)
+        write_table(folder, "coefficients", side("a", changed(4, 1.0 + 0.2 * number)).coefficients)
+        if ids:
+            (folder / "run.json").write_text(record_text({"identify": {"campaign": ids[number]}}), encoding="utf-8")
+    said = " ".join(ended(0, "compare", *folders, "--out", tmp_path / "out").stdout.split())
+    names = [f"{ids[k] if ids else 'identify'} ({folder})" for k, folder in enumerate(folders)]
+    names = ids if len(set(ids)) == 2 else names
+    assert said.startswith(f"From {names[0]} to {names[1]} 1 of 8 coefficients changed")
+
+
+def test_one_pad_is_no_range_and_one_coefficient_no_plural(monkeypatch):
+    pads = [SimpleNamespace(pad=pad, valid_to=5e3, stiffness=lambda load: 1e8) for pad in (1, 2)]
+    monkeypatch.setattr(summary, "printed_formula", lambda bearing: lambda pad, load: (0.0, 1e8))
+    for measured in (pads[:1], pads):
+        (sentence,) = summary._pivot_sentence(SimpleNamespace(curves=measured, bearing=None))
+        assert "have 100 % of" in sentence
+    monkeypatch.setattr(summary, "printed_formula", lambda bearing: lambda pad, load: (0.0, 1e8 * pad))
+    (sentence,) = summary._pivot_sentence(SimpleNamespace(curves=pads, bearing=None))
+    assert "have 50 % (pad #2) to 100 % (pad #1) of" in sentence
+    moved = TRUE * np.where(np.arange(8) == 3, 1.0, 1.5)
+    _, said, *_ = difference_sentences(difference_of(side("a", TRUE), side("b", moved)))
+    assert "1 coefficient the same within 3 %" in said
 
 
 def test_campaigns_of_static_tests_alone_are_compared_by_these(tmp_path):

@@ -41,7 +41,14 @@ def test_a_bearing_file_states_every_tolerance():
 
 @pytest.mark.parametrize(
     ("name", "value", "said"),
-    [("viscosty", "4 %", "viscosity"), ("viscosity", "4 um", "ratio"), ("viscosity", "-4 %", "zero or more")],
+    [
+        ("viscosty", "4 %", "viscosity"),
+        ("viscosity", "4 um", "ratio"),
+        ("viscosity", "-4 %", "below zero"),
+        ("viscosity", "4", "no unit, such as %"),
+        ("viscosity", 4.0, "50 % and more"),
+        ("clearance_scatter", "-1 um", "below zero"),
+    ],
 )
 def test_a_tolerance_that_cannot_be_is_refused(name, value, said):
     with pytest.raises(BadInputError, match=said):

@@ -362,7 +362,7 @@ def test_from_a_slip_on_a_record_has_another_zero(size):
     np.testing.assert_allclose(curve.stiffness([1000.0, 4000.0]), 1 / SCALE, rtol=0.01)
     np.testing.assert_allclose(curve.steps.deflection, curve.deflection(curve.steps.load), atol=1e-8)
     detail = {str(condition): condition.detail for condition in curve.status}["shaft-slipped"]
-    assert detail == f"by {1e6 * size:+.2g} um at 3000 N of p-1"
+    assert detail == f"by {1e6 * size:+.2g} µm at 3000 N of p-1"
 
 
 def test_a_kink_is_no_slip():

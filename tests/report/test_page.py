@@ -16,11 +16,11 @@ from rigdata.problem import refuse
 from tests.report.plot_cases import comparison, locus
 from tests.report.tags import Page
 from tpjb_ident.report import page as report_page
-from tpjb_ident.report.drawing.picture import add_legend, longest_series, new_picture
+from tpjb_ident.report.drawing.picture import MODEL_STYLES, add_legend, longest_series, new_picture
 from tpjb_ident.report.figure import Panel, save_panels, svg_text
 from tpjb_ident.report.page import Section, Table, render_page, render_section
 from tpjb_ident.report.sections import _run_matrix, coefficient_sections, position_panels
-from tpjb_ident.rounding import fixed, percent, signed, with_interval
+from tpjb_ident.rounding import deviation, fixed, percent, signed, with_interval
 
 ENTRIES = ("xx", "xy", "yx", "yy")
 HOSTILE = "<script>alert(1)</script>\"'& <img src=x onerror=alert(2)> $\\frac{a}{b}$ \x1b[31m\u202e"
@@ -172,6 +172,9 @@ def test_signs():
     assert signed(-1.26) == "−1.3"
     assert signed(math.nan) == "–"
     assert percent(-0.123) == "−12.3\N{NO-BREAK SPACE}%"
+    assert [deviation(share).replace("\N{NO-BREAK SPACE}", " ") for share in (2.9, 3.5, -131.5, math.nan)] == [
+        "+290.0 %", "4.5 times", "−130 times", "–"
+    ]  # fmt: skip
     assert fixed(math.inf) == "–"
 
 
@@ -208,6 +211,24 @@ def test_measured_points_have_their_intervals_and_predictions_their_lines():
     value = LOADED["kyy_N_per_m"]
     wide = LOADED.assign(kyy_N_per_m_lo=0.8 * value, kyy_N_per_m_hi=1.2 * value)
     assert len(coefficient_panels(wide)["kyy-over-load"].figure.axes) == 1  # no panel of deviations that say nothing
+
+
+@pytest.mark.parametrize("least", [-1e6, 1e5])
+def test_marks_at_or_below_zero_are_whole(least):
+    value = LOADED["kyy_N_per_m"].where(LOADED["static_load_N"] > LOADED["static_load_N"].min(), least)
+    table = LOADED.assign(kyy_N_per_m=value, kyy_N_per_m_lo=0.5 * value, kyy_N_per_m_hi=1.5 * value)
+    low, high = coefficient_panels(table)["kyy-over-load"].figure.axes[0].get_ylim()
+    assert low < least / 1e6 - 0.05 * (high - low)
+
+
+@pytest.mark.parametrize(("factor", "arrow"), [(2.0, "↑"), (0.5, "↓")])
+def test_an_arrow_shows_where_a_prediction_out_of_reach_lies(factor, arrow):
+    far = LOADED["kyy_N_per_m_predicted"].where(LOADED["pivots"] != "rigid", factor * LOADED["kyy_N_per_m"])
+    table = LOADED.assign(kyy_N_per_m_predicted=far)
+    _, deviations = coefficient_panels(table)["kyy-over-load"].figure.axes
+    arrows = [text for text in deviations.texts if text.get_text() == arrow]
+    rigid = [text.get_position()[0] for text in arrows if text.get_color() == MODEL_STYLES["rigid"]["color"]]
+    assert sorted(rigid) == pytest.approx(sorted(LOADED["static_load_N"].unique() / 1e3))
 
 
 def test_a_record_that_cannot_be_read_has_no_rate_in_the_table_of_runs():

@@ -109,6 +109,11 @@ def test_fingerprint_names_every_file_and_a_campaign_goes_on_without_a_vanished_
         campaign.run("p-1").record("X1A")
 
 
+def test_the_folder_that_somebody_stands_in_has_its_name(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    assert rigdata.load_campaign(".").path.name == folder.name
+
+
 def test_a_campaign_travels_to_worker_processes_and_threads_share_it(campaign):
     expected = campaign.run("l-1").record("X1A").values
     assert np.array_equal(pickle.loads(pickle.dumps(campaign)).run("l-1").record("X1A").values, expected)

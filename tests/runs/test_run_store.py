@@ -18,7 +18,9 @@ from rigdata.virtual_rig import write_campaign
 from tests.command_line import ended
 from tests.good_campaigns import directions
 from tests.identification.test_identify import rig
+from tpjb_ident.cli.command import Command
 from tpjb_ident.cli.commands.identify import KEPT
+from tpjb_ident.cli.commands.identify import _finished_runs as finished_runs
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs import run_jobs
 from tpjb_ident.runs.run_jobs import RunStore, fingerprint
@@ -165,6 +167,16 @@ def test_csv_runs_have_fingerprints_of_their_own_bytes(tmp_path):
     last = max(i for i, byte in enumerate(text) if chr(byte).isdigit())
     file.write_bytes(text[:last] + (b"1" if text[last : last + 1] != b"1" else b"2") + text[last + 1 :])
     assert mark != fingerprint(load_campaign(tmp_path / "folder").run(run.id), PhasorSettings())
+
+
+@pytest.mark.parametrize("has_runs", [True, False])
+def test_a_command_that_is_interrupted_says_that_finished_runs_wait(has_runs, tmp_path, capsys):
+    folder = tmp_path / "o" / KEPT
+    if has_runs:
+        folder.mkdir(parents=True)
+    with pytest.raises(KeyboardInterrupt), finished_runs(Command("identify", {}, tmp_path / "o")):
+        raise KeyboardInterrupt
+    assert (f"finished runs wait in {folder}" in capsys.readouterr().err) is has_runs
 
 
 def tables(out: Path) -> list[bytes]:

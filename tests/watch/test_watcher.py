@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import os
 import re
 import shutil
@@ -9,13 +10,16 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
+from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Fault
 from tests.command_line import ended
 from tests.good_campaigns import rocker_rig
 from tpjb_ident.watch.landing import NewFiles
+from tpjb_ident.watch.next_steps import plan_lacks
 from tpjb_ident.watch.watcher import Watcher
 
 pytestmark = pytest.mark.slow
@@ -246,3 +250,9 @@ def test_a_manifest_that_becomes_a_link_is_not_read(watch, live, tmp_path):
     snapshot = watch.look()
     assert not snapshot.campaign.id.startswith("other-")
     assert any("symlink" in p.what for p in snapshot.problems)
+
+
+def test_a_plan_lacks_a_second_direction_at_one_point():
+    point = OperatingPoint(5000.0, -math.pi / 2, 138.0, 2 * math.pi * 25.0)
+    runs = [SimpleNamespace(kind=kind, point=point, excitation_direction=0.0) for kind in ("dynamic", "clearance")]
+    assert plan_lacks(runs, 0) == ["1 operating point shaken in one direction (5 kN, 25 Hz): K and C need two."]

@@ -251,11 +251,7 @@ class RunSpectra(RunPhasors):
 
 
 def run_spectra(
-    run: Run,
-    band: tuple[float, float],
-    seconds: float,
-    settings: PhasorSettings,
-    fast: Mapping[str, float],
+    run: Run, band: tuple[float, float], seconds: float, settings: PhasorSettings, fast: Mapping[str, float]
 ) -> RunSpectra:
     """Transform the first `seconds` of a run over a band [Hz]; `fast`: rates of the channels' clocks, relative."""
     with run.opened():

@@ -19,13 +19,7 @@ from tpjb_ident.check.probe_readings import check_positions, check_shaft_lines
 from tpjb_ident.check.rig_fit import rig_fit
 from tpjb_ident.check.run_gain import check_agreement, check_film, point_runs
 from tpjb_ident.check.sensor_axes import check_cells, check_sweep
-from tpjb_ident.check.set_points import (
-    check_excitation,
-    check_places,
-    check_rotation,
-    check_speed,
-    check_static_loads,
-)
+from tpjb_ident.check.set_points import check_excitation, check_places, check_rotation, check_speed, check_static_loads
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
 from tpjb_ident.conditions import SEVERITIES, Conditions
 from tpjb_ident.phasors.compensation import with_references
@@ -61,7 +55,7 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
         campaign = with_references(as_campaign(campaign, "check_campaign: campaign"))
     except RigDataError as error:
         return _sorted(error.problems)
-    observations: list[Observation] = []
+    observations = []
     for count, run in enumerate(campaign.runs, start=1):
         observations.append(observe(run))
         if progress is not None:
@@ -69,8 +63,8 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
     observations, conditions = judged(campaign, observations)
     findings = []
     for observation in observations:
-        findings.extend(observation.report.findings)
-    merged = merge(findings, campaign.path.name, campaign.runs)
+        findings += observation.report.findings
+    merged = merge(findings, campaign.runs)
     for condition in conditions:
         severity: Severity = "error" if condition.severity == "error" else "warning"
         merged.append(Problem(severity, campaign.path.name, str(condition), condition.detail, condition.meaning))

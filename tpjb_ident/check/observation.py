@@ -287,7 +287,7 @@ def _read_block(
     try:
         return dict(zip(channels, run.reader.read(list(channels), start, stop)))
     except RigDataError:
-        blocks: dict[str, FloatArray] = {}  # one by one, to tell all that fail
+        blocks = {}  # one by one, to tell all that fail
     for name, channel in channels.items():
         try:
             (blocks[name],) = run.reader.read([name], start, stop)

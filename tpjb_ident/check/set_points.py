@@ -1,6 +1,7 @@
 """Set points of a run against what its channels show: load, directions, speed and sense of rotation, excitation."""
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -175,13 +176,13 @@ def check_rotation(runs: Sequence[Observation]) -> None:
 
 def check_excitation(runs: Sequence[Observation]) -> None:
     """Excitation of dynamic runs: there at all, as strong as in the point's other runs, in the stated direction."""
-    strengths: dict[OperatingPoint, list[float]] = {}
+    strengths = defaultdict(list)
     measured = []
     for run in runs:
         strength = float(np.linalg.norm(run.film_force))
         if np.isfinite(strength):
             measured.append((run, strength))
-            strengths.setdefault(run.run.point, []).extend([strength] if run.shows("force") else [])
+            strengths[run.run.point].extend([strength] if run.shows("force") else [])
     directed = []
     for run, strength in measured:
         present = strengths[run.run.point]

@@ -16,6 +16,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, wrapped, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon, probe_gains
+from tpjb_ident.columns import amount
 from tpjb_ident.conditions import Conditions, holding, sentences
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.lines import line_design
@@ -119,9 +120,10 @@ class Locus(Presented):
         return clearance_and_locus(locus=self, **options)
 
     def __str__(self) -> str:
-        radii = [1e6 * float(np.hypot(*p.position)) for p in self.points]
+        radii = [float(np.hypot(*p.position)) for p in self.points]
+        nearest, farthest = (amount(radius, "length", ".3g") for radius in (min(radii), max(radii)))
         origin = "probes' zero" if "no-centre" in self.status else "centre"
-        text = f"{len(self.points)} positions, {min(radii):.1f} to {max(radii):.1f} µm from the {origin}"
+        text = f"{len(self.points)} positions, {nearest} to {farthest} from the {origin}"
         return text + (f"; {', '.join(sentences(self.status))}" if self.status else "")
 
 
@@ -168,9 +170,9 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     noise = _noise(records)
     walk = _walk(records, orders, noise, centre)
     points, on_its_way = [], [walk.jump] if walk.jump else []
-    for record, moved, walked in zip(records, walk.moved, walk.covariance, strict=True):
+    for record, moved, walked in zip(records, walk.moved, walk.covariance):
         if size := _moved(record, noise):
-            on_its_way.append(f"halves of {record.run.id} stand {1e6 * size:.2g} µm apart")
+            on_its_way.append(f"halves of {record.run.id} stand {amount(size, 'length', '.2g')} apart")
         position = record.position - moved - centre
         # of a steady way the ends are as far from the mean as the halves from each other
         variance = noise.mean_variance(record.span) + size**2 / 4.0
@@ -182,7 +184,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     points = [replace(p, covariance=p.covariance + np.outer(off, off)) for p in points]
     points.sort(key=lambda p: _swept(p.point))
     if off.any():
-        on_its_way.append(f"positions go around a place {1e6 * math.hypot(*off):.2g} µm from the polygon's centre")
+        on_its_way.append(f"positions go around a place {amount(math.hypot(*off), 'length', '.2g')} from the centre")
     status = (*_status(points, polygon, walk.repeats, listed(on_its_way, 4)), *refused_runs(problems))
     return Locus(tuple(points), centre, walk.drift, status)
 
@@ -339,7 +341,7 @@ def _walk(records: Sequence[_Record], orders: FloatArray, noise: NoiseModel, cen
     size, text = np.abs(drifts[best]) * np.ptp(orders), ""
     if shares[0] < 0.5 and size > _LEAST_MOVE:
         first = records[int(np.argmax(courses[:, best]))].run.id
-        text = f"the probes' zero moved by {1e6 * size:.2g} µm, likely at one go before {first}"
+        text = f"the probes' zero moved by {amount(size, 'length', '.2g')}, likely at one go before {first}"
     return _Walk(count, _vectors(drifts @ shares), _vectors(mean), covariance, text)
 
 

@@ -13,6 +13,7 @@ from rigdata.problem import refuse
 from rigdata.vector import directions
 from tpjb_ident.clearance.polygon import Centre, SideFit, corners, find_centre, fit_sides, untested
 from tpjb_ident.clearance.sweep import LARGEST_DEFLECTION, ContactIntervals, read_sweep
+from tpjb_ident.columns import amount, size, symbol
 from tpjb_ident.conditions import Conditions, holding, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
@@ -151,15 +152,15 @@ class ClearancePolygon(Presented):
         return clearance_and_locus(self, **options)
 
     def __str__(self) -> str:
-        pads = ", ".join(f"{1e6 * c:.2f} ({1e6 * s:.2f})" for c, s in zip(self.clearance, self.clearance_se))
-        text = f"clearance polygon {self.run}: per pad {pads} µm (se), pushed by {self.push_load:.0f} N"
+        unit = size("length")
+        pads = ", ".join(f"{c / unit:.4g} ({s / unit:.2g})" for c, s in zip(self.clearance, self.clearance_se))
+        push = amount(self.push_load, "force", ".0f")
+        text = f"clearance polygon {self.run}: per pad {pads} {symbol('length')} (se), pushed by {push}"
         return "; ".join([text, *sentences(self.status)])
 
 
 def measure_clearance(
-    campaign: Campaign,
-    pivot_angles: Sequence[float],
-    curves: Sequence[PivotCurve] | None = None,
+    campaign: Campaign, pivot_angles: Sequence[float], curves: Sequence[PivotCurve] | None = None
 ) -> ClearancePolygon:
     """Measure the cold clearance polygon: the first clearance run at rest with the smallest push load.
 
@@ -208,7 +209,8 @@ def measure_run(run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotC
     outside = [curve for curve in curves if curve.is_extrapolated(contact.push)]
     lowest = min((curve.valid_from for curve in outside), default=0.0)
     pads = " of all pads" if len(outside) == len(angles) else _of_pads([curve.pad for curve in outside])
-    detail = f"pushed with {contact.push:.0f} N, the dry tests{pads} hold from {lowest:.0f} N on; the sweep corrects it"
+    push, valid = (amount(load, "force", ".0f") for load in (contact.push, lowest))
+    detail = f"pushed with {push}, the dry tests{pads} hold from {valid} on; the sweep corrects it"
     extrapolated = holding((outside, "give-extrapolated", detail))
     return replace(
         polygon, status=(*polygon.status, *_status(fit, polygon, curves), *witness.conditions, *extrapolated)
@@ -230,7 +232,7 @@ def _sides(run: Run, angles: FloatArray, curves: Sequence[PivotCurve]) -> tuple[
         deflection = fit.deflection.max()  # pads that seemed not to be touched were
     walk = fit.noise.walk * np.sqrt(np.ptp(contact.time))
     if walk > _LARGEST_WALK:
-        what = f"has a shaft that was turned, or probes that moved: their zero walks by {1e6 * walk:.1f} µm"
+        what = f"has a shaft that was turned, or probes that moved: their zero walks by {amount(walk, 'length', '.2g')}"
         raise refusal(run, "record", what, "Keep shaft and probes still")
     return contact, fit
 
@@ -323,7 +325,7 @@ def _status(fit: SideFit, polygon: ClearancePolygon, curves: Sequence[PivotCurve
 
 def _offsets(pads: IntArray, offsets: FloatArray) -> str:
     """How far pads (k,) from 0 stand off, (k,) [m], in words."""
-    return ", ".join(f"pad #{pad + 1} {1e6 * offset:+.1f} µm" for pad, offset in zip(pads, offsets, strict=True))
+    return ", ".join(f"pad #{pad + 1} {1e6 * offset:+.1f} µm" for pad, offset in zip(pads, offsets))
 
 
 def _inseparable(fit: SideFit, centre: Centre, gains: FloatArray) -> Conditions:

@@ -25,7 +25,7 @@ def main() -> None:
 
         app(prog_name="tpjb")
     except KeyboardInterrupt as error:  # while the libraries are loaded, before any command has begun
-        print("tpjb: interrupted: nothing was written.", file=sys.stderr)
+        print("tpjb: interrupted: no results were written.", file=sys.stderr)
         interrupts.leave_if_signalled(143 if error.args else 130)
     except SystemExit as end:
         interrupts.leave_if_signalled(end.code)

@@ -67,6 +67,7 @@ class Command(Terminal):
         self.name, self.out = name, out
         self.options, self.typed = dict(options), dict(options)  #: as run.json records them, and as they were typed
         self.remarks: Sequence[str] = ()  #: flags that run.json repeats
+        self.doubt = ""  #: why the results are not to be trusted
         self.arithmetic: dict[str, None] = {}  #: warnings of single operations, in order
         self.target = out or Path(f"tpjb-{name}-out")
         self.frames: dict[str, pd.DataFrame] = {}  #: tables that were written, by file name
@@ -151,6 +152,7 @@ class Command(Terminal):
         with output_folder(self.target, entry, tuple(self._sources)) as self.folder, shown as show:
             yield show
             notes = {"remarks": list(self.remarks), "arithmetic": list(self.arithmetic), "options": _plain(self.typed)}
+            notes["campaign"] = ", ".join(source.id for source in self._opened if not isinstance(source, Path))
             names = write_record(self.folder, self.target, entry, self.options, self.inputs, notes)
         self.wrote(*names)
 
@@ -197,6 +199,12 @@ class Command(Terminal):
         if serious or missing:
             raise NotTrustedError("; ".join([*(notes[text] for text in dict.fromkeys(serious)), *missing]))
 
+    def distrust(self, doubt: str) -> None:
+        """Note why the results are not to be trusted, if so: the exit code is 3, and the records come first."""
+        self.doubt = doubt
+        if doubt and self._sources:
+            self.next("check", self._sources[-1])
+
     def wrote(self, *names: str) -> None:
         """Note files that are in the output folder now."""
         self._outputs |= dict.fromkeys(names)
@@ -220,13 +228,15 @@ class Command(Terminal):
                 warnings.showwarning = self._show_warning  # type: ignore[assignment]
                 use_units(self.options.get("units", "si"))
                 function(self, **options)
+            if self.doubt:
+                raise NotTrustedError(self.doubt)
         except BrokenPipeError:  # the reader of our output went away, as `| head` does
             sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open until the process ends)
         except (Exception, KeyboardInterrupt) as error:
             exit_code, kind, message = _end_of(error)
             self.say(kind, message)
-            if exit_code == _NOT_TRUSTED and self._sources:  # the records come first
-                self.next("check", self._sources[-1])
+            if exit_code == _NOT_TRUSTED:
+                self.distrust(message)
             return exit_code
         finally:
             use_units("si")
@@ -240,6 +250,15 @@ class Command(Terminal):
             self.arithmetic[text] = None
         else:
             self.warn(text)
+
+    def print_document(self, exit_code: int) -> None:
+        """Print everything as one JSON document."""
+        from tpjb_ident.presentation import json_data
+
+        # escapes where standard output is not UTF-8, which every program that reads JSON expects
+        ascii_only = "utf" not in (sys.stdout.encoding or "").lower()
+        document = json_data(self.document(exit_code))
+        typer.echo(json.dumps(document, indent=1, ensure_ascii=ascii_only, allow_nan=False))
 
     def document(self, exit_code: int) -> dict[str, Any]:
         """Everything printed, as plain data; ``data`` holds the result tables and JSON files themselves."""
@@ -288,12 +307,7 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
             c = Command(name, recorded, out, as_json or quiet)
             exit_code = c.run(function, options)
             if as_json:
-                from tpjb_ident.presentation import json_data
-
-                # escapes where standard output is not UTF-8, which every program that reads JSON expects
-                ascii_only = "utf" not in (sys.stdout.encoding or "").lower()
-                document = json_data(c.document(exit_code))
-                typer.echo(json.dumps(document, indent=1, ensure_ascii=ascii_only, allow_nan=False))
+                c.print_document(exit_code)
             if exit_code:
                 raise typer.Exit(exit_code)
 
@@ -321,7 +335,7 @@ def _end_of(error: BaseException) -> tuple[int, str, str]:
     if interrupt is not None:
         heard()
         ended = (_TERMINATED, "terminated") if interrupt.args else (_INTERRUPTED, "interrupted")
-        return *ended, "nothing was written."
+        return *ended, "no results were written."
     model = sys.modules.get("model.errors")  # not loaded: then it is none of the model's
     refusals = (TpjbError, RigError, *((model.ModelError,) if model else ()))
     if isinstance(error, refusals) or (isinstance(error, ImportError) and "named 'model'" in str(error)):
@@ -383,7 +397,7 @@ def _places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
 
     Several of one option are numbered: ``prediction.0``.
     """
-    values: dict[str, Any] = {}
+    values = {}
     for name, value in settings.items():
         values[name] = value
         for number, item in enumerate(value) if isinstance(value, list | tuple) else ():

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command
 from tpjb_ident.cli.options import refuse_unknown
-from tpjb_ident.columns import amount, place_of
-from tpjb_ident.conditions import sentences, untrusted
-from tpjb_ident.errors import BadInputError, NotTrustedError
-from tpjb_ident.rounding import counted, listed
+from tpjb_ident.conditions import led_by, untrusted
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.rounding import counted
 from tpjb_ident.schema import DAMPING, POINT_COLUMNS, STIFFNESS
 
 if TYPE_CHECKING:
@@ -73,45 +71,17 @@ def write_identification(c: Command, result: Identification) -> None:
         c.table("budget", result.budget_frame())
 
 
-def _untrusted_places(result: Identification) -> list[str]:
-    """Bands and points without an answer, or with one that is not to be trusted, and why."""
-    bad = []
-    for band in result.bands:  # where there are points, they say it
-        serious = sentences(untrusted(band.quality))
-        if not band.points and (serious or not band.lines):
-            reason = "; ".join(serious) or "no line stands clear of the noise"
-            bad.append(f"{amount(band.point.static_load, 'load')}, {band.kind}: {reason}")
-    for p in result.points:
-        serious = sentences(untrusted(p.quality))
-        if serious or not math.isfinite(abs(p.stiffness.h.sum())):
-            bad.append(f"{place_of(p.point.static_load, p.point.excitation_hz)}: {'; '.join(serious)}")
-    return bad
-
-
-def _counted_places(result: Identification) -> int:
-    return len(result.points) + sum(not band.points for band in result.bands)
-
-
-def refuse_untrusted(result: Identification) -> None:
-    """End with exit code 3 if a point has no answer, or one that is not to be trusted, or no run any more."""
-    bad, lost = _untrusted_places(result), sentences(untrusted(result.conditions))
-    if lost and not bad:
-        raise NotTrustedError("; ".join(lost))
-    if bad:
-        count = f"{len(bad)} of {_counted_places(result)} points:"
-        raise NotTrustedError("\n".join([count, *lost, listed(bad, between="\n")]))
-
-
 def show_identification(c: Command, result: Identification) -> None:
     """Print what was identified: a summary, tables as they are on disk, in the units that people read, remarks."""
-    bad = len(_untrusted_places(result))
-    trust = f"{bad} NOT to be trusted" if bad else "all to be trusted"
-    qualities = [p.quality for p in result.points] + [band.quality for band in result.bands]
-    flagged = sum(bool(quality) and not untrusted(quality) for quality in qualities)
+    flagged = sum(bool(quality) and not untrusted(quality) for _, quality, _ in result.places)
+    trust = "" if result.doubt else ", all to be trusted"
     flags = f", {flagged} with flags" if flagged else ""
-    c.print(f"{result.campaign}: {counted(_counted_places(result), 'operating point')}, {trust}{flags}.")
+    points = counted(len(result.places), "operating point")
+    for line in led_by(result.doubt, [f"{result.campaign}: {points}{trust}{flags}."]):
+        c.print(line)
     frame = c.frames.get("coefficients")
     if frame is not None and len(frame):
+        frame = frame.replace({"quality": {"ok": "-"}})
         point = f"{POINT} rotation" if "clockwise" in set(frame["rotation"]) else POINT
         title = f"{result.campaign}: {result.method}, 95 % intervals"
         c.show_frame(title, frame, f"{point} {DIRECT} outlier_fraction quality", "coefficients.csv")

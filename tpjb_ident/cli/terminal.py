@@ -118,12 +118,13 @@ class Terminal:
             return
         shown, title = texts[:MOST_ROWS] if file else texts, printable(title)
         is_wide = len(shown) > 1 and _total(_sizes([headings, *shown])) > _width()
-        varying = []
+        varying, constant = [], []
         for i, column in enumerate(columns):
             if not is_wide or column.words or len({row[i] for row in shown}) > 1:
                 varying.append(i)
             elif shown[0][i].strip(" -"):  # constant numbers go to the title
-                title += f"; {readable(column.with_unit(shown[0][i].strip()))}"
+                constant.append(readable(column.with_unit(shown[0][i].strip())))
+        title = "; ".join(dict.fromkeys([title, *constant]))
         body = []
         for row in [headings, *shown]:
             body.append([row[i] for i in varying])
@@ -142,11 +143,11 @@ class Terminal:
             values: Iterable[Any] = frame[name]
             if f"{name}_lo" in frame:
                 column = column._replace(form=with_half)
-                values = zip(values, 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]), strict=True)
+                values = zip(values, 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]))
             columns.append(column)
             cells.append(values)
         if cells:
-            self.show(title, columns, zip(*cells, strict=True), file)
+            self.show(title, columns, zip(*cells), file)
 
     def show_table(self, table: Table, name: str) -> None:
         """Print a table of a page; `name` says what it is of."""
@@ -230,7 +231,7 @@ def _width() -> int:
 
 def _fitted(text: str, wraps: bool = True) -> str:
     """Lines with whole words, as wide as a table; messages in a log stay whole, for who searches them."""
-    lines: list[str] = []
+    lines = []
     for line in text.split("\n"):
         line = readable(line)
         lines += wrapped(line, _width()) if wraps else [line]
@@ -259,7 +260,7 @@ def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Co
 
     def line(texts: Sequence[str]) -> str:
         padded = []
-        for i, text in zip(row_columns, texts, strict=True):
+        for i, text in zip(row_columns, texts):
             pad = " " * (sizes[i] - cell_len(text))
             padded.append(text + pad if i in words else pad + text)
         return _SPACE.join(padded).rstrip()
@@ -280,7 +281,7 @@ def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Co
 
 def _sizes(rows: Iterable[Sequence[str]]) -> list[int]:
     """Size of the widest cell of each column."""
-    return [max(map(cell_len, cells)) for cells in zip(*rows, strict=True)]
+    return [max(map(cell_len, cells)) for cells in zip(*rows)]
 
 
 def _total(sizes: Sequence[int]) -> int:

@@ -15,19 +15,14 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.clearance.locus import Locus
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.compare.coefficient_table import TableSource
-from tpjb_ident.compare.predictions import (
-    ModelSettings,
-    Progress,
-    counted_twice,
-    measured_laws,
-    predict_points,
-)
+from tpjb_ident.compare.predictions import ModelSettings, Progress, counted_twice, measured_laws, predict_points
 from tpjb_ident.compare.static_tests import StaticTests, measure_static
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.presentation import Presented, changed
 from tpjb_ident.results.identification import Identification
+from tpjb_ident.rounding import counted
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
 #: Rows of `predict_points` of every pivot model; operating points are their index.
@@ -131,6 +126,14 @@ class Comparison(Presented):
     def to_dataframe(self) -> pd.DataFrame:
         """``comparison.csv``."""
         return self.table
+
+    @property
+    def doubt(self) -> str:
+        """Why a point is not to be trusted, on either side; "" where all are."""
+        if self.has_records and self.identification.doubt:
+            return self.identification.doubt
+        failed = (~self.table["converged"]).sum()
+        return f"the model did not converge at {counted(failed, 'predicted point')}." if failed else ""
 
     def plot(self, **options: Any) -> Any:
         """Draw kxx over load, measured and predicted; `tpjb_ident.report.plots.coefficient` takes the same options."""

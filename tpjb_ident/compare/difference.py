@@ -18,9 +18,10 @@ from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, symbol
 from tpjb_ident.compare.coefficient_table import described, partners
 from tpjb_ident.compare.static_tests import StaticTests
-from tpjb_ident.conditions import errors_in
+from tpjb_ident.conditions import errors_in, led_by
 from tpjb_ident.results.identification import Identification
-from tpjb_ident.rounding import counted, percent, with_interval
+from tpjb_ident.rounding import counted, listed, percent, with_interval
+from tpjb_ident.runtime.output_folder import former_runs
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, HALF_INTERVAL, KINDS, POINT_COLUMNS, TANGENT
 
@@ -81,7 +82,10 @@ def recorded_side(folder: Path) -> Side:
     coefficients = read_table(folder / "coefficients.csv", (*POINT_COLUMNS, *COEFFICIENT_COLUMNS))
     paths = [folder / f"{name}.csv" for name in ("pivot_curves", "clearance")]
     pivots, clearance = (read_table(path, ("pad",)) if path.exists() else None for path in paths)
-    return Side(folder.name, coefficients, pivots, clearance)
+    name = folder.name
+    for entry in former_runs(folder).values():
+        name = str(entry.get("campaign", name))
+    return Side(name, coefficients, pivots, clearance)
 
 
 @dataclass(frozen=True)
@@ -102,16 +106,16 @@ class Difference:
         named = {"difference": self.points, "pivot_difference": self.pivots, "clearance_difference": self.clearance}
         return {name: frame for name, frame in named.items() if len(frame)}
 
-    def untrusted_points(self) -> list[str]:
-        """Matched points with a flag that forbids trust, in words."""
-        untrusted = []
-        for row in self.points.to_dict("records"):
-            for end, side in (("a", self.a), ("b", self.b)):
-                quality = row.get(f"quality_{end}")
-                if errors_in(quality):
-                    place = place_of(row["static_load_N"], row["excitation_Hz"])
-                    untrusted.append(f"{side.name}, {place}: {quality}")
-        return untrusted
+    @property
+    def doubt(self) -> str:
+        """Why it is not to be trusted: no common points, or those with a flag that forbids it; "" where it is."""
+        is_static = self.a.coefficients.empty or self.b.coefficients.empty
+        if self.points.empty and not (is_static and self.tables):
+            return "nothing of the two can be compared."
+        flagged = self.points.filter(like="quality_").map(errors_in).astype(bool).any(axis=1)
+        bad = described(self.points[flagged])
+        count = f"{counted(len(bad), 'point')} with a flag that forbids trust:"
+        return "\n".join([count, listed(bad, between="\n")]) if bad else ""
 
 
 def difference_of(a: Side, b: Side) -> Difference:
@@ -191,8 +195,8 @@ def _judged(
     freedom = freedom.fillna(_MOST_FREEDOM).clip(1.0, _MOST_FREEDOM)  # without scatter there is nothing to count
     half = stdtrit(freedom, 0.5 + 0.5 * _LEVEL) * np.sqrt(variance)
     sure = stdtrit(freedom, 1 - 0.5 * (1 - _LEVEL) / max(number, 1)) * np.sqrt(variance)
-    columns: dict[str, Any] = {}
-    for side, frame in zip("ab", frames, strict=True):
+    columns = {}
+    for side, frame in zip("ab", frames):
         for end in _ENDS:
             columns[f"{name}_{side}{end}"] = frame[name + end]
     gap = columns[f"{name}_b"] - columns[f"{name}_a"]
@@ -220,7 +224,7 @@ def _pivots(a: Side, b: Side) -> pd.DataFrame:
         pair = [side[pad] for side in curves]
         low, high = max(curve["force_N"].min() for curve in pair), min(curve["force_N"].max() for curve in pair)
         force = np.linspace(low, high, _PIVOT_LOADS if low < high else 0)
-        for curve, tables in zip(pair, frames, strict=True):
+        for curve, tables in zip(pair, frames):
             scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve else 0.0
             columns = {TANGENT + end: np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS}
             columns["systematic"] = scale * columns[TANGENT]
@@ -255,7 +259,7 @@ def _shown(row: Mapping[Any, Any], name: str, scale: float) -> str:
     return with_interval(row[name], row[f"{name}_lo"], row[f"{name}_hi"], scale)
 
 
-def difference_sentences(difference: Difference) -> tuple[str, ...]:
+def difference_sentences(difference: Difference) -> Sequence[str]:
     """Say what changed from A to B, the answer first."""
     a, b, points = difference.a, difference.b, difference.points
     judged = points.filter(like="_changed").to_numpy()
@@ -267,11 +271,11 @@ def difference_sentences(difference: Difference) -> tuple[str, ...]:
             f"From {a.name} to {b.name} {yes} of {number} coefficients changed beyond what both intervals allow{most}."
         )
         unsure = f", of {number - yes - no} the records cannot tell" if number > yes + no else ""
-        statement = f"{no} coefficients are the same within {100 * _NO_CHANGE:g} %"
+        statement = f"{counted(no, 'coefficient')} the same within {100 * _NO_CHANGE:g} %"
         sentences.append(f"At {counted(len(points), 'common operating point')}: {statement}{unsure}.")
     elif not (a.coefficients.empty and b.coefficients.empty):
         sentences.append(f"{a.name} and {b.name} have no operating point in common.")
-    return (*sentences, *_sentences_beside(difference))
+    return led_by(difference.doubt, (*sentences, *_sentences_beside(difference)))
 
 
 def _largest_change(points: pd.DataFrame) -> str:

@@ -21,6 +21,7 @@ from model.predict import predict
 from model.prediction import Prediction
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import parse_toml
+from tpjb_ident.columns import amount
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
@@ -77,10 +78,7 @@ class ModelSettings:
 
 
 def predict_points(
-    bearing: Bearing,
-    points: Iterable[OperatingPoint],
-    settings: ModelSettings,
-    progress: Progress | None = None,
+    bearing: Bearing, points: Iterable[OperatingPoint], settings: ModelSettings, progress: Progress | None = None
 ) -> list[dict[str, Any]]:
     """Predict every operating point: rows of ``prediction.csv``, and whether a pivot is pressed beyond its dry test."""
     excited = list(map(_excited, points))
@@ -88,7 +86,7 @@ def predict_points(
     groups = defaultdict(list)
     for point in dict.fromkeys(excited):
         groups[replace(point, excitation=0.0)].append(point)
-    rows: dict[OperatingPoint, dict[str, Any]] = {}
+    rows = {}
     before = None
     for done, (static, group) in enumerate(sorted(groups.items()), start=1):
         prediction = predict(
@@ -108,7 +106,7 @@ def predict_points(
         for index, point in enumerate(group):
             rows[point] = _row(point, prediction, index)
         if progress is not None:
-            progress(f"{static.static_load / 1e3:g} kN", done, len(groups))
+            progress(amount(static.static_load, "load"), done, len(groups))
     return [rows[point] for point in excited]
 
 
@@ -119,13 +117,13 @@ def _excited(point: OperatingPoint) -> OperatingPoint:
 
 def point_columns(point: OperatingPoint) -> dict[str, float | str]:
     """Key columns of every table over operating points (outputs.md)."""
-    return dict(zip(POINT_KEY, _excited(point).key, strict=True))
+    return dict(zip(POINT_KEY, _excited(point).key))
 
 
 def _row(point: OperatingPoint, p: Prediction, index: int) -> dict[str, Any]:
     """Row of one point, of whose frequencies in a prediction it is the one of this index."""
     row = {**point_columns(point)}
-    row.update(zip(COEFFICIENT_COLUMNS, np.stack([p.k[index], p.c[index]]).ravel(), strict=True))
+    row.update(zip(COEFFICIENT_COLUMNS, np.stack([p.k[index], p.c[index]]).ravel()))
     row.update(x_m=p.position[0], y_m=p.position[1])
     for number in range(1, len(p.pad_load) + 1):
         row.update(_pad_columns(p, number))

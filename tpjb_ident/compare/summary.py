@@ -1,6 +1,7 @@
 """The comparison in words and in one small table: what is how far off, with which pivots."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from tpjb_ident.columns import amount, size, symbol
 from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.compare.effect_words import Estimate, finding
 from tpjb_ident.compare.predictions import printed_formula
-from tpjb_ident.rounding import percent, signed
+from tpjb_ident.conditions import led_by
+from tpjb_ident.rounding import deviation, signed
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 #: Direct coefficients, and their columns.
@@ -32,6 +34,8 @@ def _in_words(variant: Any) -> str:
 
 #: Median deviation of a direct coefficient from which a model is said to be off.
 _OFF = 0.05
+#: Ratios of predicted to measured beyond which the bearing may be another one.
+_FOREIGN = (0.5, 2.0)
 
 
 def agreements(table: pd.DataFrame) -> pd.DataFrame:
@@ -76,8 +80,9 @@ def is_off(agreement: pd.Series) -> bool:
     return bool((far & missed).any())
 
 
-def _medians(agreement: pd.Series) -> str:
-    return ", ".join(f"{name} {percent(value)}" for name, value in agreement["median"].items())
+def farthest(agreement: pd.Series) -> str:
+    """The direct coefficient that one model misses most, by its median."""
+    return agreement["median"].abs().idxmax()
 
 
 def _verdict_sentence(comparison: Comparison, best: pd.Series | None) -> str:
@@ -85,16 +90,22 @@ def _verdict_sentence(comparison: Comparison, best: pd.Series | None) -> str:
     campaign = comparison.campaign.id
     if best is None:
         return f"{campaign}: no coefficient could be compared; see the quality flags."
-    name, pivots = best["median"].abs().idxmax(), _in_words(best.name)
+    name, pivots = farthest(best), _in_words(best.name)
     median = best["median", name]
     if is_off(best):
         who = "No prediction agrees: the closest" if len(comparison.predictions) > 1 else "The prediction"
-        return f"{campaign}: {who}, with {pivots}, is off by {percent(median)} in {name} (median)."
+        size = deviation(median)
+        off = f"gives {size} the measured {name}" if "times" in size else f"is off by {size} in {name}"
+        sentence = f"{campaign}: {who}, with {pivots}, {off} (median)."
+        medians = best["median"].dropna()
+        if 2 * (1.0 + medians).between(*_FOREIGN).sum() < len(medians):
+            sentence += " Most coefficients are off by more than a factor of two: is this the bearing of the records?"
+        return sentence
     largest = best["worst"].abs().idxmax()
     return (
         f"{campaign}: prediction and measurement agree within {100 * abs(median):.1f} % (median) with {pivots}; the "
-        f"largest single deviation is {percent(best['worst', largest])} in {largest}, and {number_inside(best)} direct "
-        "coefficients are inside their interval."
+        f"largest single deviation is {deviation(best['worst', largest])} in {largest}, and {number_inside(best)} "
+        "direct coefficients are inside their interval."
     )
 
 
@@ -116,16 +127,14 @@ def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
     )
 
 
-def summary_sentences(comparison: Comparison) -> tuple[str, ...]:
+def summary_sentences(comparison: Comparison) -> Sequence[str]:
     """Say what the comparison found, the answer first."""
     agreement = agreements(comparison.table)
     best = closest(agreement)
     sentences = [_verdict_sentence(comparison, best), *_effects_sentences(comparison)]
-    if best is not None:
-        closest_words = f"The prediction comes closest with {_in_words(best.name)}: {_medians(best)}"
-        sentences.append(f"{closest_words} (median over {best['n'].max():.0f} points).")
-        agreement = agreement.drop(index=best.name)
-    sentences += [f"With {_in_words(name)}: {_medians(row)}." for name, row in agreement.iterrows()]
+    for name, row in agreement.iterrows() if best is not None else ():
+        medians = ", ".join(f"{coefficient} {deviation(value)}" for coefficient, value in row["median"].items())
+        sentences.append(f"With {_in_words(name)}: {medians} (median).")
     sentences += _pivot_sentence(comparison) + _extrapolation_sentence(comparison)
     sentences += _clearance_sentence(comparison)
     loci = comparison.loci
@@ -136,7 +145,7 @@ def summary_sentences(comparison: Comparison) -> tuple[str, ...]:
             distances.append(f"{amount(distance, 'length', '.2g')} with {name.replace('kirk', 'Kirk')} pivots")
         head = "The predicted shaft centre locus is off the measured one by (root mean square)"
         sentences.append(f"{head} {', '.join(distances)}.")
-    return (*sentences, *comparison.remarks)
+    return led_by(comparison.doubt, (*sentences, *comparison.remarks))
 
 
 def _pivot_sentence(comparison: Comparison) -> list[str]:
@@ -149,10 +158,10 @@ def _pivot_sentence(comparison: Comparison) -> list[str]:
         ratios.append((curve.stiffness(load) / formula(curve.pad, load)[1], curve.pad))
     (low, soft), (high, stiff) = min(ratios), max(ratios)
     load = 0.8 * comparison.curves[0].valid_to
-    return [
-        f"At {amount(load, 'load', '.3g')} the measured pivots have {100 * low:.0f} % (pad #{soft}) to "
-        f"{100 * high:.0f} % (pad #{stiff}) of the tangent stiffness by Kirk's formula."
-    ]
+    least, most = f"{100 * low:.0f} %", f"{100 * high:.0f} %"
+    reach = least if least == most else f"{least} (pad #{soft}) to {most} (pad #{stiff})"
+    stiffness = f"{reach} of the tangent stiffness by Kirk's formula"
+    return [f"At {amount(load, 'load', '.3g')} the measured pivots have {stiffness}."]
 
 
 def _extrapolation_sentence(comparison: Comparison) -> list[str]:

@@ -20,12 +20,7 @@ from tpjb_ident.compare.coefficient_table import (
     read_coefficients,
     read_rows,
 )
-from tpjb_ident.compare.comparison import (
-    VARIANTS,
-    CompareSettings,
-    Comparison,
-    possible_variants,
-)
+from tpjb_ident.compare.comparison import VARIANTS, CompareSettings, Comparison, possible_variants
 from tpjb_ident.compare.predictions import ModelSettings, Progress, predict_points
 from tpjb_ident.conditions import KINDS, Condition
 from tpjb_ident.errors import BadInputError

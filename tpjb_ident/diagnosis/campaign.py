@@ -14,6 +14,7 @@ from model.setup import Setup
 from tpjb_ident.compare.comparison import ComparisonError
 from tpjb_ident.compare.predictions import measured_laws
 from tpjb_ident.compare.static_tests import measure_static
+from tpjb_ident.conditions import led_by
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, diagnose, median_deviations
 from tpjb_ident.diagnosis.forward.forward import SENSOR
@@ -56,6 +57,7 @@ class Baseline:
 class CampaignDiagnosis(Presented):
     """A diagnosis with what it was made from."""
 
+    name: str  #: of the campaign, or of the table
     diagnosis: Diagnosis
     identification: Identification | None
     setup: Setup
@@ -64,13 +66,17 @@ class CampaignDiagnosis(Presented):
         """K and C measured, predicted before, and predicted with the effects found: columns as comparison.csv."""
         return before_and_after(self.diagnosis, self.identification)
 
+    @property
+    def doubt(self) -> str:
+        """Why it is not to be trusted; "" where it is."""
+        return "" if self.identification is None else self.identification.doubt
+
     def summary(self) -> str:
         """What was found, and what it rests on."""
         from tpjb_ident.report.diagnosis_page import verdict_sentences
 
-        name = self.identification.campaign if self.identification is not None else "table"
         off = median_deviations(self.to_dataframe())
-        return "\n".join(verdict_sentences(name, self.diagnosis.verdict, off))
+        return "\n".join(led_by(self.doubt, verdict_sentences(self.name, self.diagnosis.verdict, off)))
 
     def plot(self, **options: Any) -> Any:
         """Draw the gap by observable, before and after; see `tpjb_ident.report.plots.gap`."""
@@ -137,7 +143,7 @@ def diagnose_campaign(
         replace(observations, layout=layout), setup, settings,
         lambda text, share: report(f"diagnosing, {text}", 30 + int(70 * share), 100),
     )  # fmt: skip
-    return CampaignDiagnosis(result, identification, setup)
+    return CampaignDiagnosis(campaign.id, result, identification, setup)
 
 
 def _before(bearing: Bearing, baseline: Baseline, laws: tuple[PivotLaw, ...] | None, instruments: Instruments) -> Setup:
@@ -183,7 +189,7 @@ def diagnose_table(
     bearing = as_it_turns(bearing, {rotation_of(test.speed) for test in observations.layout.dynamic})
     setup = _before(bearing, baseline, None, Instruments())
     result = diagnose(observations, setup, settings, lambda text, share: report(text, int(100 * share), 100))
-    return CampaignDiagnosis(result, None, setup)
+    return CampaignDiagnosis(path.stem, result, None, setup)
 
 
 def unknown_centre(locus: Locus) -> float:

@@ -60,7 +60,7 @@ class CampaignPlan:
     @property
     def below_floor(self) -> tuple[str, ...]:
         """Effects that this campaign would not see at their typical size."""
-        return tuple(c.label for c, d in zip(self.candidates, self.detectable, strict=True) if d < Deciding.visible)
+        return tuple(c.label for c, d in zip(self.candidates, self.detectable) if d < Deciding.visible)
 
     def matrix(self) -> pd.DataFrame:
         """Isolability matrix: row A at d' = 6 against everything that column B can imitate, in standard deviations."""
@@ -87,7 +87,7 @@ class CampaignPlan:
 
         rows = []
         for i, c in enumerate(self.candidates):
-            distances = zip(self.candidates, self.separation[i], strict=True)
+            distances = zip(self.candidates, self.separation[i])
             like = [candidate.label for candidate, distance in distances if distance < Deciding.visible]
             end, (low,), (high,) = c.neutral + self.floor[i], *c.limits
             rows.append(
@@ -170,7 +170,7 @@ def data_sets(setup: Setup, layout: Layout) -> tuple[pd.DataFrame, dict[str, Cam
     rows, plans = [], {}
     count = len(shown.candidates)
     for name, mask in masks.items():
-        row: dict[str, object] = {"data_set": name, "numbers": int(mask.sum())}
+        row = {"data_set": name, "numbers": int(mask.sum())}
         for words, free in (("known", False), ("free", True)):
             part = plans[name] = shown.by(mask, free)
             row[f"detectable_nuisances_{words}"] = count - len(part.below_floor)

@@ -170,10 +170,7 @@ def step(sums: Sums, shared: Prior, by_point: Prior) -> Step:
     joint = inverse @ score, inverse
     is_learnt = by_point.estimated(_variances(A_inverse, K, inverse)[:, k:])
     # what is considered is held at its mean; what it would move is kept apart
-    moves, moves_shared = (
-        A[:, :, k:] * ~is_learnt[:, None, :],
-        adjoint(sums.E[:, k:] * ~is_learnt[:, :, None]),
-    )
+    moves, moves_shared = (A[:, :, k:] * ~is_learnt[:, None, :], adjoint(sums.E[:, k:] * ~is_learnt[:, :, None]))
     held = _HELD * A[:, last, last] * ~is_learnt
     A[:, last, last] += held
     g[:, k:] += held * by_point.distance

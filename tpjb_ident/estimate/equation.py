@@ -354,7 +354,7 @@ def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
     channels = dict(campaign.channels)
     for run in campaign.of_kind("dynamic"):
         channels = dict(run.channels) | channels
-    sensors: list[Sensor] = []
+    sensors = []
     for quantity in VECTOR_QUANTITIES:
         alike = [channel for channel in channels.values() if channel.quantity == quantity and channel.axis is not None]
         unstated = _USUAL_GAIN if len(alike) > 2 else None

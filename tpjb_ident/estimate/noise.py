@@ -4,6 +4,7 @@ A random effect is one pattern c of the readings with a random size of variance 
 run's own mean load, a miss of the load where its effect is not known, and the scatter of the force from run to run.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from typing import Literal
 
@@ -104,10 +105,10 @@ def slopes_over_load(points: Sequence[OperatingPoint], h: ComplexArray) -> tuple
     """
     slope = UNKNOWN_EXPONENT * np.nan_to_num(h)
     known = np.zeros(len(points), dtype=bool)
-    families: dict[tuple[object, ...], list[int]] = {}
+    families = defaultdict(list)
     for i, p in enumerate(points):
         if p.static_load > 0 and np.isfinite(h[i]).all():
-            families.setdefault(p.key[1:], []).append(i)
+            families[p.key[1:]].append(i)
     for members in families.values():
         members.sort(key=lambda i: points[i].static_load)
         log_load = np.log([points[i].static_load for i in members])

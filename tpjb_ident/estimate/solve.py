@@ -159,12 +159,7 @@ class Solver:
     """Gauss-Newton over all blocks, from a start of H; points share its numbers as the shape says."""
 
     def __init__(
-        self,
-        rig: Rig,
-        blocks: Blocks,
-        terms: Sequence[Term],
-        start: ComplexArray,
-        shape: Shape | None = None,
+        self, rig: Rig, blocks: Blocks, terms: Sequence[Term], start: ComplexArray, shape: Shape | None = None
     ) -> None:
         self.rig, self.blocks = rig, blocks
         self.shape = shape or Shape(np.arange(len(blocks.points)))

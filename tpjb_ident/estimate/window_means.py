@@ -62,12 +62,7 @@ class WindowMeans:
 
 
 def window_means(
-    z: ComplexArray,
-    run: IntArray,
-    time: FloatArray,
-    readings: Readings,
-    weights: FloatArray,
-    present: BoolArray,
+    z: ComplexArray, run: IntArray, time: FloatArray, readings: Readings, weights: FloatArray, present: BoolArray
 ) -> WindowMeans | None:
     """Means of a point's windows; None where no window has a phasor of every channel that its run has.
 
@@ -109,12 +104,7 @@ def window_means(
 
 
 def _pooled(
-    z: ComplexArray,
-    run: IntArray,
-    time: FloatArray,
-    readings: Readings,
-    weights: FloatArray,
-    present: BoolArray,
+    z: ComplexArray, run: IntArray, time: FloatArray, readings: Readings, weights: FloatArray, present: BoolArray
 ) -> WindowMeans:
     """Weighted mean and slope of every run, and the covariance of a window about them."""
     g = len(present)

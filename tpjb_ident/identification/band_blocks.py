@@ -14,14 +14,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.bands.film_products import film_products
-from tpjb_ident.bands.responses import (
-    BandPoint,
-    ClassicLine,
-    classic_line,
-    line_response,
-    one_phase_set,
-    pooled_noise,
-)
+from tpjb_ident.bands.responses import BandPoint, ClassicLine, classic_line, line_response, one_phase_set, pooled_noise
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.arrowhead import MODELS, Shape, complex_matrix, least_squares, power_columns, real_numbers
 from tpjb_ident.estimate.equation import Blocks, Rig, Sensor, adjoint, alive, film_force, stacked, vector
@@ -64,12 +57,7 @@ class BandBlocks:
         return self.blocks.band
 
 
-def band_blocks(
-    points: Sequence[BandPoint],
-    rig: Rig,
-    loads: StaticLoads,
-    clearance: float | None,
-) -> BandBlocks:
+def band_blocks(points: Sequence[BandPoint], rig: Rig, loads: StaticLoads, clearance: float | None) -> BandBlocks:
     """Responses of all runs."""
     rows = []
     calibrations: list[dict[Hashable, int]] = [{} for _ in rig.channels]

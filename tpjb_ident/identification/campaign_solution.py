@@ -20,16 +20,7 @@ from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.campaign import Campaign
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.estimate.arrowhead import complex_matrix
-from tpjb_ident.estimate.equation import (
-    Blocks,
-    Rig,
-    axes_of,
-    film_force,
-    mounted,
-    sensors_of,
-    stacked,
-    vector,
-)
+from tpjb_ident.estimate.equation import Blocks, Rig, axes_of, film_force, mounted, sensors_of, stacked, vector
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.identification.point_means import PointMeans, point_means
@@ -38,14 +29,7 @@ from tpjb_ident.runs.point_data import PointData, RunDigest
 from tpjb_ident.runs.static_load import StaticLoads, missed_load, static_loads
 from tpjb_ident.runtime.executors import Workers
 from tpjb_ident.terms.clock import START, Clock
-from tpjb_ident.terms.mains import (
-    MAINS_ON_LINE,
-    MainsFit,
-    fit_mains,
-    force_pickup,
-    force_pickup_spread,
-    mains_pickup,
-)
+from tpjb_ident.terms.mains import MAINS_ON_LINE, MainsFit, fit_mains, force_pickup, force_pickup_spread, mains_pickup
 from tpjb_ident.terms.registry import solve, solved_as_learnt
 
 if TYPE_CHECKING:
@@ -162,10 +146,7 @@ def unstated(campaign: Campaign) -> Conditions:
 
 
 def campaign_blocks(
-    points: Sequence[PointData],
-    means: Sequence[PointMeans],
-    misses: Sequence[ComplexArray],
-    bent: FloatArray,
+    points: Sequence[PointData], means: Sequence[PointMeans], misses: Sequence[ComplexArray], bent: FloatArray
 ) -> Blocks:
     """Stack the runs of all points; `bent` (P,)."""
     noises, freedoms = _pooled_noise(means, [data.runs[0].length for data in points])
@@ -284,11 +265,7 @@ class CampaignSolution:
 
 
 def solve_campaign(
-    campaign: Campaign,
-    points: Sequence[PointData],
-    digests: Sequence[RunDigest],
-    workers: Workers,
-    rig: Rig,
+    campaign: Campaign, points: Sequence[PointData], digests: Sequence[RunDigest], workers: Workers, rig: Rig
 ) -> CampaignSolution:
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
     loads = static_loads(campaign, points)

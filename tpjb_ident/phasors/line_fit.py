@@ -117,12 +117,7 @@ class LineFitter:
     """Joint fit of lines and a slow drift to windows of the same columns: one pseudo-inverse for all of them."""
 
     def __init__(
-        self,
-        length: int,
-        rate: float,
-        frequencies: FloatArray,
-        drift_order: int = 1,
-        time: FloatArray | None = None,
+        self, length: int, rate: float, frequencies: FloatArray, drift_order: int = 1, time: FloatArray | None = None
     ) -> None:
         self.length, self.rate = length, rate
         self.frequencies = np.asarray(frequencies, dtype=float)

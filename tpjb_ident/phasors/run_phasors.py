@@ -18,7 +18,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.problem import refuse
 from rigdata.run import Run
-from tpjb_ident.conditions import Conditions, merged
+from tpjb_ident.conditions import merged
 from tpjb_ident.phasors.compensation import compensated, filled_channels, unstated_filters
 from tpjb_ident.phasors.frequency import DRIFT, ShaftCourse, device_rates, retuned, shaft_speed, tuned
 from tpjb_ident.phasors.line_fit import SCALE_LIMIT, LineFitter, WindowFit, usual_scale
@@ -249,7 +249,7 @@ def run_phasors(run: Run, settings: PhasorSettings | None = None) -> RunPhasors:
     device = tuple(
         f"{slower[c.name].rate:.4g} Hz" if c.name in slower else d for c, d in zip(result.channels, result.device)
     )
-    unstated: list[Conditions] = []
+    unstated = []
     for record in () if slower else fit.records:  # images are no noise
         channels, band = [result.channels[k] for k in record.places], (0.0, max(result.lines.driven))
         unstated.append(unstated_filters(channels, record.spectrum, record.duration, band))

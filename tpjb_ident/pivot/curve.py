@@ -275,7 +275,7 @@ class PivotCurve(Presented):
         """Values (n,) of the leading law, and their covariance (n, n) by all laws about it."""
         leading, _ = quantity(self.law)
         covariance = np.zeros((len(leading), len(leading)))
-        for fit, weight in zip(self.fits, self.weights, strict=True):
+        for fit, weight in zip(self.fits, self.weights):
             value, gradient = quantity(fit)
             difference = value - leading
             covariance += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))

@@ -15,6 +15,7 @@ from rigdata.calibration import Channel
 from rigdata.campaign import Run
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
+from tpjb_ident.columns import amount
 from tpjb_ident.estimate.statistics import student_widening
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import good_samples, level_error, live_run, slow_samples, spare_slopes
@@ -179,7 +180,8 @@ def with_load_zero(records: Sequence[DryRecord]) -> list[DryRecord]:
         spread = np.linalg.inv(x.T @ x / variance + np.diag(1.0 / stated**2 if stated.all() else np.zeros(2)))
         middle, se = spread @ (x.T @ y) / variance, math.sqrt(np.trace(spread))
         if (size := np.hypot(*middle)) > max(_CLEAR * se, _NOTABLE * np.max(load)):
-            text = f"the lines along which all pads' loads grow meet at {size:.0f} N (se {se:.0f} N); it was taken off"
+            place, error = amount(float(size), "force", ".0f"), amount(se, "force", ".0f")
+            text = f"the lines along which all pads' loads grow meet at {place} (se {error}); it was taken off"
         if text or stated.all():
             zero, covariance = middle, spread
     return [_less_zero(record, zero, covariance, text) for record in records]

@@ -13,6 +13,7 @@ from scipy import special
 from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign, Run
 from rigdata.problem import Problem, RigDataError, refuse
+from tpjb_ident.columns import amount
 from tpjb_ident.conditions import Conditions, holding
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import refused_runs
@@ -39,12 +40,7 @@ from tpjb_ident.pivot.law_fit import (
 )
 from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.readings import fit_data, with_friction, with_shared_errors
-from tpjb_ident.pivot.refusals import (
-    DISPLACEMENT_LIMIT,
-    refused_records,
-    structure_behind,
-    usable_runs,
-)
+from tpjb_ident.pivot.refusals import DISPLACEMENT_LIMIT, refused_records, structure_behind, usable_runs
 from tpjb_ident.pivot.sweep_witness import SweepWitness, as_witnessed, sweep_witness
 
 CONTACT_TOLERANCE = 0.05  # of the compliance: what incomplete contact may add where contact counts as complete
@@ -137,7 +133,7 @@ def _fit_pads(pads: Sequence[Sequence[DryRecord]], structure: str) -> list[Pivot
         fits.append([fit_law(law, contact, pad_data) for law, contact in variants])
     fits = with_shared_shape(fits, posterior_weights(fits), data)
     curves = []
-    for records, candidates, weights in zip(pads, fits, posterior_weights(fits), strict=True):
+    for records, candidates, weights in zip(pads, fits, posterior_weights(fits)):
         curve = assemble_curve(records, keep_likely(candidates, weights), noise, structure)
         text = f"tests of one pad differ by {100 * scatter:.0f} % in deflection over load"
         differing = holding((scatter > _TOO_MUCH and len(records) > 1, "runs-disagree", text))
@@ -199,7 +195,7 @@ def _slips(records: Sequence[DryRecord], law: LawFit) -> str:
     for before, after in itertools.pairwise(records):
         if before.run.id == after.run.id:
             size, load = _zero(after, law) - _zero(before, law), after.used.load[0]
-            slips.append(f"by {1e6 * size:+.2g} um at {load:.0f} N of {after.run.id}")
+            slips.append(f"by {amount(size, 'length', '+.2g')} at {amount(load, 'force', '.0f')} of {after.run.id}")
     return ", ".join(slips)
 
 
@@ -219,7 +215,7 @@ def _steps(records: Sequence[DryRecord], law: LawFit, noise: NoiseModel) -> Pivo
         aside = share @ blocks.across - blocks.across[0]
         weight = 1.0 - (members & ~record.good).any(axis=1)
         parts.append((load, deflection, error, share @ blocks.across_load, aside, branch, weight))
-    return PivotSteps(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return PivotSteps(*(np.concatenate(column) for column in zip(*parts)))
 
 
 def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
@@ -237,7 +233,7 @@ def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> 
     law, onset, bad = curve.law, curve.onset_load, np.sum(curve.steps.weight == 0.0)
     aside = abs(curve.displacement_direction.angle) > 0.5 * DISPLACEMENT_LIMIT
     shares: dict[str, float] = defaultdict(float)
-    for fit, weight in zip(curve.fits, curve.weights, strict=True):
+    for fit, weight in zip(curve.fits, curve.weights):
         shares[fit.name] += weight
     listed = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
     slipped = _slips(records, law)
@@ -250,7 +246,7 @@ def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> 
         (abs(curve.load_direction.angle) > _ANGLE_WARNING, "load-off-pad", str(curve.load_direction)),
         (structure, "structure-gives", structure),
         (aside and not structure, "moves-aside", f"the shaft goes {curve.displacement_direction}"),
-        (onset > 0.0, "contact-incomplete", f"the shaft is not fully in contact below {onset:.0f} N"),
+        (onset > 0.0, "contact-incomplete", f"the shaft is not fully in contact below {amount(onset, 'force', '.0f')}"),
         (onset >= np.max(curve.steps.load), "contact-never-complete", ""),
         (shares[law.name] < _CLEAR_CHOICE, "law-undecided", listed),
         (records[0].untared, "cells-not-tared", records[0].untared),

@@ -189,7 +189,7 @@ def witness_of(run: Run, angles: FloatArray) -> SweepWitness:
     """What a live sweep past pads at `angles` (n,) [rad] tells."""
     load, place = _good_vectors(run)
     circle = push_circle(load) if len(load) > len(angles) else None
-    errors: dict[str, complex] = {}
+    errors = {}
     channels, conditions = {}, []
     for quantity, (evidence, of_gain, of_axis) in _EVIDENCE.items():
         pair = [channel for channel in axial_channels(run).values() if channel.quantity == quantity]

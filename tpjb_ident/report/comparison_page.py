@@ -13,7 +13,7 @@ from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.columns import amount, size, symbol
 from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.compare.predictions import printed_formula
-from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
+from tpjb_ident.compare.summary import agreements, closest, farthest, number_inside, summary_sentences
 from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.tables import Formula
@@ -32,7 +32,7 @@ from tpjb_ident.report.sections import (
     values_table,
 )
 from tpjb_ident.results.identification import Identification
-from tpjb_ident.rounding import fixed, percent, signed, with_interval
+from tpjb_ident.rounding import deviation, fixed, signed, with_interval
 from tpjb_ident.schema import DAMPING, KINDS, STIFFNESS, coefficient_column
 
 
@@ -75,7 +75,7 @@ def write_report(
     """
     frame = comparison.table
     points, flagged = comparison.identification.points, _flagged(comparison)
-    campaign = comparison.campaign
+    campaign, best = comparison.campaign, closest(agreements(frame))
     page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
         subtitle=campaign.description,
@@ -84,7 +84,7 @@ def write_report(
         key_table=deviations_table(frame),
         values=values_table(points),
         flags=flags_line([[flag for _, flag in flagged]], len(points)),
-        lead="kyy-over-",
+        lead="kyy" if best is None else farthest(best),
         then=then,
         sections=_sections(comparison, frame, flagged),
         settings=settings or {"campaign": campaign.id, **vars(comparison.settings)},
@@ -97,7 +97,8 @@ def deviations_table(table: pd.DataFrame) -> Table:
     """How far predictions of a table of comparison.csv are off, by pivot model."""
     rows = []
     for name, agreement in agreements(table).iterrows():
-        cells = [f"{percent(median)} ({percent(agreement['worst', k])})" for k, median in agreement["median"].items()]
+        medians = agreement["median"].items()
+        cells = [f"{deviation(median)} ({deviation(agreement['worst', k])})" for k, median in medians]
         rows.append([MODEL_LABELS.get(str(name), str(name)), *cells, number_inside(agreement)])
     return Table(
         "Predicted / measured - 1: median (largest); inside: predictions within the measured 95 % interval",
@@ -108,7 +109,7 @@ def deviations_table(table: pd.DataFrame) -> Table:
 
 def _sections(comparison: Comparison, frame: pd.DataFrame, flagged: Sequence[tuple[str, Condition]]) -> list[Section]:
     campaign: Any = comparison.campaign
-    evidence: list[Section] = []
+    evidence = []
     tables = [measured_table(comparison.identification)]
     if comparison.has_records:
         evidence.append(evidence_section(campaign, comparison.identification))
@@ -169,7 +170,7 @@ def _predicted_table(frame: pd.DataFrame) -> Table:
     for name in DIRECT:
         kind, column = KINDS[name[0]], coefficient_column(name)
         cells[f"{name}, {kind.display_unit}"] = (ordered[f"{column}_predicted"] / kind.display_scale).map(fixed)
-        cells[f"{name} off by"] = (ordered[f"{column}_ratio"] - 1.0).map(percent)
+        cells[f"{name} off by"] = (ordered[f"{column}_ratio"] - 1.0).map(deviation)
     extrapolated = ordered["pivot_extrapolated"].astype(bool)
     cells["remark"] = ordered["status"].mask(extrapolated, "beyond the measured pivot load")
     return table_of("Predicted", cells)
@@ -183,7 +184,7 @@ def _flag_table(flagged: Sequence[tuple[str, Condition]]) -> Table:
         places[flag].append((place, flag.detail))
     rows = []
     for flag, occurrences in places.items():
-        points, details = zip(*occurrences, strict=True)
+        points, details = zip(*occurrences)
         rows.append([flag, flag.meaning, "; ".join(points), "; ".join(filter(None, dict.fromkeys(details)))])
     return Table("Flags", columns, rows)
 
@@ -192,7 +193,7 @@ def _flagged(comparison: Comparison) -> list[tuple[str, Condition]]:
     """Every flag of points, pivot curves, polygon and locus, and where it stands."""
     identified = comparison.identification
     labels = point_labels(points_table(identified.points))
-    parts = [(place, p.quality) for place, p in zip(labels, identified.points, strict=True)]
+    parts = [(place, p.quality) for place, p in zip(labels, identified.points)]
     parts.append(("campaign", identified.conditions))
     parts += [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
     tests = {"clearance": comparison.clearance, "locus": comparison.locus}
@@ -211,7 +212,7 @@ def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None)
     for load in (0.5 * full, full):
         columns.append(f"at {amount(load, 'load', '.4g')}, {symbol('stiffness')}")
         columns += [] if formula is None else ["of Kirk's tangent"]
-        for curve, row in zip(curves, rows, strict=True):
+        for curve, row in zip(curves, rows):
             value = float(curve.stiffness(load))
             low, high = (float(end) for end in curve.stiffness_band(load))
             remark = " (extrapolated)" if curve.is_extrapolated(load) else ""
@@ -227,7 +228,7 @@ def clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
     digits = 2 if unit < 1e-5 else 4
     halves = 1.96 * polygon.clearance_error
     rows = []
-    for k, (drawing, value, half) in enumerate(zip(drawn, polygon.clearance, halves, strict=True)):
+    for k, (drawing, value, half) in enumerate(zip(drawn, polygon.clearance, halves)):
         measured = with_interval(value, value - half, value + half, unit)
         difference = signed((value - drawing) / unit, digits)
         pushed = fixed(polygon.clearance_pushed[k] / unit, digits)

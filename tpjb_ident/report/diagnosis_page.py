@@ -15,7 +15,7 @@ from tpjb_ident.columns import size, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.effect_words import Estimate, amount, finding, label_in_words, shown_unit, words_of
 from tpjb_ident.diagnosis.campaign import CampaignDiagnosis
-from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
+from tpjb_ident.diagnosis.diagnose import before_and_after
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap_at
@@ -25,7 +25,7 @@ from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.page import Page, Section, Table, plain_templates, write_page
 from tpjb_ident.report.plots.residuals import gap, residual_frame, residual_map, residual_series
 from tpjb_ident.report.sections import coefficient_sections, flags_line, tested_facts, values_table
-from tpjb_ident.rounding import MINUS, fixed, percent, signed, significant
+from tpjb_ident.rounding import MINUS, deviation, fixed, signed, significant
 
 #: Parameters that number what there are several of.
 _PLACES = ("pad", "probe", "cell")
@@ -77,12 +77,12 @@ def _templates() -> jinja2.Environment:
     """Sentences as templates, with what makes words of a diagnosis' values."""
     environment = plain_templates()
     environment.filters |= {
+        "deviation": deviation,
         "findings": _findings,
         "fitted": _fitted,
         "in_words": in_words,
         "label": label_in_words,
         "observable": observable,
-        "percent": percent,
         "place": place,
     }
     return environment
@@ -168,10 +168,7 @@ _SERIES = (
 
 
 def write_diagnosis_report(
-    folder: Path,
-    campaign: Campaign | TableSource,
-    result: CampaignDiagnosis,
-    origin: Mapping[str, Any],
+    folder: Path, campaign: Campaign | TableSource, result: CampaignDiagnosis, origin: Mapping[str, Any]
 ) -> None:
     """Write report.html and its figures into an existing folder."""
     verdict = result.diagnosis.verdict
@@ -182,7 +179,7 @@ def write_diagnosis_report(
     page = Page(
         title=f"{campaign.id}: what the model lacks",
         subtitle=campaign.description,
-        sentences=verdict_sentences(campaign.id, verdict, median_deviations(table)),
+        sentences=result.summary().splitlines(),
         facts=tested_facts(campaign, result.setup.bearing, points),
         values=values_table(points),
         flags=flags_line([p.quality for p in points], len(points)),

@@ -21,7 +21,7 @@ from rigdata.run import Run
 from rigdata.survey.spectrum import Spectrum
 from tpjb_ident.clearance.locus import Locus
 from tpjb_ident.clearance.measure import ClearancePolygon
-from tpjb_ident.columns import amount, channel_unit, degrees, place_of, size, spinning, symbol
+from tpjb_ident.columns import amount, channel_unit, degrees, size, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.comparison import Comparison
 from tpjb_ident.conditions import SEVERITIES, Condition, untrusted
@@ -70,7 +70,7 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
         return facts | {"Source": campaign.description}
     counts = Counter(KINDS_IN_WORDS.get(run.kind, run.kind) for run in campaign.runs)
     kinds = ", ".join(f"{count} {kind}" for kind, count in counts.items())
-    measured = ", ".join(filter(None, (campaign.date, campaign.by))) or "date and by are not stated"
+    measured = ", ".join(filter(None, (campaign.date, campaign.by))) or "when and by whom is not stated"
     return facts | {"Runs": f"{len(campaign.runs)} ({kinds})", "Measured": measured}
 
 
@@ -98,11 +98,10 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
         return None
     p = solved[len(solved) // 2]
     cells, point = p.stiffness.cells(), p.point
-    rows = list(zip(ENTRIES, cells[:4], cells[4:], strict=True))
+    rows = list(zip(ENTRIES, cells[:4], cells[4:]))
     columns = ["", f"K, {STIFFNESS.display_unit}", f"C, {DAMPING.display_unit}"]
-    place = place_of(point.static_load, point.excitation_hz)
     shaft = spinning(point.shaft_speed_hz, point.rotation)
-    return Table(f"Measured at {place}, shaft at {shaft}; 95 % intervals", columns, rows)
+    return Table(f"Measured at {p.place}, shaft at {shaft}; 95 % intervals", columns, rows)
 
 
 def interval_cells(frame: pd.DataFrame, column: str, scale: float) -> list[str]:
@@ -125,11 +124,15 @@ def flags_line(flags: Iterable[Iterable[Condition]], points: int) -> str:
     """The flags of a result with how often each is there, gravest first; "" where it has no points."""
     counts = Counter(itertools.chain(*flags))
     gravest_first = sorted(counts, key=lambda flag: SEVERITIES.index(flag.severity))
-    texts = [f"{flag} ({counts[flag]})" if counts[flag] > 1 else flag for flag in gravest_first]
-    bad = sum(counts[flag] for flag in untrusted(counts))
-    head = f"{counted(bad, 'flag')} against trust" if bad else "Flags, none of which forbids trust"
+    texts = {flag: f"{flag} ({counts[flag]})" if counts[flag] > 1 else flag for flag in gravest_first}
+    serious = untrusted(gravest_first)
+    number = counted(sum(counts[flag] for flag in serious), "flag")
+    against = ", ".join(map(texts.pop, serious))
+    others = ", ".join(texts.values())
+    if serious:
+        return f"{number} against trust: {against}{others and '; others: '}{others}."
     none = f"No flags on {counted(points, 'point')}." if points else ""
-    return f"{head}: {', '.join(texts)}." if texts else none
+    return f"Flags, none of which forbids trust: {others}." if others else none
 
 
 def set_up_section(comparison: Comparison) -> Section:
@@ -212,7 +215,7 @@ def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
     point = result.points[len(result.points) // 2]
     for run in map(campaign.run, point.runs):
         try:
-            label = f"run {run.id}, {place_of(point.point.static_load, point.point.excitation_hz)}"
+            label = f"run {run.id}, {point.place}"
             return [
                 Panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
                       orbit(run)),
@@ -231,9 +234,9 @@ def budget_table(result: Identification) -> Table:
     for p in result.points:
         sources.update(p.budget)
     rows = []
-    for place, p in zip(point_labels(points_table(result.points)), result.points, strict=True):
+    for place, p in zip(point_labels(points_table(result.points)), result.points):
         deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}
-        for i, (value, half) in enumerate(zip(p.stiffness.cells(), p.stiffness.half_width(), strict=True)):
+        for i, (value, half) in enumerate(zip(p.stiffness.cells(), p.stiffness.half_width())):
             kind, factor = (STIFFNESS, 1.0) if i < 4 else (DAMPING, p.stiffness.omega)
             scale = kind.display_scale * factor
             digits = 2 - math.floor(math.log10(half / scale)) if 0.0 < half < math.inf else 3
@@ -299,7 +302,7 @@ def quick_look(series: Sequence[Series], spectra: Mapping[str, Spectrum]) -> Fig
     """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
     series = series[:_MOST]
     figure, grid = new_pictures(len(series), 2, width=_WIDTH, height=_ROW)
-    for (over_time, spectrum), channel in zip(grid, series, strict=True):
+    for (over_time, spectrum), channel in zip(grid, series):
         label(over_time, "time, s", printable(", ".join(filter(None, (channel.name, channel.unit)))))
         label(spectrum, "frequency, Hz", "")
         time = np.arange(len(channel), dtype=float) if channel.time is None else channel.time

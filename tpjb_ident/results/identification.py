@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -10,14 +13,14 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.columns import amount, place_of
-from tpjb_ident.conditions import Conditions, sentences
+from tpjb_ident.columns import amount
+from tpjb_ident.conditions import Conditions, sentences, untrusted
 from tpjb_ident.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.presentation import Presented
 from tpjb_ident.results.frequency_model import MODEL_COLUMNS, FrequencyModel, StaticFits, fits_over_frequency
 from tpjb_ident.results.point_result import PointResult, quality_cell
-from tpjb_ident.rounding import counted
+from tpjb_ident.rounding import counted, listed
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY, with_endings
 
 if TYPE_CHECKING:
@@ -147,20 +150,40 @@ class Identification(Presented):
             rows += [common | fit.columns() for fit in group.fits.values()]
         return pd.DataFrame(rows, columns=[*STATIC_KEY, "model", "supported", *MODEL_COLUMNS])
 
+    @functools.cached_property
+    def places(self) -> list[tuple[str, Conditions, bool]]:
+        """Operating points, and bands without one: in words, their conditions, and whether there is an answer."""
+        places = [(p.place, p.quality, math.isfinite(abs(p.stiffness.h.sum()))) for p in self.points]
+        for band in self.bands:
+            if not band.points:
+                place = f"{amount(band.point.static_load, 'load')}, {band.kind}"
+                places.append((place, band.quality, bool(band.lines)))
+        return places
+
     def remarks(self) -> tuple[str, ...]:
         """What somebody should read beside the numbers: each condition once, with the places where it was found."""
-        remarks = [condition.sentence() for condition in self.conditions]
-        places: dict[str, list[str]] = {}
-        flagged = [(place_of(p.point.static_load, p.point.excitation_hz), p.quality) for p in self.points]
-        for band in self.bands:
-            flagged += [] if band.points else [(f"{amount(band.point.static_load, 'load')}, {band.kind}", band.quality)]
-        for place, quality in flagged:
+        remarks = [*sentences(self.conditions)]
+        findings = defaultdict(list)
+        for place, quality, _ in self.places:
             for condition in quality:
-                places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
-        for name, listed in places.items():
-            addition = f" (and at {counted(len(listed) - 1, 'more point')})" if listed[1:] else ""
-            remarks.append(f"{name} at {listed[0]}{addition}")
+                findings[condition].append(f"{place}: {condition.detail or 'found'}")
+        for name, (first, *more) in findings.items():
+            addition = f" (and at {counted(len(more), 'more point')})" if more else ""
+            remarks.append(f"{name} at {first}{addition}")
         return tuple(remarks)
+
+    @property
+    def doubt(self) -> str:
+        """Why it is not to be trusted: how many points and their flags, then place by place; "" where it is."""
+        lost, bad = sentences(untrusted(self.conditions)), []
+        flags: list[str] = []
+        for place, quality, has_answer in self.places:
+            serious = untrusted(quality)
+            if serious or not has_answer:
+                flags += serious or ["no answer"]
+                bad.append(f"{place}: {'; '.join(sentences(serious)) or 'no answer'}")
+        count = f"{len(bad)} of {counted(len(self.places), 'point')} ({', '.join(dict.fromkeys(flags))}):"
+        return "\n".join([count, *lost, listed(bad, between="\n")]) if bad else "; ".join(lost)
 
 
 def point_columns(p: PointResult) -> dict[str, object]:

@@ -1,5 +1,6 @@
 """What a campaign says about one operating point, and the figures and flags that say how far it can be trusted."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,7 +11,7 @@ from scipy.special import bdtrc
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.vector import directions
-from tpjb_ident.columns import place_of
+from tpjb_ident.columns import amount, place_of
 from tpjb_ident.conditions import Conditions, holding, merged
 from tpjb_ident.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.estimators.stiffness import DynamicStiffness
@@ -95,10 +96,14 @@ class PointResult:
     budget: dict[str, FloatArray] = field(default_factory=dict)
     scattering: tuple[str, ...] = ("random", "load miss", "load direction", "mains")
 
+    @property
+    def place(self) -> str:
+        """Load and excitation in words."""
+        return place_of(self.point.static_load, self.point.excitation_hz)
+
     def __str__(self) -> str:
         flags = f" ({', '.join(str(q) for q in self.quality)})" if self.quality else ""
-        place = place_of(self.point.static_load, self.point.excitation_hz)
-        return f"{place}: {self.stiffness.direct_coefficients()}{flags}"
+        return f"{self.place}: {self.stiffness.direct_coefficients()}{flags}"
 
     def __repr__(self) -> str:
         return f"<PointResult: {self}>"
@@ -106,10 +111,10 @@ class PointResult:
 
 def by_static_point(points: Sequence[PointResult]) -> list[list[int]]:
     """Places of the points that have a stiffness, those of one load and speed together."""
-    groups: dict[tuple[object, ...], list[int]] = {}
+    groups = defaultdict(list)
     for i, p in enumerate(points):
         if np.isfinite(p.stiffness.h).all():
-            groups.setdefault(p.point.static_key, []).append(i)
+            groups[p.point.static_key].append(i)
     return list(groups.values())
 
 
@@ -314,18 +319,18 @@ def with_probe_doubts(
     by_probe = {}
     for (run, name), half in swept.items():
         if not _TRAVEL[0] * clearance < half < _TRAVEL[1] * clearance:
-            by_probe[name] = f"{name} travels {1e6 * half:.3g} um to either side in the sweep {run}"
+            by_probe[name] = f"{name} travels {amount(half, 'length', '.3g')} to either side in the sweep {run}"
     sentences = list(by_probe.values())
     places = np.array([p.position for p in points if np.isfinite(p.position).all()]).reshape(-1, 2)
     distance = float(np.hypot(*np.ptp(places, axis=0))) if len(places) else 0.0
     if distance > _APART * clearance:
-        sentences.append(f"the shaft's mean positions lie {1e6 * distance:.3g} um apart")
+        sentences.append(f"the shaft's mean positions lie {amount(distance, 'length', '.3g')} apart")
     load, value = min(_static_stiffness(points), key=lambda pair: pair[1] / pair[0], default=(0.0, 0.0))
     if load * _LEAST_STIFF > value * clearance:
-        softest = f"{load / 1e3:g} kN on a stiffness of {value / 1e6:.3g} MN/m"
-        sentences.append(f"{softest} would move the shaft by more than {1e6 * load / value:.3g} um")
+        softest = f"{amount(load, 'load')} on a stiffness of {amount(value, 'stiffness', '.3g')}"
+        sentences.append(f"{softest} would move the shaft by more than {amount(load / value, 'length', '.3g')}")
     cure = "is the probes' sensitivity right in the manifest?"
-    text = f"{'; '.join(sentences)} (clearance {1e6 * clearance:.0f} um): {cure}"
+    text = f"{'; '.join(sentences)} (clearance {amount(clearance, 'length', '.3g')}): {cure}"
     doubts = holding((sentences, "probes-contradict-clearance", text))
     return tuple(replace(point, quality=merged(point.quality, doubts)) for point in points)
 

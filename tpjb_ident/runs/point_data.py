@@ -45,11 +45,7 @@ def digest(phasors: RunPhasors, observations: tuple[Observation, ...] = ()) -> R
     excitation = replace(phasors, z=phasors.z[:, :lines].copy(), residual=phasors.residual[:lines])
     mains, force = mains_lines(phasors)
     return RunDigest(
-        **vars(excitation),
-        mains=mains,
-        mains_force=force,
-        harmonics=film_lines(phasors),
-        observations=observations,
+        **vars(excitation), mains=mains, mains_force=force, harmonics=film_lines(phasors), observations=observations
     )
 
 

@@ -43,13 +43,7 @@ from tpjb_ident.estimators.estimate import estimate_table
 from tpjb_ident.estimators.r_matrix import phasor_table
 from tpjb_ident.phasors.frequency import shaft_phases
 from tpjb_ident.phasors.lines import Line, LineSet, RecordTooShortError
-from tpjb_ident.phasors.run_data import (
-    FilmLine,
-    PhasorSettings,
-    RunPhasors,
-    beginning_of,
-    with_kept_beginning,
-)
+from tpjb_ident.phasors.run_data import FilmLine, PhasorSettings, RunPhasors, beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_phasors import run_phasors
 from tpjb_ident.runs.point_data import ExcludedRun, FinishedRuns, RunDigest, digest, gather, mean_temperatures, point_of
 from tpjb_ident.runtime.executors import Workers
@@ -208,7 +202,7 @@ def all_runs(
         former_results.append(former)
     finished: list[Any] = []
     results = (workers or Workers()).map(process_run, jobs)
-    for run, former, (mark, result) in zip(runs, former_results, results, strict=True):
+    for run, former, (mark, result) in zip(runs, former_results, results):
         if store is not None and mark and isinstance(result, RunDigest):
             store.keep(mark, result)
         finished.append(result or former)

@@ -97,7 +97,7 @@ class PoolWorkers(Workers):
     def map(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[Any]:
         """See `Workers`; raises `LostJobsError`."""
         packed = pickle.dumps(_with_shared(task, shared), protocol=5)
-        futures: dict[int, Future[Outcome]] = {}  # by number of the job
+        futures = {}  # by number of the job
         first = losses = 0
         while first < len(jobs):
             try:

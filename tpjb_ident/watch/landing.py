@@ -32,8 +32,8 @@ class NewFiles:
 
         An empty file is still being written: a logger has opened it and holds the samples back.
         """
-        stable: dict[Path, FileState] = {}
-        written: list[Path] = []
+        stable = {}
+        written = []
         now = self._steady()
         for path in paths:
             state = file_state(path)

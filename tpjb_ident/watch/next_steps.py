@@ -157,7 +157,7 @@ def located(problem: Problem) -> str:
 def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
     """A fault of one channel in the last records in a row: the next one will have it too."""
     landed = sorted(filter(lambda s: s.landed, states), key=lambda s: s.landed)[::-1]
-    steps: list[Step] = []
+    steps = []
     stopped: set[str] = set()
     for finding in landed[0].findings if landed else ():
         if finding.problem.severity == "note" or finding.key == _CUT or not finding.key.startswith(_LOST_SAMPLES):
@@ -174,7 +174,7 @@ def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
 
 def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
     """Runs to be made again: first what the rig stands at, then what takes another set-up."""
-    steps: list[tuple[bool, Step]] = []
+    steps = []
     for status in states:
         if status.state != "repeat":
             continue
@@ -205,8 +205,7 @@ def _precision_steps(states: Sequence[RunStatus], points: Sequence[PointResult],
         random_alone = (solved.half_width(systematic=False)[direct] / mean)[worst]
         if point.point in unfinished or not widest > within:
             continue
-        place = place_of(point.point.static_load, point.point.excitation_hz)
-        share = f"{place}: {name} is known to {100 * widest:.1f} %, {100 * within:g} % is wanted"
+        share = f"{point.place}: {name} is known to {100 * widest:.1f} %, {100 * within:g} % is wanted"
         random_allowed = within**2 - max(0.0, widest**2 - random_alone**2)
         if random_allowed <= 0.25 * within**2:
             steps.append(Step("more", f"{share}; calibration sets that, more records do not help."))
@@ -245,11 +244,11 @@ def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:
     lonely = [p for p, directions in directions_of.items() if len(directions) == 1 and None not in directions]
     if lonely:
         first = listed([place_of(p.static_load, p.excitation_hz) for p in lonely], 3, "; ")
-        lacks.append(f"{len(lonely)} operating points have one excitation direction ({first}): K and C need two.")
+        lacks.append(f"{counted(len(lonely), 'operating point')} shaken in one direction ({first}): K and C need two.")
     pads = {run.pad for run in runs if run.kind == "dry_pivot"}
     without = [f"#{pad}" for pad in range(1, n_pads + 1) if pad not in pads]
     if without:
-        lacks.append(f"No dry load steps on pad {', '.join(without)}: its pivot's stiffness stays unknown.")
+        lacks.append(f"No dry load steps on pad {', '.join(without)}: the pivot stiffness there stays unknown.")
     if not any(run.kind == "clearance" for run in runs):
         lacks.append("No clearance sweep: positions count from the probes' zero, and clearances stay the drawing's.")
     return lacks

@@ -155,7 +155,7 @@ class Watcher:
     def _observe(self, runs: list[Run], stable: dict[Path, FileState]) -> list[str]:
         """Read what is new; forget what is gone. Ids of the runs with news."""
         new = []
-        records: dict[str, _Record] = {}
+        records = {}
         for run in runs:
             path = self.folder / run.file
             state = stable.get(path)
@@ -213,7 +213,7 @@ class Watcher:
         angles = () if self.bearing is None else self.bearing.pivot_angles
         clearance = None if self.bearing is None else min(self.bearing.clearances)
         settings = IdentifySettings(clearance=clearance, keep_weights=False)
-        measures: dict[str, tuple[str, Callable[[], Any]]] = {
+        measures = {
             "identification": ("dynamic", lambda: identify(good, settings, store=self.store)),
             "curves": ("dry_pivot", lambda: fit_pivots(good, angles, on_refusal="skip")),
             "polygon": ("clearance", lambda: measure_clearance(good, angles)),

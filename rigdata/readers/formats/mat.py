@@ -50,7 +50,7 @@ def read_mat(path: Path) -> list[Series]:
     """
     variables = list(_flattened(_load(path), "", 0))
     texts = {name: value for name, value in variables if isinstance(value, list)}
-    channels: dict[str, Series] = {}
+    channels = {}
     rates = []
     for name, value in variables:
         if isinstance(value, list):

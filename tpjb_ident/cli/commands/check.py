@@ -26,7 +26,7 @@ def span(*values: float) -> str:
     return finite[0] if len(finite) == 1 else f"{finite[0]}..{finite[-1]}"
 
 
-RANGES = ("rate {frequency}", "load {load}", "direction {angle}", "speed {frequency}", "excitation {frequency}")
+RANGES = ("rate {frequency}", "load {load}", "direction {angle}", "speed {speed}", "excitation {frequency}")
 
 
 @command("tpjb check {DEMO}", "tpjb check {DEMO} --json > findings.json")
@@ -67,7 +67,7 @@ def check(c: Command, campaign: Path) -> None:
                 with suppress(RigDataError):  # a record that cannot be read is among the problems already
                     rate = run.sample_rate
                 figures.append((rate, *run.point.static_key[:3], run.point.excitation_hz or math.nan))
-            rows.append([kind, len(runs), len(places), *zip(*figures, strict=True)])
+            rows.append([kind, len(runs), len(places), *zip(*figures)])
         columns = [*words("kind"), "runs", "points, pads", *(Column(title, span) for title in RANGES)]
         c.show(f"{source.id}: what it covers", columns, rows)
     if any("open (??)" in p.what for p in problems):

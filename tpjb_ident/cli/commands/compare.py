@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.identification import identified, identify_settings, refuse_untrusted, write_identification
+from tpjb_ident.cli.identification import identified, identify_settings, write_identification
 from tpjb_ident.cli.inputs import model_settings, open_source, parse_share
 from tpjb_ident.cli.options import known_names
-from tpjb_ident.columns import amount, words
-from tpjb_ident.errors import BadInputError, NotTrustedError
-from tpjb_ident.rounding import listed, percent
+from tpjb_ident.columns import words
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.rounding import deviation
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
@@ -83,7 +83,6 @@ def compare(
                 c.next("diagnose", *typed)
             write_comparison(c, result, show)
     show_comparison(c, result)
-    refuse_comparison(result)
 
 
 def _compare_two(c: Command, *paths: Path) -> None:
@@ -93,22 +92,21 @@ def _compare_two(c: Command, *paths: Path) -> None:
     from tpjb_ident.report.difference_page import write_difference_report
 
     with c.results():
-        difference = difference_of(*(_side(c, path) for path in paths))
+        sides = [_side(c, path) for path in paths]
+        if sides[0].name == sides[1].name:
+            sides = [replace(side, name=f"{side.name} ({path})") for side, path in zip(sides, paths)]
+        difference = difference_of(*sides)
         for name, frame in difference.tables.items():
             c.table(name, frame)
         on_records = difference.b.campaign is not None and not difference.b.coefficients.empty
         c.next(*(("diagnose", paths[1]) if on_records else ("view", c.target)))
+        c.distrust(difference.doubt)
         write_difference_report(c.folder, difference, c.origin)
     points = difference.points
     with c.conclusion(difference_sentences(difference)):
         title = f"{difference.a.name} and {difference.b.name}: changed?"
         names = " ".join(f"{name}_changed" for name in DIRECT)
         c.show_frame(title, points, f"static_load_N excitation_Hz {names}", "difference.csv")
-    is_static = difference.a.coefficients.empty or difference.b.coefficients.empty
-    if points.empty and not (is_static and difference.tables):
-        raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")
-    if bad := difference.untrusted_points():
-        raise NotTrustedError(f"{len(bad)} points have a flag that forbids trust: {'; '.join(bad[:5])}.")
 
 
 def _side(c: Command, path: Path) -> Side:
@@ -127,11 +125,12 @@ def _side(c: Command, path: Path) -> Side:
 
 
 def write_comparison(c: Command, result: Comparison, show: Progress, note: str = "") -> None:
-    """Write every table, pivots.toml and the report."""
+    """Write every table, pivots.toml and the report; whether a point is not to be trusted, on either side, is noted."""
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.pivot.tables import pivot_table, write_pivots
     from tpjb_ident.report.comparison_page import write_report
 
+    c.distrust(result.doubt)
     show("writing tables", 0, 2)
     if result.has_records:
         write_identification(c, result.identification)
@@ -154,17 +153,7 @@ def show_comparison(c: Command, result: Comparison) -> None:
 
     rows = []
     for name, agreement in agreements(result.table).iterrows():
-        rows.append([str(name), *map(percent, agreement["median"]), number_inside(agreement)])
+        rows.append([str(name), *map(deviation, agreement["median"]), number_inside(agreement)])
     columns = [*words("pivots"), *DIRECT, "inside"]
     with c.conclusion(summary_sentences(result)):
         c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, rows)
-
-
-def refuse_comparison(result: Comparison) -> None:
-    """End with exit code 3 if a point is not to be trusted, on either side."""
-    if result.has_records:
-        refuse_untrusted(result.identification)
-    failed = result.table[~result.table["converged"]]
-    bad = [f"{row['pivots']}, {amount(row['static_load_N'], 'load')}" for row in failed.to_dict("records")]
-    if bad:
-        raise NotTrustedError(f"the model did not converge at {len(bad)} points ({listed(bad, between='; ')}).")

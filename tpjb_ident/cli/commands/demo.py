@@ -8,7 +8,7 @@ from pathlib import Path
 import rigdata
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.commands.check import check_summary
-from tpjb_ident.cli.commands.compare import refuse_comparison, show_comparison, write_comparison
+from tpjb_ident.cli.commands.compare import show_comparison, write_comparison
 from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.executors import background_job
 
@@ -52,4 +52,3 @@ def demo(c: Command) -> None:
     c.print(note)
     c.print("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
     c.next("view", c.target)
-    refuse_comparison(result)

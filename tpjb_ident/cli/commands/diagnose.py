@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.identification import refuse_untrusted, write_identification
+from tpjb_ident.cli.identification import write_identification
 from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, pivot_choice
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
@@ -26,7 +26,7 @@ def diagnose(
     pivots: str = "kirk",
     thermal: str = "adiabatic",
     effects: Path | None = None,
-    model_tolerance: float | None = None,
+    model_tolerance: str | None = None,
     tolerance: list[str] | None = None,
     coefficients: Path | None = None,
     reading_error: str | None = None,
@@ -46,7 +46,6 @@ def diagnose(
     start = pivots if pivots == "measured" else pivot_choice(c)
     from tpjb_ident.compare.static_tests import measure_static
     from tpjb_ident.diagnosis.campaign import Baseline, diagnose_campaign, diagnose_table
-    from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
     from tpjb_ident.runtime.executors import background_job, cores, forks
 
     source, drawing, typed = open_source(c)
@@ -71,21 +70,19 @@ def diagnose(
         from tpjb_ident.report import diagnosis_page as page
 
         c.next(*page.next_command(typed, verdict, c.target))
+        c.distrust(result.doubt)
         page.write_diagnosis_report(c.folder, source, result, c.origin)
-    deviations = median_deviations(before_and_after(result.diagnosis, result.identification))
-    with c.conclusion(page.verdict_sentences(source.id, verdict, deviations)):
+    with c.conclusion(result.summary().splitlines()):
         if verdict.effects:
             columns = [*words("effect", "parameter"), "value"]
             c.show("Effects, with 95 % intervals", columns, page.parameter_rows(verdict))
-    if result.identification is not None:
-        refuse_untrusted(result.identification)
 
 
-def _settings(model_tolerance: float | None, tolerances: Sequence[str], workers: int | None) -> DiagnoseSettings:
+def _settings(model_tolerance: str | None, tolerances: Sequence[str], workers: int | None) -> DiagnoseSettings:
     from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
     from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 
-    typed: dict[str, str | float] = {}
+    typed = {}
     for text in tolerances:
         name, _, value = text.partition("=")
         if not value.strip():

@@ -10,12 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.identification import (
-    identify_settings,
-    refuse_untrusted,
-    show_identification,
-    write_identification,
-)
+from tpjb_ident.cli.identification import identify_settings, show_identification, write_identification
 from tpjb_ident.cli.inputs import parse_value, parse_values
 from tpjb_ident.cli.options import refuse_unknown
 from tpjb_ident.errors import BadInputError
@@ -73,7 +68,7 @@ def identify(
 
     team = open_workers(workers, scheduler) if workers or scheduler else open_workers(*_worth_starting(source))
     with c.results():
-        with team as opened, _finished_runs(c.target) as store, c.progress("identifying") as show:
+        with team as opened, _finished_runs(c) as store, c.progress("identifying") as show:
             result = run_identification(source, settings, show, opened, store)
         write_identification(c, result)
         if plain or keep_r:
@@ -91,11 +86,11 @@ def identify(
         c.next("compare", campaign)
     elif result.points:
         c.next("export", c.target, "--to", "ross")
-    refuse_untrusted(result)
+    c.distrust(result.doubt)
 
 
 @contextmanager
-def _finished_runs(target: Path) -> Iterator[RunStore]:
+def _finished_runs(c: Command) -> Iterator[RunStore]:
     """Give a store of finished runs inside the output folder; only a kill or Ctrl-C leaves it there.
 
     Results come into the folder whole or not at all; what is stored for a rerun is apart from them, in a folder of
@@ -103,11 +98,15 @@ def _finished_runs(target: Path) -> Iterator[RunStore]:
     """
     from tpjb_ident.runs.run_jobs import RunStore
 
-    store = RunStore(target / KEPT)
+    store = RunStore(c.target / KEPT)
     try:
         yield store
     except Exception:
         store.clear()
+        raise
+    except KeyboardInterrupt:
+        if store.folder.is_dir():
+            c.note(f"finished runs wait in {store.folder}: the same command goes on from there.")
         raise
     store.clear()
 

@@ -16,10 +16,7 @@ if TYPE_CHECKING:
     from tpjb_ident.diagnosis.plan import CampaignPlan
 
 
-@command(
-    "tpjb plan {ROCKER}",
-    'tpjb plan {ROCKER} --load "5, 10 kN" --excitation "20..60:10 Hz" --locus 0',
-)
+@command("tpjb plan {ROCKER}", 'tpjb plan {ROCKER} --load "5, 10 kN" --excitation "20..60:10 Hz" --locus 0')
 def plan(
     c: Command,
     bearing: Path,
@@ -92,7 +89,7 @@ def _show(c: Command, result: CampaignPlan) -> None:
     from tpjb_ident.compare.effect_words import label_in_words
 
     rows = []
-    for row, candidate in zip(result.to_frame().to_dict("records"), result.candidates, strict=True):
+    for row, candidate in zip(result.to_frame().to_dict("records"), result.candidates):
         size = _detected_from(row["seen_from"], candidate.parameter)
         like = label_in_words(row["mistaken_for"]) or "-"
         rows.append([label_in_words(row["effect"]), row["typical_size_sigma"], size, like])

@@ -32,11 +32,7 @@ _COLUMNS = (
 )
 
 
-@command(
-    "tpjb show {DEMO}",
-    "tpjb show {DEMO} --run d-05000-25-01 --picture",
-    "tpjb show exports/run1.csv",
-)
+@command("tpjb show {DEMO}", "tpjb show {DEMO} --run d-05000-25-01 --picture", "tpjb show exports/run1.csv")
 def show(c: Command, source: Path, run: str | None = None, picture: bool = False) -> None:
     """Show channels, statistics and spectra of a file.
 
@@ -61,14 +57,14 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
             return
         chosen = campaign.run(run)
         title = f"{chosen.id} ({chosen.kind})"
-        with c.progress(f"looking at {source.name}"):
+        with c.progress(f"looking at {place.name}"):
             series, displayed = _run_series(chosen)
     else:
         c.next("check" if (source.parent / MANIFEST_NAME).exists() else "init", source.parent)
         if run is not None:
             raise BadInputError(f"--run: {source.name} is a single record, not a campaign. Leave the option out.")
         title = source.name
-        with c.progress(f"looking at {source.name}"):
+        with c.progress(f"looking at {place.name}"):
             displayed = series = list(read_export(c.file(source)).series)
     spectra = {s.name: amplitude_spectrum(s.values, s.rate) for s in displayed}
     rows = [channel_row(s, spectra[s.name]) for s in displayed]
@@ -103,7 +99,7 @@ def _show_campaign(c: Command, campaign: Campaign) -> None:
         p = run.point
         place = [p.static_load or None, p.static_load_direction_deg, p.shaft_speed_hz, p.excitation_hz or None]
         rows.append([run.id, run.kind, *place, run.pad and f"#{run.pad}", p.rotation if p.shaft_speed else None])
-    quantities = ["load {load}", "direction {angle}", "speed {frequency}", "exc. {frequency}"]
+    quantities = ["load {load}", "direction {angle}", "speed {speed}", "exc. {frequency}"]
     c.show("runs", [*words("run", "kind"), *quantities, "pad", "rotation"], rows)
     if len(campaign.runs) > len(rows):
         c.print(f"... and {len(campaign.runs) - len(rows)} more runs")
@@ -125,7 +121,7 @@ def _run_series(run: Run) -> tuple[list[Series], list[Series]]:
         try:
             record = run.record(name)
         except RigDataError as error:
-            problems.extend(error.problems)
+            problems += error.problems
         else:
             unit = SI_UNITS.get(DIMENSIONS.get(channel.quantity, ""), "")
             series.append(Series(name, unit, record.values, record.time))

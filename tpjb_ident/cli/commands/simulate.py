@@ -71,6 +71,8 @@ def simulate(
         faults=tuple(Fault(**_fault_arguments(text)) for text in fault or ()),
     )
     file = "campaign.h5" if layout == "hdf5" else "campaign"
+    if (c.target / file).exists():
+        c.warn(f"{c.target / file}: the campaign that is there is replaced; --out keeps both.")
     with c.results("simulating") as show:
         truth = write_campaign(c.folder / file, rig, layout, progress=lambda done, total, run: show(run, done, total))
         truth.write(c.folder / "truth.json")

@@ -6,7 +6,7 @@ from typing import Any
 
 from tpjb_ident.cli.command import Command, command, refuse_special
 from tpjb_ident.errors import BadInputError, NotTrustedError
-from tpjb_ident.rounding import listed
+from tpjb_ident.rounding import counted, listed
 from tpjb_ident.runtime.output_folder import READY, RECORD, former_runs, outputs_of, texts_of
 from tpjb_ident.runtime.provenance import sha256, versions
 
@@ -56,8 +56,8 @@ def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
         raise NotTrustedError(f"{results}: not as it was computed: {listed(differing)}. Run the command again.")
     if missing:
         raise BadInputError(
-            f"{results}: the results are unchanged, but {len(missing)} inputs ({listed(missing, 1)}) are not where "
-            "they were. Give --input PATH of the campaign."
+            f"{results}: the results are unchanged, but not where they were: {counted(len(missing), 'input')} "
+            f"({listed(missing, 1)}). Give --input PATH of the campaign."
         )
 
 
@@ -87,7 +87,7 @@ def files_of(results: Path, name: str, entry: Mapping[str, Any], inputs: Sequenc
     for place in inputs or [results / place for place in texts_of(entry, "inputs_at").values()]:
         inner = campaign_place(place)
         folders += [inner if inner.is_dir() else inner.parent, *([place] if place.is_dir() else ())]
-    around: list[Path] = []
+    around = []
     for folder in folders:
         around += folder.resolve().parents
     for file, recorded_hash in texts_of(entry, "inputs_sha256").items():

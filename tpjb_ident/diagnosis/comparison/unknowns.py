@@ -56,13 +56,13 @@ class Unknowns:
     def effects(self, theta: FloatArray) -> tuple[Effect, ...]:
         """The faults as effects."""
         amplitudes = theta + self.origin
-        pairs = zip(self.faults, self.slices, strict=True)
+        pairs = zip(self.faults, self.slices)
         return tuple(Effect(fault.name, **fault.values(amplitudes[at])) for fault, at in pairs)
 
     def predict(self, forward: Forward, theta: FloatArray) -> FloatArray | None:
         """Prediction in units of sigma, (n,); None where the model has no equilibrium."""
         amplitudes = theta + self.origin
-        pairs = zip(self.faults, self.slices, strict=True)
+        pairs = zip(self.faults, self.slices)
         effects = [fault.candidate.effect(amplitudes[at]) for fault, at in pairs if fault.own < 0]
         problem = self.problem
         try:
@@ -85,7 +85,7 @@ def derivatives(
     """Job: derivatives of the prediction by some numbers, each from the point's own solved state, (n,) each."""
     unknowns = Unknowns(problem, faults)
     at_point = unknowns.predict(forward, theta)
-    out: list[FloatArray | None] = []
+    out = []
     for index in indices:
         step = _SHARE * unknowns.width[index]
         if index >= unknowns.amplitudes:  # towards zero: there the model surely has an equilibrium

@@ -74,7 +74,7 @@ class Candidate:
         inside = np.clip(np.atleast_1d(np.asarray(amplitudes, float)), *self.limits)
         sizes = np.transpose(self.basis) @ inside if self.basis else inside
         # inverse forms may round past their own bound
-        pairs = zip(self.free, map(float, sizes), strict=True)
+        pairs = zip(self.free, map(float, sizes))
         return {**{p.name: min(max(p.from_linear(v), p.low), p.high) for p, v in pairs}, **self.fixed}
 
     def effect(self, amplitudes: FloatArray | float) -> Effect:
@@ -95,7 +95,7 @@ class Candidate:
 def candidates(setup: Setup, skip: frozenset[str] = frozenset()) -> tuple[Candidate, ...]:
     """List every effect of the library (registered ones too) that can act on a set-up."""
     bearing = setup.bearing
-    out: list[Candidate] = []
+    out = []
     for kind in known_effects().values():
         if kind.name in skip or kind.missing(bearing):
             continue
@@ -107,7 +107,7 @@ def candidates(setup: Setup, skip: frozenset[str] = frozenset()) -> tuple[Candid
         pads = range(1, len(bearing.pads) + 1)
         places = {p.name: pads if p.discrete else p.options for p in parameters if math.isnan(p.neutral)}
         for chosen in itertools.product(*places.values()):
-            out.append(Candidate(kind.name, free, dict(zip(places, chosen, strict=True))))
+            out.append(Candidate(kind.name, free, dict(zip(places, chosen))))
     return tuple(out)
 
 

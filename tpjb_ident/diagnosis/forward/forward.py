@@ -101,7 +101,7 @@ class ModelCache:
         h = bearing_impedance(running, equilibrium, np.array(lines)) if lines else np.zeros((0, 2, 2), complex)
         if runs_backward(setup.bearing, speed):
             sensors = tuple(1.0 - place for place in sensors)
-        warm = np.array([film.temperature_at(place) for film, place in zip(equilibrium.films, sensors, strict=True)])
+        warm = np.array([film.temperature_at(place) for film, place in zip(equilibrium.films, sensors)])
         loads = np.array([film.forces.force[0] if film.forces is not None else 0.0 for film in equilibrium.films])
         return SolvedPoint(h, in_rig(running, equilibrium.position), force, warm, loads)
 
@@ -127,7 +127,7 @@ class Forward:
         setup = apply_effects(self.setup, effects)
         for done in (change, self.last):
             setup = setup if done is None else done(setup)
-        values: list[FloatArray] = []
+        values = []
         for test in self.layout.dynamic:
             reading = self._solve(setup, test, test.excitation)
             values += [np.stack([reading.h.real, reading.h.imag], axis=1).ravel()]

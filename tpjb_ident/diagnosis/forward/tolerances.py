@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from model.bearing import Bearing
 from model.possible import KEYS
 from rigdata.near_names import hint
-from rigdata.units import UnitError, parse_quantity
+from rigdata.units import UnitError, example_of, parse_quantity
 from tpjb_ident.diagnosis.observations.constants import TRUSTED
 from tpjb_ident.errors import BadInputError
 
@@ -47,6 +47,9 @@ DEFAULTS: dict[str, float] = {
     "model": TRUSTED["h"],
 }
 
+#: A larger share was meant in per cent.
+_LARGEST = 0.5
+
 
 @dataclass(frozen=True)
 class Tolerances:
@@ -72,8 +75,11 @@ class Tolerances:
                 number = parse_quantity(value, dimension, name) if isinstance(value, str) else float(value)
             except (UnitError, ValueError) as error:
                 raise BadInputError(f"tolerance {name} ({source}): {error}") from error
-            if not 0.0 <= number < math.inf:
-                raise BadInputError(f"tolerance {name} ({source}): must be zero or more, got {value!r}.")
+            if not 0.0 <= number < (_LARGEST if dimension == "ratio" else math.inf):
+                raise BadInputError(
+                    f"tolerance {name} ({source}): {value!r} is below zero, or {100 * _LARGEST:g} % and more. "
+                    f'Write, for instance, "2 {example_of(dimension)}".'
+                )
             table[name] = StatedTolerance(number, source)
         return Tolerances(table, self.centre)
 

@@ -27,7 +27,7 @@ def held_out(observations: Observations) -> BoolArray:
     usual = moving & (speed == (speeds.most_common(1)[0][0] if speeds else 0.0))
     out = (moving & ~usual) | (still & np.isin(direction % (2 * np.pi), _sector(direction[still])))
     swept = usual & (family == "h")
-    points = set(zip(load[swept].tolist(), direction[swept].tolist(), strict=True))
+    points = set(zip(load[swept].tolist(), direction[swept].tolist()))
     for weight, way in points:
         at_point = (load == weight) & (direction == way)
         lines = np.unique(line[swept & at_point])
@@ -127,7 +127,7 @@ def localise(observations: Observations, prediction: FloatArray) -> tuple[Disagr
     """Split the squared gap by observable and region, largest share first; `prediction` (n,)."""
     z = residuals(observations, prediction)
     total, names = float(np.sum(z**2)), named(observations.elements, "observable")
-    rows: list[Disagreement] = []
+    rows = []
     for name in dict.fromkeys(names.tolist()):
         for region, part in _regions(observations.elements, names == name):
             square = float(np.sum(z[part] ** 2))

@@ -113,7 +113,7 @@ def _elements(names: Iterable[tuple[str, str]], *places: Where) -> list[Element]
 
 def all_elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
     """Everything that a layout of tests shows of a bearing with pivots at these angles, in the order of predictions."""
-    out: list[Element] = []
+    out = []
     for test in layout.dynamic:
         out += _elements(_STIFFNESS, *(_at_point(*test.point, omega) for omega in test.excitation))
         pads = ((*_at_point(*test.point), ("pad", float(pad))) for pad in test.pads)
@@ -243,7 +243,7 @@ def _add_locus(parts: list[Part], locus: Locus, identification: Identification) 
     points = [p.point for p in locus.points]
     tests = [LocusTest(point.static_load, point.static_load_direction, point.spin) for point in points]
     chosen, moved = _spread(tests), moved_by_miss(locus, identification)
-    for test, p, moved_by in zip(tests, locus.points, moved, strict=True):
+    for test, p, moved_by in zip(tests, locus.points, moved):
         if test not in chosen:
             continue
         turn = math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)
@@ -257,10 +257,10 @@ def _add_locus(parts: list[Part], locus: Locus, identification: Identification) 
 
 def _spread(tests: Sequence[LocusTest]) -> set[LocusTest]:
     """Every second, third .. direction where a load and a speed have more than `_DIRECTIONS`."""
-    groups: dict[tuple[float, float], list[LocusTest]] = {}
+    groups = defaultdict(list)
     for test in dict.fromkeys(tests):
-        groups.setdefault((test.load, test.speed), []).append(test)
-    chosen: set[LocusTest] = set()
+        groups[(test.load, test.speed)].append(test)
+    chosen = set()
     for group in groups.values():
         around = sorted(group, key=lambda test: test.direction % (2 * math.pi))
         chosen.update(around[:: -(-len(around) // _DIRECTIONS)])

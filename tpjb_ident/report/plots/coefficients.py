@@ -40,7 +40,7 @@ from tpjb_ident.schema import ENTRIES, KINDS, STATIC_KEY, coefficient_column
 _SMALL = 5.0
 #: A prediction nearer than this [%] is the measurement itself: it sets no scale.
 _EXACT = 1e-3
-_BARS: dict[str, Any] = {"fmt": "o", "color": INK, "zorder": 5, "label": "measured, 95 %"}
+_BARS: dict[str, Any] = {"fmt": "o", "color": INK, "markerfacecolor": "none", "zorder": 5, "label": "measured, 95 %"}
 
 
 @plot
@@ -93,9 +93,14 @@ def coefficient(comparison: Comparison | pd.DataFrame, name: str, over: str = "l
         _draw_predictions(axes, series, "off")
         axes.errorbar(measured["at"], np.zeros(len(measured)), yerr=shares, **_BARS)
         axes.margins(x=0.06)
-        reach = deviation.abs().groupby(series["pivots"]).max()
+        reach = deviation.abs().groupby(series["pivots"], sort=False).max()
         limit = 1.4 * max(np.max(shares), reach[reach > _EXACT].min() if (reach > _EXACT).any() else 1.0)
         axes.set_ylim(-limit, limit)
+        colours = model_styles(list(reach.index))
+        for row in series[deviation.abs() > limit].to_dict("records"):  # on which side what is out of reach lies
+            colour, is_above = colours[row["pivots"]]["color"], row["off"] > 0.0
+            side, edge, arrow = (limit, "top", "↑") if is_above else (-limit, "bottom", "↓")
+            axes.text(row["at"], side, arrow, color=colour, ha="center", va=edge)
     return figure
 
 
@@ -161,11 +166,7 @@ def direct_coefficients(
 
 
 @plot
-def frf(
-    source: BandResult | Identification | pd.DataFrame,
-    *,
-    entries: tuple[str, ...] = ("xx", "yy"),
-) -> Figure:
+def frf(source: BandResult | Identification | pd.DataFrame, *, entries: tuple[str, ...] = ("xx", "yy")) -> Figure:
     """Draw the real and the imaginary part of h over frequency with 95 % intervals, over a band the coherence below.
 
     Parameters
@@ -191,7 +192,7 @@ def frf(
     if over_band and table.filter([*STATIC_KEY, "excitation"]).nunique().max() > 1:
         raise ValueError("the table holds several operating points; give the rows of one")
     figure, grid = new_pictures(3 if over_band else 2, 1, height=2.3)
-    for axes, part in zip(grid[:2, 0], ("real", "imag"), strict=True):
+    for axes, part in zip(grid[:2, 0], ("real", "imag")):
         label(axes, "frequency, Hz", f"{part.capitalize()[:2]} h, {symbol('stiffness')}")
         for entry in entries:
             value, errors = with_errors(table, f"h{entry}_{part}_N_per_m", size("stiffness"))

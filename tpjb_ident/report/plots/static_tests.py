@@ -49,11 +49,7 @@ def _listed(curves: PivotCurve | Sequence[PivotCurve]) -> list[PivotCurve]:
 
 
 @plot
-def load_deflection(
-    curves: PivotCurve | Sequence[PivotCurve],
-    *,
-    up_to: float | None = None,
-) -> Figure:
+def load_deflection(curves: PivotCurve | Sequence[PivotCurve], *, up_to: float | None = None) -> Figure:
     """Draw the settled steps of dry tests and the laws fitted to them (the paper's Fig. 11).
 
     Steps that were left out are crossed; unloading steps are hollow. The law is drawn solid where it was measured with
@@ -73,7 +69,7 @@ def load_deflection(
         _draw_steps(axes, curve)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     from_zero(axes)
-    named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    named = dict(zip(*reversed(axes.get_legend_handles_labels())))
     add_legend(axes, handles=[named[name] for name in sorted(named)])  # pad by pad, what was left out last
     return figure
 
@@ -169,10 +165,7 @@ _LOWEST = 0.04  # of the largest load: Hertz's stiffness has no value at zero
 
 @plot
 def pivot_stiffness(
-    curves: Sequence[PivotCurve],
-    formula: Formula | None = None,
-    *,
-    loads: ArrayLike | None = None,
+    curves: Sequence[PivotCurve], formula: Formula | None = None, *, loads: ArrayLike | None = None
 ) -> Figure:
     """Draw the stiffness of every pad's pivot over its load (the paper's Fig. 12).
 
@@ -264,7 +257,7 @@ def clearance_and_locus(
         _draw_closed(axes, polygon.corners, **line, linewidth=1.5, label=f"clearance, {name}")
         _draw_closed(axes, corners(polygon.fitted_angle, polygon.clearance_pushed), **line, linewidth=0.6)
     for polygon in list(named.values())[:1]:  # number of each pad, just inside its side
-        for k, (angle, clearance) in enumerate(zip(polygon.angles, polygon.clearance, strict=True), 1):
+        for k, (angle, clearance) in enumerate(zip(polygon.angles, polygon.clearance), 1):
             if np.isfinite(clearance):
                 toward = directions(angle)
                 axes.annotate(f"#{k}", tuple(clearance / size("length") * toward), tuple(-10.0 * toward),
