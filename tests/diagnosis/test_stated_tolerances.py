@@ -45,7 +45,7 @@ def test_a_bearing_file_states_every_tolerance():
         ("viscosty", "4 %", "viscosity"),
         ("viscosity", "4 um", "ratio"),
         ("viscosity", "-4 %", "below zero"),
-        ("viscosity", "4", "no unit, such as %"),
+        ("viscosity", "4", "50 % and more"),
         ("viscosity", 4.0, "50 % and more"),
         ("clearance_scatter", "-1 um", "below zero"),
     ],
