@@ -101,9 +101,19 @@ def test_a_drive_off_its_set_point_is_one_line_and_turns_no_shaft(off):
     assert {str(condition) for condition in result.conditions} == {"excitation off set point"}
 
 
-def test_a_drive_that_grows_or_wanders_is_no_second_line():
-    for level in (1 + 0.1 * TIME / SECONDS, 1 + 0.03 * np.cos(2 * np.pi * 0.4 * TIME)):
-        assert "unexpected lines" not in phasors_of(record(level=level)).conditions
+SLOW_CHANGES = [1 + 0.1 * TIME / SECONDS, 1 + 0.03 * np.cos(2 * np.pi * 0.4 * TIME)]
+SLOW_CHANGES += [np.exp(growth * TIME / SECONDS) for growth in (-4.0, -1.5, 1.8)]
+
+
+# a decay looks like two lines on one another, which no window of whatever length tells apart
+@pytest.mark.parametrize("level", SLOW_CHANGES)
+def test_a_drive_that_grows_or_decays_or_wanders_is_no_second_line(level):
+    result = phasors_of(record(level=level))
+    assert "unexpected lines" not in result.conditions
+    assert "found" not in [line.name for line in result.lines.nuisance]
+    good = result.z[np.isfinite(result.z[:, 0]).all(axis=1), 0]
+    assert len(good) >= 10
+    assert np.median(good[:, 0] / good[:, 2]) == pytest.approx(Z["DX"] / Z["FX"], rel=0.02)
 
 
 def test_a_shaft_at_twice_the_excitation_is_the_shafts():

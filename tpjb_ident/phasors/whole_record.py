@@ -31,7 +31,7 @@ from rigdata.run import Run
 from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.phasors.frequency import exact_frequencies
 from tpjb_ident.phasors.line_fit import LineFitter
-from tpjb_ident.phasors.lines import HIGHEST, LineSet
+from tpjb_ident.phasors.lines import HIGHEST, ONE_LINE, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors, device_readers
 
 #: Noise of a line is looked at in the bins so far from it [1 / record length],
@@ -280,6 +280,8 @@ def near_line(result: RunPhasors, driven: int, duration: float) -> tuple[float, 
         pair = _least(windows, time, drive + np.multiply.outer(distances[apart], [0.0, 1.0]))
         if drive:
             pair = minimize(lambda places: _left(windows, time, places[None])[0], pair, method="Nelder-Mead").x
+        if np.abs(pair[1] - np.append(pair[0], others)).min() < ONE_LINE:  # it stands for the drive's own change
+            continue
         remainder = float(_left(windows, time, pair[None])[0])
         power = _left(windows, time, np.array([alone, pair[:1]])).min() - remainder
         if power > smallest and remainder - count * channels < _LEFT * (count - _TAKEN) * power:
