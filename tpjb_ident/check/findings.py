@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -133,9 +134,9 @@ def is_shared(concerned: int, alike: int) -> bool:
 
 def _alike(findings: Iterable[Finding]) -> Iterable[list[Finding]]:
     """Findings by key and severity."""
-    groups: dict[tuple[str, str], list[Finding]] = {}
+    groups = defaultdict(list)
     for finding in findings:
-        groups.setdefault((finding.key, finding.problem.severity), []).append(finding)
+        groups[finding.key, finding.problem.severity].append(finding)
     return groups.values()
 
 
@@ -179,9 +180,9 @@ def reach(reports: Sequence[Reporter]) -> None:
 
     What only one of many runs of its kind shows is that run's own: a cable was changed.
     """
-    kinds: dict[str, list[Reporter]] = {}
+    kinds = defaultdict(list)
     for report in reports:
-        kinds.setdefault(report.run.kind, []).append(report)
+        kinds[report.run.kind].append(report)
     dynamic = kinds.pop("dynamic", [])
     for alike in kinds.values():
         findings = []

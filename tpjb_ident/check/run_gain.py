@@ -14,6 +14,7 @@ by anything, and a shaft wanders by more than a load some per cent off moves it.
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -104,7 +105,7 @@ class PointRuns:
 
 def point_runs(observations: Sequence[Observation]) -> list[PointRuns]:
     """Dynamic runs by operating point and channels: of those that show what two probes and the cells answer."""
-    groups: dict[object, list[Observation]] = {}
+    groups = defaultdict(list)
     for observation in observations:
         point, probes = observation.run.point, observation.of("displacement")
         # runout answers at a line of the shaft too, as no film does
@@ -113,7 +114,7 @@ def point_runs(observations: Sequence[Observation]) -> list[PointRuns]:
         measured = np.array([observation.film_force, observation.line("displacement")])
         if is_clear and len(probes) == 2 and not observation.report.cells_doubted and np.isfinite(measured).all():
             named = ((channel.name, channel.axis) for channel in [*probes, *observation.of("force")])
-            groups.setdefault((point, *named), []).append(observation)
+            groups[point, *named].append(observation)
     return [_readings(group) for group in groups.values()]
 
 

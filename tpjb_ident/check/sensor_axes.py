@@ -6,6 +6,7 @@ stand across the pads, two cells by the push around it. Where all but one agree,
 have a say too.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -31,10 +32,10 @@ _BEND, _CLEAR = 1.5, 4.0
 
 def check_cells(observations: Sequence[Observation]) -> None:
     """Cells against the static loads of dynamic and locus runs."""
-    groups: dict[tuple[str, ...], list[Observation]] = {}
+    groups = defaultdict(list)
     for observation in observations:
         if observation.run.kind in {"dynamic", "locus"} and observation.run.point.static_load > 0:
-            groups.setdefault(tuple(observation.names("force")), []).append(observation)
+            groups[tuple(observation.names("force"))].append(observation)
     for names, group in groups.items():
         axes = np.array([channel.axis or 0.0 for channel in group[0].of("force")])
         readings = np.array([observation.lines.mean[observation.pick("force")] for observation in group])

@@ -1,6 +1,7 @@
 """Check dry, clearance and locus runs: what their own fits refuse, and whether the shaft goes where it is pushed."""
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -141,11 +142,11 @@ def _is_pushed(observation: Observation, gain: FloatArray) -> bool:
 
 def check_locus(runs: Sequence[Observation]) -> None:
     """Locus runs together: mean positions follow the directions of the loads."""
-    groups: dict[object, list[Observation]] = {}
+    groups = defaultdict(list)
     for run in runs:
         means = run.mean("force"), run.mean("displacement")
         if np.isfinite(means).all() and len(run.of("displacement")) == 2 and not run.report.cells_doubted:
-            groups.setdefault((run.run.point.static_load, run.run.point.spin), []).append(run)
+            groups[run.run.point.static_load, run.run.point.spin].append(run)
     for group in groups.values():
         loads = np.array([run.mean("force") for run in group])
         places = np.array([run.mean("displacement") for run in group])

@@ -188,9 +188,9 @@ def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, ra
     """Worst variance of an excitation phasor against a fit of that line alone; `frequencies` (n_lines,)."""
     # A few hundred samples carry the whole geometry as long as no line aliases.
     step = max(1, int(rate / (8.0 * frequencies.max())))
-    count = math.ceil(round(length * rate) / step)
+    even = range(0, round(length * rate), step)
     # beyond some thousand, scattered ones do that too, however long the window
-    time = np.arange(count) * step / rate if count <= _EVEN else length * np.random.default_rng(0).random(_EVEN)
+    time = np.array(even) / rate if len(even) <= _EVEN else length * np.random.default_rng(0).random(_EVEN)
     design = line_design(time, frequencies)
     if design.shape[0] <= design.shape[1]:
         return math.inf

@@ -13,6 +13,7 @@ The four levels are estimated by restricted maximum likelihood (Patterson and Th
 1971, 545-554), pooled over all series of a campaign: the probes are the same in each.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -116,7 +117,7 @@ def _rotated(series: Sequence[NoiseSeries], unit: float) -> list[tuple[FloatArra
     (k, m, 2) over the white noise, of the 1/f noise and (all but diagonal there) of a walk's quick part; and signal,
     drift, the walk's slow part and values (k, m, p + 10).
     """
-    groups: dict[tuple[int, ...], list[tuple[FloatArray, FloatArray]]] = {}
+    groups = defaultdict(list)
     for samples in series:
         root = np.sqrt(samples.duration)
         kernel = flicker_kernel(samples.time, samples.duration) * np.outer(root, root)
@@ -129,7 +130,7 @@ def _rotated(series: Sequence[NoiseSeries], unit: float) -> list[tuple[FloatArra
         drift = samples.time - np.mean(samples.time)
         slow = np.column_stack([drift, waves]) * root[:, None]
         columns = np.column_stack([mean, slow, samples.values / unit * root])
-        groups.setdefault(samples.mean.shape, []).append((np.maximum(spectra, 0.0), basis.T @ columns))
+        groups[samples.mean.shape].append((np.maximum(spectra, 0.0), basis.T @ columns))
     stacks = (zip(*alike) for alike in groups.values())
     return [(np.stack(spectra), np.stack(columns)) for spectra, columns in stacks]
 

@@ -7,6 +7,7 @@ corners of every ramp.
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -193,10 +194,10 @@ def contradictions(
     `slopes`: of every run, by how much each reading changes with some directions (k,); `noise`: by quantity, standard
     error of the slopes of every run.
     """
-    groups: dict[tuple[str, float], list[str]] = {}
+    groups = defaultdict(list)
     for name in slopes[0] if slopes else ():
         if all(name in run_slopes for run_slopes in slopes):
-            groups.setdefault((str(channels[name].quantity), channels[name].plane), []).append(name)
+            groups[channels[name].quantity, channels[name].plane].append(name)
     contradicting = []
     for (quantity, _), names in groups.items():
         columns = []

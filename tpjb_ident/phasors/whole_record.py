@@ -280,11 +280,10 @@ def near_line(result: RunPhasors, driven: int, duration: float) -> tuple[float, 
         pair = _least(windows, time, drive + np.multiply.outer(distances[apart], [0.0, 1.0]))
         if drive:
             pair = minimize(lambda places: _left(windows, time, places[None])[0], pair, method="Nelder-Mead").x
-        if np.abs(pair[1] - np.append(pair[0], others)).min() < ONE_LINE:  # it stands for the drive's own change
-            continue
         remainder = float(_left(windows, time, pair[None])[0])
         power = _left(windows, time, np.array([alone, pair[:1]])).min() - remainder
-        if power > smallest and remainder - count * channels < _LEFT * (count - _TAKEN) * power:
+        is_told = power > smallest and remainder - count * channels < _LEFT * (count - _TAKEN) * power
+        if is_told and abs(pair[1] - pair[0]) > ONE_LINE:  # nearer they are the drive's own change
             exact, near = (frequency + pair / duration).tolist()
             return exact, near
     return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -150,13 +151,13 @@ class Identification(Presented):
     def remarks(self) -> tuple[str, ...]:
         """What somebody should read beside the numbers: each condition once, with the places where it was found."""
         remarks = [condition.sentence() for condition in self.conditions]
-        places: dict[str, list[str]] = {}
+        places = defaultdict(list)
         flagged = [(place_of(p.point.static_load, p.point.excitation_hz), p.quality) for p in self.points]
         for band in self.bands:
             flagged += [] if band.points else [(f"{amount(band.point.static_load, 'load')}, {band.kind}", band.quality)]
         for place, quality in flagged:
             for condition in quality:
-                places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
+                places[str(condition)].append(f"{place}: {condition.detail or 'found'}")
         for name, listed in places.items():
             addition = f" (and at {counted(len(listed) - 1, 'more point')})" if listed[1:] else ""
             remarks.append(f"{name} at {listed[0]}{addition}")

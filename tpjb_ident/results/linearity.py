@@ -10,6 +10,7 @@ films integrated in time it is right within a fifth, so 1.3 times it is taken. W
 another line on it) the second harmonic stands in, 4.5 q2^2: for a force law x / (1 - x / c)^n the change is 2.7 q2^2.
 """
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -58,14 +59,14 @@ class AmplitudeSlope:
 
 def amplitude_slope(data: PointData, h: ComplexArray, weights: FloatArray) -> AmplitudeSlope:
     """Slope of h over the logarithm of the amplitude, from directions run at several amplitudes; NaN without such."""
-    groups: dict[float, list[tuple[float, float]]] = {}
+    groups = defaultdict(list)
     for run, places in data.counted(weights) if np.isfinite(h).all() else ():
         if run.direction is not None:
             D, F = (np.average(z[places], axis=0, weights=weights[places]) for z in (data.D, data.F))
             fitted = h @ D
             excess = float((fitted.conj() @ (F - fitted)).real / np.linalg.norm(fitted) ** 2)
             angle = round(np.degrees(run.direction) % 180.0, 1)
-            groups.setdefault(angle, []).append((np.log2(np.linalg.norm(D)), excess))
+            groups[angle].append((np.log2(np.linalg.norm(D)), excess))
     # Differences within a direction only: what a direction as a whole is off by is no amplitude effect.
     centred, runs = [], 0
     for group in groups.values():

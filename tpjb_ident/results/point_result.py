@@ -1,5 +1,6 @@
 """What a campaign says about one operating point, and the figures and flags that say how far it can be trusted."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -106,10 +107,10 @@ class PointResult:
 
 def by_static_point(points: Sequence[PointResult]) -> list[list[int]]:
     """Places of the points that have a stiffness, those of one load and speed together."""
-    groups: dict[tuple[object, ...], list[int]] = {}
+    groups = defaultdict(list)
     for i, p in enumerate(points):
         if np.isfinite(p.stiffness.h).all():
-            groups.setdefault(p.point.static_key, []).append(i)
+            groups[p.point.static_key].append(i)
     return list(groups.values())
 
 
