@@ -8,6 +8,7 @@ taken to be the force's, as H1 does.
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -233,9 +234,9 @@ def read_points(
 
     `fast`: rates of the channels' clocks by name, relative.
     """
-    groups: dict[tuple[object, ...], list[Run]] = {}
+    groups = defaultdict(list)
     for run in runs:
-        groups.setdefault((*run.point.static_key, run.excitation_kind), []).append(run)
+        groups[*run.point.static_key, run.excitation_kind].append(run)
     points, unusable = [], []
     for key in sorted(groups, key=repr):
         first, spectra = groups[key][0], []
