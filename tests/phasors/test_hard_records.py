@@ -78,7 +78,9 @@ def test_channels_stand_in_order_and_make_the_vectors():
 
 
 # a strong one's beat looks like a drive off its set point, and like a shaft that changes its speed
-@pytest.mark.parametrize(("distance", "share"), [(0.4, 0.12), (-0.3, 0.12), (0.8, 0.12), (-0.35, 0.8), (0.6, 0.9)])
+@pytest.mark.parametrize(
+    ("distance", "share"), [(0.4, 0.12), (-0.3, 0.12), (0.8, 0.12), (-0.35, 0.8), (0.6, 0.9), (0.235, 0.5)]
+)
 def test_a_line_beside_the_drive_is_found_and_fitted_along(distance, share):
     data = record()
     for name in ("FX", "FY", "DX", "DY"):

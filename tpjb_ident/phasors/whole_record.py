@@ -246,8 +246,9 @@ def vertex(three: FloatArray) -> float:
 _LEAST = 6
 #: Windows that its slow change and a line take of them,
 _TAKEN = 4
-#: distances from the excitation at which a line is looked for [1 / record length],
-_NEAREST, _FARTHEST, _STEP = 1.0, 4.5, 0.1
+#: distances from the excitation at which a line is looked for [1 / record length]: a bound at one would hold a line
+#: there that stands at 0.9,
+_NEAREST, _FARTHEST, _STEP = 0.8, 4.5, 0.1
 #: power over that of the noise that it must explain, a channel,
 _CLEAR_POWER = 25.0
 #: and share of it that may be left a window: sidebands of a drive that changes come in pairs, steps leave more.
