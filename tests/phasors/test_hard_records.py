@@ -352,6 +352,19 @@ def test_a_drive_that_is_switched_over_gives_its_longest_stretch():
     assert error(result) < 2e-3
 
 
+@pytest.mark.parametrize("restart", [2.1, 2.7])
+def test_a_drive_that_pauses_and_goes_on_with_another_phase_gives_its_longest_stretch(restart):
+    """What stands idle between them belongs to neither side of the change."""
+    level = np.where(TIME < 1.6, 1.0, np.where(restart > TIME, 0.0, -1.0))
+    result = phasors_of(record(level=level))
+    first = restart > 2.4
+    assert result.span == (
+        pytest.approx(0.0 if first else restart, abs=0.3),
+        pytest.approx(1.6 if first else 4.0, abs=0.3),
+    )
+    assert error(result, Z if first else {name: -z for name, z in Z.items()}) < 2e-3
+
+
 def test_a_channel_that_fails_for_a_while_is_no_change_of_the_drive():
     data = record()
     data["DX"] = data["DX"] + np.where(TIME > 2.0, 3e-6 * np.cos(2 * np.pi * 25 * TIME), 0.0)
