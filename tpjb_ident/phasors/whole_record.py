@@ -31,7 +31,7 @@ from rigdata.run import Run
 from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.phasors.frequency import exact_frequencies
 from tpjb_ident.phasors.line_fit import LineFitter
-from tpjb_ident.phasors.lines import HIGHEST, ONE_LINE, LineSet
+from tpjb_ident.phasors.lines import HIGHEST, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors, device_readers
 
 #: Noise of a line is looked at in the bins so far from it [1 / record length],
@@ -248,7 +248,7 @@ _LEAST = 6
 _TAKEN = 4
 #: distances from the excitation at which a line is looked for [1 / record length]: a bound at one would hold a line
 #: there that stands at 0.9,
-_NEAREST, _FARTHEST, _STEP = 0.8, 4.5, 0.1
+_NEAREST, _FARTHEST, _STEP = 0.75, 4.5, 0.1
 #: power over that of the noise that it must explain, a channel,
 _CLEAR_POWER = 25.0
 #: and share of it that may be left a window: sidebands of a drive that changes come in pairs, steps leave more.
@@ -284,7 +284,7 @@ def near_line(result: RunPhasors, driven: int, duration: float) -> tuple[float, 
         remainder = float(_left(windows, time, pair[None])[0])
         power = _left(windows, time, np.array([alone, pair[:1]])).min() - remainder
         is_told = power > smallest and remainder - count * channels < _LEFT * (count - _TAKEN) * power
-        if is_told and abs(pair[1] - pair[0]) > ONE_LINE:  # nearer they are the drive's own change
+        if is_told and abs(pair[1] - pair[0]) > _NEAREST - 0.5 * _STEP:  # at the bound it is the drive's own change
             exact, near = (frequency + pair / duration).tolist()
             return exact, near
     return None
