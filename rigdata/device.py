@@ -3,7 +3,7 @@
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -54,14 +54,18 @@ class Grid:
     label: str = ""
     begin: float = 0.0  #: first time [s]; NaN where it is missing
     times: int | None = None  #: of a time column that should serve it but has not its length
-    places: IntArray | None = None  #: of its rows, where a logger left rows out
+    places: IntArray | None = None  #: of its rows, where a logger left rows out: readings without a value
+    even: bool = False  #: times are counted from the first one and the rate: the file's are rounded
     channels: list[str] = field(default_factory=list)
 
 
 #: Steps this many times longer than nearly all are gaps.
 _GAP = 3.0
-#: Steps of an even grid are whole within this.
-_EVEN = 0.2
+#: Times whose steps are even within this are as good as even, jittering ones are on a grid within that share of a step,
+#: rounded ones within that share of their resolution.
+_FINE, _EVEN, _WITHIN = 0.05, 0.2, 0.6
+#: Share by which `rate_of_time` may miss the rate: 990 Hz in milliseconds look like 1000 Hz with every hundredth lost.
+_RATE_DOUBT = 2e-3
 
 
 def rate_of_time(time: FloatArray) -> float:
@@ -91,22 +95,36 @@ def _without_gaps(time: FloatArray) -> FloatArray:
 def timed_grid(length: int, clock: str, time: FloatArray, label: str, nominal_rate: float | None) -> Grid:
     """The grid of a time column, by its first times (n,) [s] or all; of a stated rate where these tell none."""
     rate, begin = rate_of_time(time), float(time[0]) if len(time) else 0.0
-    places = _places(time) if len(time) == length else None
-    length = length if places is None else int(places[-1]) + 1
-    return Grid(length, clock, rate if rate > 0 else nominal_rate or rate, label, begin, places=places)
+    grid = Grid(length, clock, rate if rate > 0 else nominal_rate or rate, label, begin)
+    steps = np.diff(time) * rate
+    is_uneven = len(time) == length and np.abs(steps - 1.0).max(initial=0.0) > _FINE
+    return _placed(grid, (time - begin) * rate, steps) if is_uneven else grid
 
 
-def _places(time: FloatArray) -> IntArray | None:
-    """Places (n,) of rows on an even grid of times (n,) that a logger left rows out of; None where it left out none.
+def _placed(grid: Grid, time: FloatArray, steps: FloatArray) -> Grid:
+    """The grid of rounded stamps, and of rows that a logger left out: readings without a value; else as it is.
 
-    A row that is left out is a reading without a value: what is known of gaps is known of either.
+    Rows between gaps share an offset, of which their mean tells more than a rounded gap. `time` (n,) from the first
+    and its steps (n - 1,), over a step of the grid.
     """
-    steps = np.diff(time) * rate_of_time(time)
+    spaces = np.diff(np.unique(steps[steps <= _GAP * np.median(steps[steps > 0.0])]))
+    resolution = np.min(spaces, where=spaces > _FINE * spaces.max(initial=0.0), initial=np.inf)
     counts = np.rint(steps)
-    is_even = np.all((counts >= 1) & (np.abs(steps - counts) < _EVEN))
-    if not is_even or not len(steps) < counts.sum() < 2 * len(time):
-        return None
-    return np.append(0, np.cumsum(counts)).astype(np.intp)
+    is_whole = np.all((counts > 0) & (np.abs(steps - counts) < _EVEN))
+    is_whole &= abs(time[-1] / counts.sum() - 1.0) < _RATE_DOUBT
+    stretch = np.append(0, np.cumsum(steps > (1.5 if is_whole else 1.0 + 1.1 * resolution)))
+    rows = np.arange(len(time))
+    row, moment = (np.bincount(stretch, values) / np.bincount(stretch) for values in (rows, time))
+    within = rows - row[stretch]
+    offsets = moment * (within @ within) / (within @ time) - row
+    places = rows + np.rint(offsets - offsets[0]).astype(int)[stretch]
+    step, begin = np.polyfit(places, time, 1).tolist()
+    is_even = np.abs(time - step * places - begin).max() < _WITHIN * resolution < np.inf
+    if not (is_even or is_whole) or places[-1] >= 2 * len(time):
+        return grid
+    if is_even:
+        grid = replace(grid, rate=grid.rate / step, begin=grid.begin + begin / grid.rate, even=True)
+    return replace(grid, length=int(places[-1]) + 1, places=places if places[-1] >= len(time) else None)
 
 
 def planned(
@@ -204,7 +222,7 @@ def by_clock(grids: Iterable[Grid], channels: Channels) -> tuple[Device, ...]:
         grid = grid_of[names[0]]
         name = letter or (grid.label if devices else "")
         if name in devices:
-            name = f"{name}, {grid.rate:.6g} Hz" if name else f"{grid.rate:.6g} Hz"
+            name = f"{name}, {grid.rate:.6g} Hz".removeprefix(", ")
         while name in devices:
             name += "'"
         counted = not grid.clock and grid.begin == 0.0

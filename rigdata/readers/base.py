@@ -204,7 +204,7 @@ class RunReader(RecordFile):
     def device_time(self, name: str, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,) of a channel's samples: the file's, else counted from its device's rate."""
         grid = self._grid(name)
-        if not grid.clock:
+        if grid.even or not grid.clock:
             return grid.begin + np.arange(start, stop) / grid.rate
         if grid.places is None:
             return self._clock_times(grid.clock, start, stop)

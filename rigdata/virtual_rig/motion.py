@@ -55,7 +55,7 @@ class Motion:
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
         """X and Y of "displacement" [m], "force" [N] or "acceleration" [m/s^2] at `time` (n,) [s] -> (n, 2)."""
         mean = {"displacement": self.position, "force": self.load}.get(quantity, np.zeros(2))
-        if mean.ndim == 2 and not np.array_equal(time, self.time):
+        if mean.ndim == 2:
             mean = np.stack([np.interp(time, self.time, column) for column in mean.T], axis=1)
         out = np.broadcast_to(mean, (len(time), 2)).copy()
         for line in self.lines:
@@ -205,8 +205,6 @@ def held_back(load: FloatArray, friction: float) -> FloatArray:
     The play operator: going up the pivot feels (1 - friction) of the load, going down (1 + friction), and on
     reversal it waits until the load has crossed that gap.
     """
-    if friction == 0.0:
-        return load
     felt = np.empty_like(load)
     low, high = (load * (1 - friction)).tolist(), (load * (1 + friction)).tolist()
     # a falling test begins at the top of a load that came from above

@@ -516,6 +516,17 @@ def test_a_multisine_that_starts_late_or_ends_early_is_taken_where_it_drives(tmp
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seconds", "held"), [(2.5, "its period of 1 s 2.5 times"), (2.1, "its period of 1 s 2.1 times")]
+)
+def test_a_multisine_that_is_held_less_than_three_times_is_told_with_its_period(tmp_path, seconds, held):
+    """Half the period, which the record holds five times, is none."""
+    rig = cf.Rig(excitation="multisine", seconds=seconds, directions=(20.0, 110.0))
+    with pytest.raises(RigDataError, match=f"a multi-sine, but the record holds {held}; three periods are needed"):
+        identify(load_campaign(cf.write_rig(tmp_path, rig)))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("band", [(8.0, 60.0), (25.0, 28.5)])
 def test_a_band_in_which_nothing_drives_gives_no_line_and_says_so(tmp_path, band):
     rig = cf.Rig(excitation="multisine", band=band, seconds=6.0, directions=(20.0, 110.0), amplitude=1e-9)

@@ -86,6 +86,10 @@ def test_a_load_that_is_held_on_one_step_of_the_converter_is_not_clipped(kind, n
     wave = np.minimum(70.0 * np.sin(np.arange(2400) / 20.0), 60.0).round()
     check_signal(report, replace(probe, name="B"), seen(wave), False, PROBES)
     assert any(f.key == "clipped B" for f in report.findings)
+    # a keyphasor knows two levels
+    pulses = np.where(np.arange(2400) % 20 < 2, -12.0, 0.0)
+    check_signal(report, Channel("K", "keyphasor", "V"), seen(pulses), False, PROBES)
+    assert not any(f.key == "clipped K" for f in report.findings)
 
 
 def test_coarse_converters_repeat_readings_without_being_stuck():

@@ -63,6 +63,15 @@ def test_a_channel_at_its_own_rate_is_not(step):
     assert slower_channel(values, 2000.0) is None
 
 
+def test_what_a_converters_few_steps_make_of_lines_fills_no_channel():
+    """All sums of 20 Hz agree, one of them by chance as a rate's do."""
+    rng = np.random.default_rng(23)
+    t, phases = np.arange(12799) / 5120.0, rng.uniform(0, 6, 3)
+    lines = zip((3.02, 12.63, 1.06), (140.0, 200.0, 400.0), phases)
+    values = sum(size * np.cos(2 * np.pi * f * t + phase) for size, f, phase in lines)
+    assert slower_channel(np.round(values + 0.02 * rng.standard_normal(len(t))), 5120.0) is None
+
+
 def test_blows_and_sweeps_fill_no_channel():
     t, noise = np.arange(8000) / 2000.0, 1e-3 * np.random.default_rng(3).standard_normal(8000)
     blows = np.zeros(8000)

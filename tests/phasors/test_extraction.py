@@ -340,6 +340,13 @@ def test_a_record_too_short_is_refused_with_the_length_it_takes():
     assert length / RATE >= needed * 0.99
 
 
+def test_lines_that_nearly_coincide_are_refused_in_bounded_time():
+    """Windows of days would have more samples than memory."""
+    lines = known_lines((440.0, 440.000001), 22.0, RATE)
+    with pytest.raises(RecordTooShortError, match=r"nearest to the excitation is 1e-06 Hz away; it takes at least"):
+        plan_windows(8000, RATE, lines)
+
+
 def test_gaps_at_other_places_in_every_channel_need_no_robust_fit(monkeypatch):
     """The samples present are fitted by the normal equations less the missing ones: 20 times quicker, and exact."""
     rng = np.random.default_rng(8)

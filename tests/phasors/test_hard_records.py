@@ -78,7 +78,9 @@ def test_channels_stand_in_order_and_make_the_vectors():
 
 
 # a strong one's beat looks like a drive off its set point, and like a shaft that changes its speed
-@pytest.mark.parametrize(("distance", "share"), [(0.4, 0.12), (-0.3, 0.12), (0.8, 0.12), (-0.35, 0.8), (0.6, 0.9)])
+@pytest.mark.parametrize(
+    ("distance", "share"), [(0.4, 0.12), (-0.3, 0.12), (0.8, 0.12), (-0.35, 0.8), (0.6, 0.9), (0.235, 0.5)]
+)
 def test_a_line_beside_the_drive_is_found_and_fitted_along(distance, share):
     data = record()
     for name in ("FX", "FY", "DX", "DY"):
@@ -101,9 +103,19 @@ def test_a_drive_off_its_set_point_is_one_line_and_turns_no_shaft(off):
     assert {str(condition) for condition in result.conditions} == {"excitation off set point"}
 
 
-def test_a_drive_that_grows_or_wanders_is_no_second_line():
-    for level in (1 + 0.1 * TIME / SECONDS, 1 + 0.03 * np.cos(2 * np.pi * 0.4 * TIME)):
-        assert "unexpected lines" not in phasors_of(record(level=level)).conditions
+SLOW_CHANGES = [1 + 0.1 * TIME / SECONDS, 1 + 0.03 * np.cos(2 * np.pi * 0.4 * TIME)]
+SLOW_CHANGES += [np.exp(growth * TIME / SECONDS) for growth in (-4.0, -1.5, 1.8)]
+
+
+# a decay looks like two lines on one another, which no window of whatever length tells apart
+@pytest.mark.parametrize("level", SLOW_CHANGES)
+def test_a_drive_that_grows_or_decays_or_wanders_is_no_second_line(level):
+    result = phasors_of(record(level=level))
+    assert "unexpected lines" not in result.conditions
+    assert "found" not in [line.name for line in result.lines.nuisance]
+    good = result.z[np.isfinite(result.z[:, 0]).all(axis=1), 0]
+    assert len(good) >= 10
+    assert np.median(good[:, 0] / good[:, 2]) == pytest.approx(Z["DX"] / Z["FX"], rel=0.02)
 
 
 def test_a_shaft_at_twice_the_excitation_is_the_shafts():
@@ -338,6 +350,19 @@ def test_a_drive_that_is_switched_over_gives_its_longest_stretch():
     result = phasors_of(data)
     assert result.span == (0.0, pytest.approx(2.2, abs=0.3))
     assert error(result) < 2e-3
+
+
+@pytest.mark.parametrize("restart", [2.1, 2.7])
+def test_a_drive_that_pauses_and_goes_on_with_another_phase_gives_its_longest_stretch(restart):
+    """What stands idle between them belongs to neither side of the change."""
+    level = np.where(TIME < 1.6, 1.0, np.where(restart > TIME, 0.0, -1.0))
+    result = phasors_of(record(level=level))
+    first = restart > 2.4
+    assert result.span == (
+        pytest.approx(0.0 if first else restart, abs=0.3),
+        pytest.approx(1.6 if first else 4.0, abs=0.3),
+    )
+    assert error(result, Z if first else {name: -z for name, z in Z.items()}) < 2e-3
 
 
 def test_a_channel_that_fails_for_a_while_is_no_change_of_the_drive():

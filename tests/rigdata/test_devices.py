@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigdata import RigDataError, Run, load_campaign
-from rigdata.device import rate_of_time
+from rigdata.device import rate_of_time, timed_grid
 from tests.foreign_files import Columns, write_columns, write_groups
 from tests.manifests import PROBES, SET_POINT, manifest, write_files, write_hdf5
 
@@ -118,7 +118,7 @@ def test_one_missing_reading_is_missing_and_moves_no_other(tmp_path):
         columns = {"L1H": spread(lost), "L1V": spread(-other)}
         force = recorded(tmp_path / "r.csv", FAST | columns, slow_cells(), RATE).vector("force")
         assert np.flatnonzero(np.isnan(force.values[:, 0])).tolist() == [7]
-        np.testing.assert_allclose(force.time, COUNTED)
+        np.testing.assert_allclose(force.time, COUNTED, atol=1e-9)
 
 
 def test_a_time_column_wins_over_a_stated_rate_and_that_over_the_runs(tmp_path):
@@ -226,6 +226,47 @@ def test_rows_that_a_time_dataset_left_out_are_readings_without_a_value(tmp_path
     part = run.record("L1H", 5, 25)  # a slice begins and ends where its samples are
     np.testing.assert_array_equal(part.values, force.values[5:25])
     np.testing.assert_allclose(part.time, T2[5:25], atol=1e-9)
+
+
+STAMPS = {"rounded": np.round, "cut": np.floor, "float32": lambda stamps: np.float64(np.float32(stamps))}
+
+
+@pytest.mark.parametrize("file", ["r.csv", "r.h5"])
+@pytest.mark.parametrize("kind", STAMPS)
+@pytest.mark.parametrize("stated", [None, RATE * 1.6])
+@pytest.mark.parametrize("lost", [np.s_[:0], np.s_[700:760]])
+def test_rounded_stamps_are_those_of_an_even_grid(tmp_path, file, kind, stated, lost):
+    """At 1600 Hz, stamps in milliseconds repeat; as floats of 32 bits, at noon, eight in a row are alike."""
+    time = 43200.0 + np.arange(2000) / (1.6 * RATE)
+    stamps = STAMPS[kind](1000.0 * time) / 1000.0 if kind != "float32" else STAMPS[kind](time)
+    columns = {name: np.delete(values, lost) for name, values in {"Time": stamps, **FAST}.items()}
+    run = recorded(tmp_path / file, columns, {"Time": TIME, **PROBES}, stated)
+    record = run.record("X1A")
+    assert len(record) == 2000
+    assert run.sample_rate == pytest.approx(1.6 * RATE, rel=2e-4)
+    np.testing.assert_allclose(np.diff(record.time), 1 / (1.6 * RATE), rtol=2e-4)
+    np.testing.assert_allclose(record.time, time, atol=5e-4 if kind == "cut" else 1e-4)
+    missing = np.isnan(record.values)
+    assert np.flatnonzero(missing).tolist() == list(range(2000)[lost])
+
+
+@pytest.mark.parametrize("jitter", [0.06, 0.3])
+@pytest.mark.parametrize("digits", [4, 9])
+def test_times_of_a_clock_that_jitters_are_no_rounded_ones(jitter, digits):
+    time = np.round(T + jitter / RATE * np.random.default_rng(5).uniform(-1, 1, len(T)), digits)
+    grid = timed_grid(len(T), "t", time, "", None)
+    assert not grid.even
+    assert grid.places is None
+    assert grid.length == len(T)
+
+
+@pytest.mark.parametrize(("rate", "resolution"), [(900.0, 1e-3), (990.0, 1e-3), (2000.0, 0.0864)])
+def test_rounding_alone_loses_no_rows(rate, resolution):
+    """900 samples a second in milliseconds look like 1000 of which every tenth is missing; in days, of six digits."""
+    grid = timed_grid(6000, "t", resolution * np.round(np.arange(6000) / rate / resolution), "", None)
+    assert grid.even
+    assert grid.length == 6000
+    assert grid.rate == pytest.approx(rate, rel=3e-4)
 
 
 def test_gaps_in_a_short_record_leave_its_rate_as_it_is():

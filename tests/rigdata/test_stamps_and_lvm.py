@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rigdata import RigDataError, Run, load_campaign
+from rigdata.device import timed_grid
 from rigdata.readers.text.cells import stamp_seconds
 from rigdata.survey.exports import read_export
 from tests.foreign_files import lvm_text, read_series
@@ -63,7 +64,9 @@ def test_a_column_of_dates_beside_the_times_is_no_trouble(tmp_path):
 def test_stamps_coarser_than_the_samples_are_spread_evenly_and_midnight_is_no_step_back(cells, step):
     time, bad = stamp_seconds(cells)
     assert bad == 0
-    np.testing.assert_allclose(np.diff(time), step, rtol=0.01 if step < 0.1 else 1e-8)
+    grid = timed_grid(len(time), "stamps", time, "", None)
+    assert (grid.even, grid.length) == (step < 0.1, len(time))
+    assert grid.rate == pytest.approx(1 / step, rel=1e-3)
 
 
 def test_a_cell_that_is_no_stamp_is_named_by_its_line(tmp_path):

@@ -236,7 +236,7 @@ def read_points(
     """
     groups = defaultdict(list)
     for run in runs:
-        groups[(*run.point.static_key, run.excitation_kind)].append(run)
+        groups[*run.point.static_key, run.excitation_kind].append(run)
     points, unusable = [], []
     for key in sorted(groups, key=repr):
         first, spectra = groups[key][0], []

@@ -88,7 +88,7 @@ def find_period(clean: Samples, band: tuple[float, float], lines: tuple[Line, ..
     finer = math.ceil(_POINTS * band[1] / clean.rate)
     pairs = (rows * window, rows * window), (rows**2, window[None] ** 2)
     alike, power = (_correlation(*pair, finer) for pair in pairs)
-    part = alike[::finer][first : n // _MIN_PERIODS + 1]
+    part = alike[::finer][first : n // 2 + 1]
     lags = local_maxima(part, 0.0) + first
     if not len(lags):
         return None
@@ -152,7 +152,7 @@ def _chance_of_noise(clean: Samples, period: float, band: tuple[float, float], l
     periodic = resampled(clean, period, band[1])
     count = periodic.length // round(period)
     step = periodic.rate / max(periodic.length, 1)
-    if count < _MIN_PERIODS:
+    if count < 2:
         return 1.0
     power = np.sum(np.abs(np.fft.rfft(periodic.signals(), axis=1)) ** 2, axis=0)
     bins = np.arange(len(power))
@@ -347,10 +347,13 @@ def _period(
     part = driven_part(clean, band)
     clean, driven = (record.mapped(lambda rows: rows[:, part]) for record in (clean, samples))
     period = find_period(clean, band, lines, 1.0 if is_stated else _LEFT)
-    if period is not None:
+    if period is not None and _MIN_PERIODS * period <= clean.length:
         return resampled(driven, period, band[1]), round(period)
     if is_stated:
-        text = "a multi-sine, but no period is found that the record holds three times"
+        shown = "its period is not found"
+        if period is not None:
+            shown = f"the record holds its period of {period / clean.rate:.4g} s {clean.length / period:.2g} times"
+        text = f"a multi-sine, but {shown}; three periods are needed"
         cure = 'Record longer; or state excitation = "random" if it does not repeat'
         raise refuse(run.file, "excitation", text, cure, run.id)
     return samples, None

@@ -31,10 +31,8 @@ from tpjb_ident.phasors.whole_record import vertex
 _MAX_LOST = 0.01
 #: and from which share on it is said.
 _TOLD_LOST = 1e-4
-#: Time stamps may stray this share of a sample from the even grid, beyond what their last digit rounds.
+#: Time stamps may stray this share of a sample from the even grid.
 _MAX_JITTER = 0.05
-#: Finest step of rounded time stamps that is looked for [s].
-_FINEST = 1e-7
 #: Half the length of the kernel [samples], and the shape of its Kaiser window: 1e-5 of a tone up to 0.4 of the rate.
 _TAPS, _KAISER, _REACH = 24, 9.0, 0.4
 #: Relative difference of rates up to which devices are alike but for their clocks.
@@ -140,7 +138,7 @@ def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
     place = np.flatnonzero(np.isfinite(time))
     off = time[place] * rate - place
     drift = np.polyval(np.polyfit(place, off, 1), place)
-    if np.abs(off - drift).max() > _MAX_JITTER + 0.6 * rate * _rounding(time[place]):
+    if np.abs(off - drift).max() > _MAX_JITTER:
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
         raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
     return float(np.median(off)) / rate
@@ -156,16 +154,6 @@ def _refuse_unlike(run: Run, reader: DeviceReader, highest: float) -> None:
     if need:
         place, fault = f"device of channel {reader.channels[0].name}", f"is sampled at {reader.rate:.6g} Hz, {need}"
         raise refuse(run.file, place, fault, cure, run.id)
-
-
-def _rounding(time: FloatArray) -> float:
-    """Step [s] to which time stamps are rounded, a power of ten; zero where none is seen."""
-    step = 0.1
-    while step > _FINEST:
-        if np.abs(time / step - np.round(time / step)).max() < 1e-4:
-            return step
-        step /= 10
-    return 0.0
 
 
 def without_glitches(values: FloatArray) -> FloatArray:

@@ -136,7 +136,7 @@ def _alike(findings: Iterable[Finding]) -> Iterable[list[Finding]]:
     """Findings by key and severity."""
     groups = defaultdict(list)
     for finding in findings:
-        groups[(finding.key, finding.problem.severity)].append(finding)
+        groups[finding.key, finding.problem.severity].append(finding)
     return groups.values()
 
 

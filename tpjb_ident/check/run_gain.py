@@ -114,7 +114,7 @@ def point_runs(observations: Sequence[Observation]) -> list[PointRuns]:
         measured = np.array([observation.film_force, observation.line("displacement")])
         if is_clear and len(probes) == 2 and not observation.report.cells_doubted and np.isfinite(measured).all():
             named = ((channel.name, channel.axis) for channel in [*probes, *observation.of("force")])
-            groups[(point, *named)].append(observation)
+            groups[point, *named].append(observation)
     return [_readings(group) for group in groups.values()]
 
 

@@ -53,7 +53,8 @@ def check_signal(
     if not noise_free and stands_still(statistics):
         report.ask("stuck", statistics.longest_flat / statistics.samples, name, **words)
     clipped = statistics.clipped_share()
-    if clipped > 0 and (is_dynamic or not _is_held(statistics)):
+    # of a keyphasor its edges count alone
+    if clipped > 0 and channel.quantity != "keyphasor" and (is_dynamic or not _is_held(statistics)):
         report.ask("clipped", clipped, name, **words)
     if channel.quantity == "temperature":
         cold, hot = np.sort(channel.to_si(np.array([statistics.low, statistics.high]))) - _CELSIUS
@@ -94,10 +95,4 @@ def check_clock(report: Reporter, time: FloatArray) -> None:
         longest, lost = int(gaps[np.argmax(steps[gaps])]), np.sum(steps[gaps] - 1)
         words = {"gaps": len(gaps), "longest": steps[longest] / rate, "sample": longest}
         report.ask("gap", lost / len(steps), lost=lost, **words)
-    usual = steps[steps < 1.5]
-    if len(usual) < len(steps) / 2:
-        return
-    scatter, resolution = float(np.std(usual)), float(np.min(steps[steps > 0], initial=1.0))
-    is_rounded = resolution > 0.3 and np.max(np.abs(usual - 1)) <= resolution
-    cause = "the time column is rounded" if is_rounded else "the clock jitters"
-    report.ask("jitter", min(scatter, 0.2) if is_rounded else scatter, cause=cause, scatter=scatter)
+    report.ask("jitter", float(np.std(np.append(1.0, steps[steps <= 1.9]))))

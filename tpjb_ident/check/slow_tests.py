@@ -146,7 +146,7 @@ def check_locus(runs: Sequence[Observation]) -> None:
     for run in runs:
         means = run.mean("force"), run.mean("displacement")
         if np.isfinite(means).all() and len(run.of("displacement")) == 2 and not run.report.cells_doubted:
-            groups[(run.run.point.static_load, run.run.point.spin)].append(run)
+            groups[run.run.point.static_load, run.run.point.spin].append(run)
     for group in groups.values():
         loads = np.array([run.mean("force") for run in group])
         places = np.array([run.mean("displacement") for run in group])

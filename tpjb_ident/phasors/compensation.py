@@ -41,6 +41,9 @@ _CLEAR = 25.0
 #: Sums of frequencies to either side [bins], above whose usual agreement a rate stands so many times (blows agree at
 #: many of them, and come to 5; filled channels to 12 and more), and the least of a rate: what is folded back has less.
 _BESIDE, _ABOVE, _AGREEMENT = 40, 6.0, 0.35
+#: So far from multiples of a rate, over it and folded back, other sums agree by that much less: what a converter's few
+#: steps make of lines agrees at many.
+_NO_MULTIPLE, _RIVALS = 0.1, 1.8
 #: Multiples of a rate that tell it more sharply.
 _MULTIPLES = 4
 #: Part of f_s in which images tell the order of filling, and how far from it they may be, relative.
@@ -133,12 +136,16 @@ def slower_channel(values: FloatArray, export_rate: float, speed: float = 0.0) -
     step, orders = export_rate / n, np.array([1.0, 2.0])
     near_shaft = np.abs(peaks[:, None] * step - orders * speed) < orders * (SPEED_DRIFT + 2 * step)
     peaks = peaks[~near_shaft.any(axis=1)]
-    for k in peaks[chance[peaks] > _CLEAR].tolist():
+    clear = peaks[chance[peaks] > _CLEAR]
+    for k in clear.tolist():
+        ratio = np.array([clear, n - clear, 2 * n - clear]) / k
+        others = clear[np.all(np.abs(ratio - np.round(ratio)) > _NO_MULTIPLE, axis=0)]
         order = _filling_order(size, k)
         nearby = np.median(agreement[max(k - _BESIDE, 0) : k + _BESIDE + 1])
         again = agreement[2 * k - 2 : 2 * k + 3]
         is_repeated = len(again) < 5 or again.max() >= 0.5 * agreement[k]
-        if agreement[k] > max(_ABOVE * nearby, _AGREEMENT) and is_repeated and order is not None:
+        least = max(_ABOVE * nearby, _RIVALS * agreement[others].max(initial=0.0), _AGREEMENT)
+        if agreement[k] > least and is_repeated and order is not None:
             slower = SlowerChannel(_sharpened(agreement, chance, k) * export_rate / n, export_rate, order)
             return replace(slower, rate=export_rate / slower.steps) if slower.steps else slower
     return None

@@ -162,6 +162,8 @@ def _faint_lines(driven: tuple[Line, ...], speed: float) -> list[Line]:
 _COUNT, _CYCLES, MAX_INFLATION = 20, 4.0, 1.3
 #: Samples per window, where a shorter one resolves the lines.
 MAX_SAMPLES = 2**16
+#: Even samples that tell how well a window separates its lines, at most.
+_EVEN = 2**14
 
 
 class RecordTooShortError(TpjbError):
@@ -186,7 +188,10 @@ def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, ra
     """Worst variance of an excitation phasor against a fit of that line alone; `frequencies` (n_lines,)."""
     # A few hundred samples carry the whole geometry as long as no line aliases.
     step = max(1, int(rate / (8.0 * frequencies.max())))
-    design = line_design(np.arange(0, round(length * rate), step) / rate, frequencies)
+    even = range(0, round(length * rate), step)
+    # beyond some thousand, scattered ones do that too, however long the window
+    time = np.array(even) / rate if len(even) <= _EVEN else length * np.random.default_rng(0).random(_EVEN)
+    design = line_design(time, frequencies)
     if design.shape[0] <= design.shape[1]:
         return math.inf
     r = np.linalg.qr(design, mode="r")

@@ -64,16 +64,18 @@ def longest_stretch(result: RunPhasors) -> RunPhasors:
     good = np.flatnonzero(np.isfinite(z).all(axis=(1, 2)))
     if len(good) < _LEAST or len(set(quantity)) < 2:
         return result
-    windows = z[good]
-    groups = [windows[:, :, quantity == q].reshape(len(good), -1) for q in ("displacement", "force")]
-    cuts = sorted(_cuts(groups, 0, len(good)))
-    level = np.sqrt(np.mean(np.abs(windows) ** 2, axis=(1, 2)))
+    level = np.sqrt(np.mean(np.abs(z[good]) ** 2, axis=(1, 2)))
     idle = (level < _DEVIATIONS) | (level < _QUIET * np.quantile(level, 0.9))
-    is_steady = not cuts and not (idle.any() and np.median(level) > _DEVIATIONS)
-    if is_steady or idle.all():
+    if idle.all():
         return result
-    inside = _longest(windows.reshape(len(good), -1), np.array([0, *cuts, len(good)]), idle)
-    repeats = good[inside]
+    driven_windows = good[~idle]
+    windows, count = z[driven_windows], len(driven_windows)
+    groups = [windows[:, :, quantity == q].reshape(count, -1) for q in ("displacement", "force")]
+    cuts = sorted(_cuts(groups, 0, count))
+    is_steady = not cuts and not (idle.any() and np.median(level) > _DEVIATIONS)
+    if is_steady:
+        return result
+    repeats = driven_windows[_longest(windows.reshape(count, -1), np.array([0, *cuts, count]))]
     z = np.full_like(result.z, np.nan)
     z[repeats] = result.z[repeats]
     first, last = result.start[repeats[[0, -1]]].tolist()
@@ -105,10 +107,10 @@ def _scatter(windows: ComplexArray) -> float:
     return float(squares.sum() - squares.max())
 
 
-def _longest(windows: ComplexArray, edges: IntArray, idle: BoolArray) -> BoolArray:
+def _longest(windows: ComplexArray, edges: IntArray) -> BoolArray:
     """Windows (n,) of the longest driven stretch that do not lie across a change; `windows` (n, m)."""
     stretch = np.repeat(np.arange(len(edges) - 1), np.diff(edges))
-    inside = ~idle & (stretch == np.bincount(stretch[~idle]).argmax())
+    inside = stretch == np.bincount(stretch).argmax()
     places = np.flatnonzero(inside)
     middle = complex_median(windows[places])
     distance = np.linalg.norm(windows - middle, axis=1)

@@ -197,7 +197,7 @@ def contradictions(
     groups = defaultdict(list)
     for name in slopes[0] if slopes else ():
         if all(name in run_slopes for run_slopes in slopes):
-            groups[(str(channels[name].quantity), channels[name].plane)].append(name)
+            groups[channels[name].quantity, channels[name].plane].append(name)
     contradicting = []
     for (quantity, _), names in groups.items():
         columns = []

@@ -246,8 +246,9 @@ def vertex(three: FloatArray) -> float:
 _LEAST = 6
 #: Windows that its slow change and a line take of them,
 _TAKEN = 4
-#: distances from the excitation at which a line is looked for [1 / record length],
-_NEAREST, _FARTHEST, _STEP = 1.0, 4.5, 0.1
+#: distances from the excitation at which a line is looked for [1 / record length]: a bound at one would hold a line
+#: there that stands at 0.9,
+_NEAREST, _FARTHEST, _STEP = 0.75, 4.5, 0.1
 #: power over that of the noise that it must explain, a channel,
 _CLEAR_POWER = 25.0
 #: and share of it that may be left a window: sidebands of a drive that changes come in pairs, steps leave more.
@@ -282,7 +283,8 @@ def near_line(result: RunPhasors, driven: int, duration: float) -> tuple[float, 
             pair = minimize(lambda places: _left(windows, time, places[None])[0], pair, method="Nelder-Mead").x
         remainder = float(_left(windows, time, pair[None])[0])
         power = _left(windows, time, np.array([alone, pair[:1]])).min() - remainder
-        if power > smallest and remainder - count * channels < _LEFT * (count - _TAKEN) * power:
+        is_told = power > smallest and remainder - count * channels < _LEFT * (count - _TAKEN) * power
+        if is_told and abs(pair[1] - pair[0]) > _NEAREST - 0.5 * _STEP:  # at the bound it is the drive's own change
             exact, near = (frequency + pair / duration).tolist()
             return exact, near
     return None

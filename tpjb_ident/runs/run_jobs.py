@@ -19,7 +19,6 @@ H_b) D.
 import hashlib
 import json
 import shutil
-import zipfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -52,18 +51,6 @@ from tpjb_ident.runtime.tables import write_atomic
 
 #: What tells whether a file is still the one that was read: size, time of its last change [ns], node.
 FileState = tuple[int, int, int]
-#: What reading says of an entry that is cut off, or that somebody else wrote.
-_NOT_OURS = (
-    OSError,
-    ValueError,
-    LookupError,
-    TypeError,
-    AttributeError,
-    EOFError,
-    MemoryError,
-    RuntimeError,
-    zipfile.BadZipFile,
-)
 #: Classes that a result is made of, field by field, and series of values.
 _RECORDS = (
     RunDigest, OperatingPoint, LineSet, Line, FilmLine,
@@ -112,8 +99,8 @@ class RunStore:
             meta = json.loads(str(arrays.pop("meta")))
             mark, result = meta["fingerprint"], unpacked(meta["result"], arrays, run)
             is_ours = meta["run"] == run.id and isinstance(mark, str) and isinstance(result, RunDigest)
-        except _NOT_OURS:
-            is_ours = False  # not there, cut off, or not ours: the run is simply done again
+        except Exception:  # whatever reading says of what is not there, cut off, or not ours: the run is done again
+            is_ours = False
         return (mark, result) if is_ours else ("", None)
 
     def keep(self, mark: str, result: RunDigest) -> None:

@@ -261,7 +261,7 @@ def _walk_matrix(walk: _Bytes, depth: int) -> None:
     if kind == _CHAR:
         walk.element(*_TEXTS)
     elif kind == _SPARSE or 6 <= kind <= 15:
-        for _ in range((2 if kind == _SPARSE else 0) + 1 + is_complex):
+        for _ in range(2 * (kind == _SPARSE) + 1 + is_complex):
             walk.element(*_NUMBERS)
     elif kind in (_CELL, _STRUCT, _OBJECT, _FUNCTION, _OPAQUE):
         if kind == _OBJECT:

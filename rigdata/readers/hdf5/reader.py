@@ -195,9 +195,11 @@ class Hdf5Reader(RunReader):
                 clock = names[place]
                 time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
                 grid = timed_grid(lengths[clock], clock, time, clock, run_rate)
-                timed[clock] = grid if rate is None or self.channels[clock].clock else replace(grid, rate=rate)
+                if rate is not None and not (grid.even or self.channels[clock].clock):
+                    grid = replace(grid, rate=rate)
+                timed[clock] = grid
             timings = {name: Grid(length) for name, length in lengths.items() if name not in timed}
-            for name, i in zip(names, serving(names, clocks, self.channels), strict=True):
+            for name, i in zip(names, serving(names, clocks, self.channels)):
                 if i is not None and name in timings:
                     matches = [clock for clock in (names[i], *timed) if lengths[clock] == lengths[name]]
                     timings[name] = timed[matches[0]] if matches else Grid(lengths[name], times=lengths[names[i]])

@@ -148,8 +148,7 @@ def is_entry(cell: str) -> bool:
 def stamp_seconds(cells: Sequence[str | None]) -> tuple[FloatArray, int]:
     """Seconds (n,) from the first stamp of a column, and how many cells hold none where one should be.
 
-    Stamps coarser than the samples are spread evenly: several samples then bear one stamp, and the straight line
-    through them is nearer to the truth than the steps. Midnight between stamps without a date is a day.
+    Midnight between stamps without a date is a day.
     """
     matches = [_STAMP.fullmatch(cell) if cell else None for cell in cells]
     bad = sum(map(bool, cells)) - sum(map(bool, matches))
@@ -162,7 +161,7 @@ def stamp_seconds(cells: Sequence[str | None]) -> tuple[FloatArray, int]:
     if not days:
         midnights = np.cumsum(np.diff(stamped) < -0.5 * _DAY)
         stamped = stamped + _DAY * np.concatenate([[0.0], midnights])
-    seconds[good] = _spread(stamped - stamped[0])
+    seconds[good] = stamped - stamped[0]
     return seconds, bad
 
 
@@ -182,18 +181,6 @@ def _seconds(match: re.Match[str], days: dict[str, float]) -> float:
         # counted from the first day: seconds since 1970 would cost the digits below a microsecond
         start = days[text] - next(iter(days.values()))
     return start + 3600.0 * hours + 60.0 * int(minute) + float(f"{second}.{fraction or 0}")
-
-
-def _spread(time: FloatArray) -> FloatArray:
-    """Even times where several samples in a row bear one stamp, and no stamp is farther off than its own step."""
-    steps = np.diff(time)
-    if len(time) < 8 or not (steps == 0).any() or not (steps > 0).any():
-        return time
-    resolution = steps[steps > 0].min()
-    index = np.arange(len(time))
-    slope, start = np.polyfit(index, time, 1)
-    even = start + slope * index
-    return even - even[0] if np.abs(even - time).max() <= 1.5 * resolution else time
 
 
 def is_number(cell: str, decimal: str) -> bool:
