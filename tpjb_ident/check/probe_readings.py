@@ -64,7 +64,7 @@ def check_shaft_lines(runs: Sequence[Observation]) -> None:
 
     Whole operating points are told so in which a channel has another gain: their runs have no fellow without it.
     """
-    for order, speed in enumerate(("", "twice ")):
+    for order, speed in enumerate(("", "twice ", "three times ")):
         # what computed records without noise show beside their lines is rounding
         shown = [run for run in runs if NO_NOISE not in run.report.keys and _motion(run, order) >= 0]
         for name, members in _by_probe(shown, "run.point.spin"):
@@ -88,7 +88,7 @@ def _motion(run: Observation, order: int) -> float:
 def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object]) -> FloatArray:
     """By how much a line's sizes (n,), logarithms, differ from most others; zero where scatter or motion explains it.
 
-    Where no half of them agree, any may be the right one: from the farthest point. `motion` (n,): share of it that may
+    Where no half of them agree, as where a gain drifts, any may be the right one: from the farthest one. `motion` (n,): share of it that may
     be motion, which another film answers otherwise; `static`: point of every run.
     """
     codes = np.array([static.index(key) for key in static])
@@ -96,11 +96,14 @@ def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object
     spare = len(sizes) - len(set(static))
     if spare < _MIN_SPARE or np.ptp(usual) > _LOST:
         return np.zeros(len(sizes))
-    scatter = _MANY_LINES * np.median(np.abs(sizes - usual)) * math.sqrt(len(sizes) / spare)
     # the middle of two groups as large would halve what they differ by
     alone, change = sizes - usual, sizes - np.quantile(sizes, 0.5, method="lower")
+    order = np.arange(len(sizes)) - np.array([np.flatnonzero(codes == code).mean() for code in codes])
+    drift = order * (order @ alone) / max(order @ order, 1.0)
+    spread, remainder = np.median(np.abs(alone)), np.median(np.abs(alone - drift))
+    scatter = _MANY_LINES * min(spread, remainder) * math.sqrt(len(sizes) / spare)
     differs = np.abs(change) > max(_SAME_RUNOUT, scatter) + _SOFTER * (motion + np.median(motion))
-    if differs.mean() >= 0.5:
+    if differs.mean() >= 0.5 or (2 * remainder < spread and differs.any()):
         above, below = sizes - usual.min(), sizes - usual.max()
         return np.where(above > -below, above, below)
     return np.where(differs, change, np.where(np.abs(alone) > max(_SAME_LINE, scatter), alone, 0.0))

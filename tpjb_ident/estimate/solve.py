@@ -63,7 +63,7 @@ class Table:
             begin[place] = np.reshape(term.start or mean, (-1, term.width)) if known is None else self.mean[place]
             deviation[place] = np.maximum(np.reshape(spread, (-1, term.width)), _LEAST)
             self.always[place] = term.always_estimated and known is None
-            self.never[place] = term.never_estimated or known is not None
+            self.never[place] = True if known is not None else term.never_estimated
         self.precision = 1 / deviation**2
         self.value = begin
 
@@ -88,7 +88,7 @@ _STEPS, _CONVERGED = 18, 1e-9
 #: Steps in which weights and scatter follow.
 _SCATTER_STEPS = 12
 #: Steps after which the noise of the housing is found: at first, and where what turns with the shaft has settled.
-_HOUSING_STEPS = (3, 7)
+_HOUSING_STEPS = (3, 7, 11)
 #: Change of H in one step, of its size, at most: a line next to noise could run away.
 _LARGEST_STEP = 1.0
 #: Weight of an unknown beside a block's best told one below which nothing is told of it.

@@ -29,6 +29,8 @@ _UNKNOWN = 1.0
 #: Motion of a floating stator's shaft over that of the stator, before anything is known of it, one deviation; what its
 #: accelerometers may differ from the probes by gains and pitch: more is a contradiction, and no lag hides behind it.
 _SHAFT, _PITCH = 0.1, 0.02
+#: Mass of what moves with a floating stator's shaft over the stator's, one deviation.
+_HEAVY = 2.0
 #: The difference from which one of them is wrong; from which it is no work of a delay or a corner.
 _OTHERWISE, _GROSS = 0.05, 0.2
 #: A sign is beyond doubt from so many standard errors on.
@@ -87,10 +89,13 @@ class Housing(Term):
         elif rig.mount == "unknown":
             self.parameters = (_Found("inertia not measured", "1", _UNKNOWN),)
         elif rig.has_acceleration:
-            compliance = _shaft(rig, blocks) / _NANOMETRE or 1.0
+            shaft, sizes = _shaft(rig, blocks), (vector(rig, blocks, q) for q in ("displacement", "force"))
+            compliance = max(_SHAFT * _usual_ratio(*sizes) / _NANOMETRE, *shaft[:2].tolist()) or 1.0
+            self.start = (0.0, 0.0, 0.0, 0.0, *shaft.tolist(), 0.0, 0.0, 0.0)
             self.parameters = (
                 *[Parameter(f"kappa_{axes}", "1", _PITCH) for axes in ("xx", "xy", "yx", "yy")],
                 *[_Found(f"c_{axes}", "nm/N", compliance) for axes in ("xx", "yy")],
+                _Found("shaft", "kg", _HEAVY * rig.mass),
                 _Found("loss", "1", _LOSS),
                 _Found("damping", "1", _LOSS),
                 _Found("lag", "rad", _LOSS / 2 if self._is_timed else _SHAFT),
@@ -127,10 +132,11 @@ class Housing(Term):
 
     def _hung(self, blocks: Blocks, value: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Kappa and the shaft's compliance [m/N], (n, 2, 2): steel and bolts lose alike, oil with frequency."""
-        *_, loss, damping, lag = value.tolist()
-        share = blocks.omega / self._omega
+        *_, mass, loss, damping, lag = value.tolist()
+        share, springs = blocks.omega / self._omega, _NANOMETRE * value[4:6]
         kappa = np.multiply.outer(np.exp(-1j * lag * share), np.eye(2)) + value[:4].reshape(2, 2)
-        return kappa, np.multiply.outer(1 - 1j * (loss + damping * share), _NANOMETRE * np.diag(value[4:6]))
+        held = 1 + 1j * (loss + damping * share)[:, None] - mass * np.multiply.outer(blocks.omega**2, springs)
+        return kappa, (springs / held)[:, :, None] * np.eye(2)
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """In the housing's own rows, by small steps of every parameter."""
@@ -283,14 +289,22 @@ def _compliance(value: FloatArray) -> ComplexArray:
     return np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * lag), complex)
 
 
-def _shaft(rig: Rig, blocks: Blocks) -> float:
-    """What is plausible of a shaft's compliance [m/N]: its usual share of the motion, more where it moves by more.
+def _shaft(rig: Rig, blocks: Blocks) -> FloatArray:
+    """Compliances of a shaft along X and Y [nm/N] and its mass [kg]: x = C (F + omega^2 m x) by least squares.
 
-    A shaft goes where the film pushes it: no sensor that is inverted or exchanged looks like one that gives way.
+    Zeros where that leaves much: of wrong sensors, or of a shaft that gives way by no more than those differ.
     """
-    force, d, a = film_force(rig, blocks), *(vector(rig, blocks, q) for q in ("displacement", "acceleration"))
-    work = np.nan_to_num(force.conj() * (a / (blocks.omega**2)[:, None] - d)).real.sum()
-    return max(_SHAFT * _usual_ratio(d, force), float(work / max(np.nansum(np.abs(force) ** 2), 1e-300)))
+    square, d = (blocks.omega**2)[:, None], vector(rig, blocks, "displacement")
+    force, x = film_force(rig, blocks), vector(rig, blocks, "acceleration") / square - d
+    usable = np.isfinite(force + x).all(axis=1)
+    numbers, remainder = np.zeros((2, 2)), np.zeros(2)
+    for axis, pushes in enumerate(np.stack([force, square * x], axis=2)[usable].swapaxes(0, 1)):
+        numbers[axis] = np.linalg.lstsq(pushes, x[usable, axis], rcond=None)[0].real
+        remainder[axis] = np.linalg.norm(x[usable, axis] - pushes @ numbers[axis])
+    if not np.linalg.norm(remainder) < _LEFT * np.linalg.norm(x[usable]):
+        return np.zeros(3)
+    springs, heavy = numbers.T
+    return np.array([*springs / _NANOMETRE, heavy.sum() / springs.sum()])
 
 
 def _usual_ratio(first: ComplexArray, second: ComplexArray) -> float:
