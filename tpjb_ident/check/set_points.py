@@ -22,6 +22,8 @@ _NO_STATIC = (0.002, 0.02)
 _LOAD_OFF, _MANY = 0.04, 9.0
 #: Angle [deg] within which an excitation acts as stated, runs that must not, and share that one fault must explain.
 _ALONG, _SEVERAL, _NEARLY_ALL = 10.0, 3, 0.8
+#: Mass of a shaft over that of the stator, at most.
+_HEAVY = 12.0
 #: Angle [deg] within which the shaft moves as stated, whatever the force does.
 _MOVED_ALONG = 3.0
 #: Ratio of the parts that go round one way and the other from which a run tells the sense: a film far stiffer in one
@@ -194,7 +196,8 @@ def check_excitation(runs: Sequence[Observation]) -> None:
             run.report.ask("on shaft line", float(not run.run.of("keyphasor")))
         elif not run.report.cells_doubted and run.run.excitation_direction is not None:
             directed.append(run)
-    _check_directions(directed)
+    if directed:
+        _check_directions(directed)
 
 
 def _turn(run: Observation, vector: ComplexArray) -> float:
@@ -204,10 +207,27 @@ def _turn(run: Observation, vector: ComplexArray) -> float:
     return math.remainder(shown - math.degrees(run.run.excitation_direction or 0.0), 180.0)
 
 
+def _shaker_forces(runs: Sequence[Observation]) -> ComplexArray:
+    """The films' forces and the inertia of a shaft that is shaken, with a mass by every frequency, (n, 2) [N]."""
+    across = [1j * np.exp(1j * (run.run.excitation_direction or 0.0)) for run in runs]
+    omega = np.array([run.run.point.excitation for run in runs])
+    force = np.array([run.film_force for run in runs])
+    # of the housing and of the shaft, which moves against it
+    acceleration = np.array([np.nan_to_num(run.line("acceleration")) for run in runs])
+    acceleration -= (omega**2)[:, None] * np.array([run.line("displacement") for run in runs])
+    aside, moved = (v[:, 0] * np.real(across) + v[:, 1] * np.imag(across) for v in (force, acceleration))
+    for frequency in np.unique(omega):
+        alike = omega == frequency
+        mass = -float(np.median((aside / moved)[alike].real))
+        force[alike] += np.clip(mass, 0.0, _HEAVY * runs[0].run.housing_mass) * acceleration[alike]
+    return force
+
+
 def _check_directions(runs: Sequence[Observation]) -> None:
     turned = []
-    for run in runs:
-        turn = _turn(run, run.film_force)
+    for run, force in zip(runs, _shaker_forces(runs)):
+        # of a floating stator the cells show the shaker's force itself
+        turn = min((_turn(run, vector) for vector in (run.film_force, force, run.line("force"))), key=abs)
         # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
         if abs(turn) > _ALONG and not abs(_turn(run, run.line("displacement"))) <= _MOVED_ALONG:
             turned.append((run, turn))
