@@ -29,7 +29,9 @@ def observation(load, size, stated=0.0, force=0.0, displacement=45.0, frequency=
     """A run driven along `stated`, whose force and displacement act along other angles [deg]."""
     point = OperatingPoint(load, -np.pi / 2, 138.0, 2 * np.pi * frequency)
     run = SimpleNamespace(id="r", file="r.csv", point=point, excitation_direction=np.radians(stated))
+    run.housing_mass = 30.0
     lines = {"displacement": 1e-6 * directions(np.radians(displacement)), "force": size * directions(np.radians(force))}
+    lines["acceleration"] = np.zeros(2)
     return SimpleNamespace(
         run=run, report=Reporter(run), conditions=(), shows=lambda quantity: True,
         film_force=lines["force"], line=lines.get, names=lambda quantity: ["L1H", "L1V"],
@@ -118,8 +120,8 @@ def turning_run(load, frequency, size, twice=np.nan, motion=0.02):
     run = observation(load, 1000.0, frequency=frequency)
     stiffness = np.linalg.norm(run.film_force) / np.linalg.norm(run.line("displacement"))
     force = stiffness * motion * np.array([4e-6, 1e-6])
-    run.shaft_lines = np.array([[4e-6 * size, 3e-6, force[0], 0.0], [1e-6 * twice, 1e-6, force[1], 0.0]])
-    run.run.housing_mass = 30.0
+    run.shaft_lines = np.array([[4e-6 * size, 3e-6, force[0], 0.0], [1e-6 * twice, 1e-6, force[1], 0.0], [np.nan] * 4])
+    run.lines = SimpleNamespace(floor=np.full(4, 1e-9))
     run.channels = [SimpleNamespace(name=name, axis=0.0) for name in ("X1A", "X1B", "L1H", "L1V")]
     run.pick, run.spread = {"displacement": [0, 1], "force": [2, 3], "acceleration": []}.get, np.zeros((3, 4))
     return run

@@ -18,6 +18,8 @@ from tpjb_ident.check.observation import NO_NOISE, Observation
 #: Logarithm by which what turns with the shaft differs in one run, and run-out between loads (they move the shaft along
 #: by little), over the median scatter of runs, and runs beyond one a load that tell it.
 _SAME_LINE, _SAME_RUNOUT, _MANY_LINES, _MIN_SPARE = 0.06, 0.02, 6.0, 4
+#: Sizes below this many times what noise makes of a line tell nothing.
+_CLEAR = 8.0
 #: Logarithm between loads that is no gain: the shaft's speed is wrong at one, and its line stands elsewhere.
 _LOST = math.log(10.0)
 #: How much softer a film may be than along its excitation; deviation of a gain over its change: a 95 % interval holds
@@ -67,8 +69,10 @@ def check_shaft_lines(runs: Sequence[Observation]) -> None:
     for order, speed in enumerate(("", "twice ", "three times ")):
         # what computed records without noise show beside their lines is rounding
         shown = [run for run in runs if NO_NOISE not in run.report.keys and _motion(run, order) >= 0]
-        for name, members in _by_probe(shown, "run.point.spin"):
-            sizes, motion = np.transpose([(run.shaft_lines[order, k], _motion(run, order)) for run, k in members])
+        for name, alike in _by_probe(shown, "run.point.spin"):
+            members = [(run, k) for run, k in alike if run.shaft_lines[order, k] > _CLEAR * run.lines.floor[k]]
+            shown_there = [(run.shaft_lines[order, k], _motion(run, order)) for run, k in members]
+            sizes, motion = np.reshape(shown_there, (-1, 2)).T
             static = [run.run.point.static_key for run, _ in members]
             for (run, _), change in zip(members, _size_changes(np.log(sizes), motion / sizes, static).tolist()):
                 if change:

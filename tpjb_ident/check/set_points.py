@@ -7,6 +7,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import ROTATIONS, OperatingPoint
+from rigdata.vector import directions
 from tpjb_ident.check.findings import explanation, far, pointing, repairs
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
@@ -209,17 +210,16 @@ def _turn(run: Observation, vector: ComplexArray) -> float:
 
 def _shaker_forces(runs: Sequence[Observation]) -> ComplexArray:
     """The films' forces and the inertia of a shaft that is shaken, with a mass by every frequency, (n, 2) [N]."""
-    across = [1j * np.exp(1j * (run.run.excitation_direction or 0.0)) for run in runs]
+    stated = np.array([run.run.excitation_direction or 0.0 for run in runs])
     omega = np.array([run.run.point.excitation for run in runs])
     force = np.array([run.film_force for run in runs])
-    # of the housing and of the shaft, which moves against it
-    acceleration = np.array([np.nan_to_num(run.line("acceleration")) for run in runs])
-    acceleration -= (omega**2)[:, None] * np.array([run.line("displacement") for run in runs])
-    aside, moved = (v[:, 0] * np.real(across) + v[:, 1] * np.imag(across) for v in (force, acceleration))
+    motion, housing = (np.nan_to_num([run.line(q) for run in runs]) for q in ("displacement", "acceleration"))
+    shaft = housing - (omega**2)[:, None] * motion
+    aside, moved = (np.sum(directions(stated + np.pi / 2) * rows, axis=1) for rows in (force, shaft))
     for frequency in np.unique(omega):
         alike = omega == frequency
-        mass = -float(np.median((aside / moved)[alike].real))
-        force[alike] += np.clip(mass, 0.0, _HEAVY * runs[0].run.housing_mass) * acceleration[alike]
+        mass = -np.median((aside * moved.conj()).real[alike] / np.maximum(np.abs(moved[alike]) ** 2, 1e-300))
+        force[alike] += np.clip(mass, 0.0, _HEAVY * runs[0].run.housing_mass) * shaft[alike]
     return force
 
 

@@ -89,9 +89,7 @@ class Housing(Term):
         elif rig.mount == "unknown":
             self.parameters = (_Found("inertia not measured", "1", _UNKNOWN),)
         elif rig.has_acceleration:
-            shaft, sizes = _shaft(rig, blocks), (vector(rig, blocks, q) for q in ("displacement", "force"))
-            compliance = max(_SHAFT * _usual_ratio(*sizes) / _NANOMETRE, *shaft[:2].tolist()) or 1.0
-            self.start = (0.0, 0.0, 0.0, 0.0, *shaft.tolist(), 0.0, 0.0, 0.0)
+            compliance, self.start = _shaft(rig, blocks)
             self.parameters = (
                 *[Parameter(f"kappa_{axes}", "1", _PITCH) for axes in ("xx", "xy", "yx", "yy")],
                 *[_Found(f"c_{axes}", "nm/N", compliance) for axes in ("xx", "yy")],
@@ -157,7 +155,7 @@ class Housing(Term):
         conditions = self._shown(fitted)
         if self.rig.out_of_step:  # the delay tells whether it stays that they lead
             return tuple(condition for condition in conditions if condition != OUT_OF_STEP)
-        return self.rig.contradicted.get(self.name) or conditions
+        return conditions or self.rig.contradicted.get(self.name, ())
 
     def _shown(self, fitted: Fitted) -> Conditions:
         """What these numbers say of the accelerometers."""
@@ -289,10 +287,12 @@ def _compliance(value: FloatArray) -> ComplexArray:
     return np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * lag), complex)
 
 
-def _shaft(rig: Rig, blocks: Blocks) -> FloatArray:
-    """Compliances of a shaft along X and Y [nm/N] and its mass [kg]: x = C (F + omega^2 m x) by least squares.
+def _shaft(rig: Rig, blocks: Blocks) -> tuple[float, tuple[float, ...]]:
+    """Compliance [nm/N] that is plausible of a shaft, and where steps to kappa, compliances, mass and losses begin.
 
-    Zeros where that leaves much: of wrong sensors, or of a shaft that gives way by no more than those differ.
+    Its usual share of the motion, more where it moves by more: x = C (F + omega^2 m x) by least squares. A shaft goes
+    where the film pushes it: no sensor that is inverted or exchanged looks like one that gives way. No start where much
+    is left: of wrong sensors, or of a shaft that gives way by no more than sensors differ.
     """
     square, d = (blocks.omega**2)[:, None], vector(rig, blocks, "displacement")
     force, x = film_force(rig, blocks), vector(rig, blocks, "acceleration") / square - d
@@ -301,10 +301,12 @@ def _shaft(rig: Rig, blocks: Blocks) -> FloatArray:
     for axis, pushes in enumerate(np.stack([force, square * x], axis=2)[usable].swapaxes(0, 1)):
         numbers[axis] = np.linalg.lstsq(pushes, x[usable, axis], rcond=None)[0].real
         remainder[axis] = np.linalg.norm(x[usable, axis] - pushes @ numbers[axis])
-    if not np.linalg.norm(remainder) < _LEFT * np.linalg.norm(x[usable]):
-        return np.zeros(3)
     springs, heavy = numbers.T
-    return np.array([*springs / _NANOMETRE, heavy.sum() / springs.sum()])
+    work = (force.conj() * x)[usable].real.sum() / max(np.sum(np.abs(force[usable]) ** 2), 1e-300)
+    compliance = max(_SHAFT * _usual_ratio(d, force), float(work)) / _NANOMETRE or 1.0
+    if not np.linalg.norm(remainder) < _LEFT * np.linalg.norm(x[usable]):
+        return compliance, ()
+    return compliance, (*[0.0] * 4, *(springs / _NANOMETRE).tolist(), float(heavy.sum() / springs.sum()), *[0.0] * 3)
 
 
 def _usual_ratio(first: ComplexArray, second: ComplexArray) -> float:
