@@ -209,18 +209,14 @@ def _turn(run: Observation, vector: ComplexArray) -> float:
 
 
 def _shaker_forces(runs: Sequence[Observation]) -> ComplexArray:
-    """The films' forces and the inertia of a shaft that is shaken, with a mass by every frequency, (n, 2) [N]."""
-    stated = np.array([run.run.excitation_direction or 0.0 for run in runs])
-    omega = np.array([run.run.point.excitation for run in runs])
+    """The films' forces and the inertia of a shaft that is shaken, of the mass that brings them along, (n, 2) [N]."""
+    angles, omega = np.transpose([(run.run.excitation_direction or 0.0, run.run.point.excitation) for run in runs])
     force = np.array([run.film_force for run in runs])
     motion, housing = (np.nan_to_num([run.line(q) for run in runs]) for q in ("displacement", "acceleration"))
     shaft = housing - (omega**2)[:, None] * motion
-    aside, moved = (np.sum(directions(stated + np.pi / 2) * rows, axis=1) for rows in (force, shaft))
-    for frequency in np.unique(omega):
-        alike = omega == frequency
-        mass = -np.median((aside * moved.conj()).real[alike] / np.maximum(np.abs(moved[alike]) ** 2, 1e-300))
-        force[alike] += np.clip(mass, 0.0, _HEAVY * runs[0].run.housing_mass) * shaft[alike]
-    return force
+    aside, moved = (np.sum(directions(angles + np.pi / 2) * rows, axis=1) for rows in (force, shaft))
+    mass = -np.median((aside * moved.conj()).real / np.maximum(np.abs(moved) ** 2, 1e-300))
+    return force + np.clip(mass, 0.0, _HEAVY * runs[0].run.housing_mass) * shaft
 
 
 def _check_directions(runs: Sequence[Observation]) -> None:

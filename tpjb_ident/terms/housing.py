@@ -290,23 +290,19 @@ def _compliance(value: FloatArray) -> ComplexArray:
 def _shaft(rig: Rig, blocks: Blocks) -> tuple[float, tuple[float, ...]]:
     """Compliance [nm/N] that is plausible of a shaft, and where steps to kappa, compliances, mass and losses begin.
 
-    Its usual share of the motion, more where it moves by more: x = C (F + omega^2 m x) by least squares. A shaft goes
+    Its usual share of the motion, more where it moves by more: x = C F + omega^2 C m x by least squares. A shaft goes
     where the film pushes it: no sensor that is inverted or exchanged looks like one that gives way. No start where much
     is left: of wrong sensors, or of a shaft that gives way by no more than sensors differ.
     """
     square, d = (blocks.omega**2)[:, None], vector(rig, blocks, "displacement")
-    force, x = film_force(rig, blocks), vector(rig, blocks, "acceleration") / square - d
-    usable = np.isfinite(force + x).all(axis=1)
-    numbers, remainder = np.zeros((2, 2)), np.zeros(2)
-    for axis, pushes in enumerate(np.stack([force, square * x], axis=2)[usable].swapaxes(0, 1)):
-        numbers[axis] = np.linalg.lstsq(pushes, x[usable, axis], rcond=None)[0].real
-        remainder[axis] = np.linalg.norm(x[usable, axis] - pushes @ numbers[axis])
-    springs, heavy = numbers.T
-    work = (force.conj() * x)[usable].real.sum() / max(np.sum(np.abs(force[usable]) ** 2), 1e-300)
-    compliance = max(_SHAFT * _usual_ratio(d, force), float(work)) / _NANOMETRE or 1.0
-    if not np.linalg.norm(remainder) < _LEFT * np.linalg.norm(x[usable]):
+    force, moved = film_force(rig, blocks), vector(rig, blocks, "acceleration") / square - d
+    usable = np.isfinite(force + moved)
+    pushes, x = np.stack([force, square * moved], axis=2)[usable], moved[usable]
+    spring, heavy = numbers = np.linalg.lstsq(pushes, x, rcond=None)[0].real / _NANOMETRE
+    compliance = max(_SHAFT * _usual_ratio(d, force) / _NANOMETRE, float(spring)) or 1.0
+    if not np.linalg.norm(x - pushes @ numbers * _NANOMETRE) < _LEFT * np.linalg.norm(x):
         return compliance, ()
-    return compliance, (*[0.0] * 4, *(springs / _NANOMETRE).tolist(), float(heavy.sum() / springs.sum()), *[0.0] * 3)
+    return compliance, (*[0.0] * 4, spring, spring, heavy / spring, *[0.0] * 3)
 
 
 def _usual_ratio(first: ComplexArray, second: ComplexArray) -> float:
