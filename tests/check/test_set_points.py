@@ -141,7 +141,7 @@ def test_a_shaft_that_stands_as_under_another_load_is_named(seed, wrong):
 
 
 def turning_run(load, frequency, size, twice=np.nan, motion=0.02, thrice=np.nan):
-    """A run whose probes show `size`, `twice` and `thrice` as much as they do at the shaft's lines, some of it motion."""
+    """A run whose probes show `size`, `twice`, `thrice` as much as usual at the shaft's lines, some of it motion."""
     run = observation(load, 1000.0, frequency=frequency)
     stiffness = np.linalg.norm(run.film_force) / np.linalg.norm(run.line("displacement"))
     force = stiffness * motion * np.array([4e-6, 1e-6])

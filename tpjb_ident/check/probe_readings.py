@@ -92,8 +92,8 @@ def _motion(run: Observation, order: int) -> float:
 def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object]) -> FloatArray:
     """By how much a line's sizes (n,), logarithms, differ from most others; zero where scatter or motion explains it.
 
-    Where no half of them agree, as where a gain drifts, any may be the right one: from the farthest one. `motion` (n,): share of it that may
-    be motion, which another film answers otherwise; `static`: point of every run.
+    Where no half of them agree, as where a gain drifts, any may be the right one: from the farthest point. `motion`
+    (n,): share of it that may be motion, which another film answers otherwise; `static`: point of every run.
     """
     codes = np.array([static.index(key) for key in static])
     usual = np.array([np.median(sizes[codes == code]) for code in codes])

@@ -300,9 +300,9 @@ def _shaft(rig: Rig, blocks: Blocks) -> tuple[float, tuple[float, ...]]:
     pushes, x = np.stack([force, square * moved], axis=2)[usable], moved[usable]
     spring, heavy = numbers = np.linalg.lstsq(pushes, x, rcond=None)[0].real / _NANOMETRE
     compliance = max(_SHAFT * _usual_ratio(d, force) / _NANOMETRE, float(spring)) or 1.0
-    if not np.linalg.norm(x - pushes @ numbers * _NANOMETRE) < _LEFT * np.linalg.norm(x):
-        return compliance, ()
-    return compliance, (*[0.0] * 4, spring, spring, heavy / spring, *[0.0] * 3)
+    is_explained = np.linalg.norm(x - pushes @ numbers * _NANOMETRE) < _LEFT * np.linalg.norm(x)
+    start = (*[0.0] * 4, spring, spring, heavy / spring, *[0.0] * 3) if spring > 0 and is_explained else ()
+    return compliance, start
 
 
 def _usual_ratio(first: ComplexArray, second: ComplexArray) -> float:
