@@ -102,12 +102,10 @@ def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object
         return np.zeros(len(sizes))
     # the middle of two groups as large would halve what they differ by
     alone, change = sizes - usual, sizes - np.quantile(sizes, 0.5, method="lower")
-    order = np.arange(len(sizes)) - np.array([np.flatnonzero(codes == code).mean() for code in codes])
-    drift = order * (order @ alone) / max(order @ order, 1.0)
-    spread, remainder = np.median(np.abs(alone)), np.median(np.abs(alone - drift))
-    scatter = _MANY_LINES * min(spread, remainder) * math.sqrt(len(sizes) / spare)
+    spread, step = (np.median(np.abs(off)) for off in (alone, np.diff(alone)))
+    scatter = _MANY_LINES * min(spread, step) * math.sqrt(len(sizes) / spare)
     differs = np.abs(change) > max(_SAME_RUNOUT, scatter) + _SOFTER * (motion + np.median(motion))
-    if differs.mean() >= 0.5 or (2 * remainder < spread and differs.any()):
+    if differs.mean() >= 0.5 or (2 * step < spread and differs.any()):
         above, below = sizes - usual.min(), sizes - usual.max()
         return np.where(above > -below, above, below)
     return np.where(differs, change, np.where(np.abs(alone) > max(_SAME_LINE, scatter), alone, 0.0))

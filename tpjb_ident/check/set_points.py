@@ -197,8 +197,7 @@ def check_excitation(runs: Sequence[Observation]) -> None:
             run.report.ask("on shaft line", float(not run.run.of("keyphasor")))
         elif not run.report.cells_doubted and run.run.excitation_direction is not None:
             directed.append(run)
-    if directed:
-        _check_directions(directed)
+    _check_directions(directed)
 
 
 def _turn(run: Observation, vector: ComplexArray) -> float:
@@ -208,22 +207,20 @@ def _turn(run: Observation, vector: ComplexArray) -> float:
     return math.remainder(shown - math.degrees(run.run.excitation_direction or 0.0), 180.0)
 
 
-def _shaker_forces(runs: Sequence[Observation]) -> ComplexArray:
-    """The films' forces and the inertia of a shaft that is shaken, of the mass that brings them along, (n, 2) [N]."""
-    angles, omega = np.transpose([(run.run.excitation_direction or 0.0, run.run.point.excitation) for run in runs])
-    force = np.array([run.film_force for run in runs])
-    motion, housing = (np.nan_to_num([run.line(q) for run in runs]) for q in ("displacement", "acceleration"))
-    shaft = housing - (omega**2)[:, None] * motion
-    aside, moved = (np.sum(directions(angles + np.pi / 2) * rows, axis=1) for rows in (force, shaft))
-    mass = -np.median((aside * moved.conj()).real / np.maximum(np.abs(moved) ** 2, 1e-300))
-    return force + np.clip(mass, 0.0, _HEAVY * runs[0].run.housing_mass) * shaft
+def _shaker_force(run: Observation) -> ComplexArray:
+    """The film's force and the inertia of a shaft that is shaken, of a mass that brings them along, X and Y [N]."""
+    across = directions((run.run.excitation_direction or 0.0) + np.pi / 2)
+    shaft = np.nan_to_num(run.line("acceleration")) - run.run.point.excitation**2 * run.line("displacement")
+    moved = across @ shaft
+    mass = -(across @ run.film_force * moved.conj()).real / max(abs(moved) ** 2, 1e-300)
+    return run.film_force + np.clip(mass, 0.0, _HEAVY * run.run.housing_mass) * shaft
 
 
 def _check_directions(runs: Sequence[Observation]) -> None:
     turned = []
-    for run, force in zip(runs, _shaker_forces(runs)):
+    for run in runs:
         # of a floating stator the cells show the shaker's force itself
-        turn = min((_turn(run, vector) for vector in (run.film_force, force, run.line("force"))), key=abs)
+        turn = min((_turn(run, force) for force in (_shaker_force(run), run.line("force"))), key=abs)
         # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
         if abs(turn) > _ALONG and not abs(_turn(run, run.line("displacement"))) <= _MOVED_ALONG:
             turned.append((run, turn))
