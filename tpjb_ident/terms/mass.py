@@ -85,7 +85,7 @@ def _doubted(rig: Rig, solution: Solution, compliance: ComplexArray | None) -> R
     mass = rig.mass - lighter
     is_plausible = rig.mass / _PLAUSIBLE < mass < rig.mass * (_PLAUSIBLE if compliance is not None else 1.0)
     # what the gains of accelerometers and cells are off by looks like it
-    gain = max((s.uncertainty or 0.0 for s in rig.channels if s.quantity != "displacement"), default=0.0)
+    gain = np.linalg.norm([s.uncertainty or 0.0 for s in rig.channels if s.quantity != "displacement"])
     if not (is_clear and is_plausible and abs(lighter) > 3 * np.hypot(rig.mass_uncertainty, gain * rig.mass)):
         return rig
     text = f"over frequency the cells show the inertia of {mass:.3g} kg (standard error {error:.2g} kg)"
