@@ -87,9 +87,8 @@ class Table:
 _STEPS, _CONVERGED = 18, 1e-9
 #: Steps in which weights and scatter follow.
 _SCATTER_STEPS = 12
-#: Steps after which the noise of the housing is found: at first, where what turns with the shaft has settled, and where
-#: the mass of a floating one's shaft has.
-_HOUSING_STEPS = (3, 7, 11)
+#: Steps after which the noise of the housing is found: at first, and where what turns with the shaft has settled.
+_HOUSING_STEPS = (3, 7)
 #: Change of H in one step, of its size, at most: a line next to noise could run away.
 _LARGEST_STEP = 1.0
 #: Weight of an unknown beside a block's best told one below which nothing is told of it.
@@ -206,9 +205,7 @@ class Solver:
             if count in _HOUSING_STEPS:
                 m = self.blocks.z.shape[1]
                 misfit = [state.reading(self.rig, blocks)[:, m:] for _, blocks, state in self._states()]
-                noise = housing_noise(self.rig, self.blocks, self.u, np.concatenate(misfit))
-                # larger later on, it would hide more and more of what makes it
-                self.housing_noise = noise if count < _HOUSING_STEPS[-1] else min(noise, self.housing_noise)
+                self.housing_noise = housing_noise(self.rig, self.blocks, self.u, np.concatenate(misfit))
             if self.scatter.follows and count < _SCATTER_STEPS:
                 self.scatter = self.scatter.updated(self.group, fit, self.answered, count)
             elif count > 3 and change < _CONVERGED:

@@ -6,7 +6,7 @@ accelerometers have another gain, axis or delay than is stated. A shaft's lag gr
 """
 
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 
@@ -102,16 +102,13 @@ class Housing(Term):
         else:
             state.floating, state.compliance = self._hung(blocks, value)
 
-    @cached_property
-    def _foundation(self) -> bool:
-        return _is_on_foundation(self.rig, self._blocks)
-
     def _is_unexplained(self, fitted: Fitted) -> bool:
         return fitted.unexplained > _UNEXPLAINED[self.rig.mount]
 
     def is_on_foundation(self, fitted: Fitted) -> bool:
         """Whether no one spring, but a support all the same carries the housing."""
-        return self.rig.mount == "cells" and self._is_unexplained(fitted) and self._foundation
+        is_doubtful = self.rig.mount == "cells" and self._is_unexplained(fitted)
+        return is_doubtful and _is_on_foundation(self.rig, self._blocks)
 
     def acceleration(self, blocks: Blocks, fitted: Fitted) -> ComplexArray:
         """What every block's cells, or probes where the housing floats, let the accelerometers show, (n, 2) [m/s^2]."""
