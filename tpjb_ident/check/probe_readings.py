@@ -71,8 +71,8 @@ def check_shaft_lines(runs: Sequence[Observation]) -> None:
         shown = [run for run in runs if NO_NOISE not in run.report.keys and _motion(run, order) >= 0]
         for name, alike in _by_probe(shown, "run.point.spin"):
             members = [(run, k) for run, k in alike if run.shaft_lines[order, k] > _CLEAR * run.lines.floor[k]]
-            shown_there = [(run.shaft_lines[order, k], _motion(run, order)) for run, k in members]
-            sizes, motion = np.reshape(shown_there, (-1, 2)).T
+            rows = [(run.shaft_lines[order, k], _motion(run, order)) for run, k in members]
+            sizes, motion = np.reshape(rows, (-1, 2)).T
             static = [run.run.point.static_key for run, _ in members]
             for (run, _), change in zip(members, _size_changes(np.log(sizes), motion / sizes, static).tolist()):
                 if change:
@@ -102,7 +102,7 @@ def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object
         return np.zeros(len(sizes))
     # the middle of two groups as large would halve what they differ by
     alone, change = sizes - usual, sizes - np.quantile(sizes, 0.5, method="lower")
-    spread, step = (np.median(np.abs(off)) for off in (alone, np.diff(alone)))
+    spread, step = np.median(np.abs(alone)), np.median(np.abs(np.diff(alone)))
     scatter = _MANY_LINES * min(spread, step) * math.sqrt(len(sizes) / spare)
     differs = np.abs(change) > max(_SAME_RUNOUT, scatter) + _SOFTER * (motion + np.median(motion))
     if differs.mean() >= 0.5 or (2 * step < spread and differs.any()):

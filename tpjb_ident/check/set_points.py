@@ -220,7 +220,7 @@ def _check_directions(runs: Sequence[Observation]) -> None:
     turned = []
     for run in runs:
         # of a floating stator the cells show the shaker's force itself
-        turn = min((_turn(run, force) for force in (_shaker_force(run), run.line("force"))), key=abs)
+        turn = min(_turn(run, _shaker_force(run)), _turn(run, run.line("force")), key=abs)
         # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
         if abs(turn) > _ALONG and not abs(_turn(run, run.line("displacement"))) <= _MOVED_ALONG:
             turned.append((run, turn))

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Conditions, holding
+from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import Blocks, Rig, State
 from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter
@@ -54,6 +54,8 @@ class Corner(Factor):
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Accelerometers whose corner would have to be negative: something else turns them, no filter does."""
-        late = dict(zip((p.name for p in self.parameters), fitted.value < -_CLEAR * fitted.deviation))
         text = "the accelerometers lag the more the lower the frequency, as no filter lets them: other sensors are late"
-        return holding((late.get("accelerometers"), OUT_OF_STEP, text))
+        for parameter, value, error in zip(self.parameters, fitted.value, fitted.deviation):
+            if parameter.name == "accelerometers" and value < -_CLEAR * error:
+                return (Condition(OUT_OF_STEP, text),)
+        return ()

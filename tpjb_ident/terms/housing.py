@@ -79,7 +79,13 @@ class Housing(Term):
                 _Found("c_xy", "nm/N", across),
                 *[_Found(f"loss_{axis}", "1", loss) for axis in "xy"],
             )
-            self.start = (0.0,) * 5  # rigid: of accelerometers that read rounding no spring leads there
+            if rig.has_acceleration:
+                force, shown = (np.nan_to_num(vector(rig, blocks, q)) for q in ("force", "acceleration"))
+                pushes = -_NANOMETRE * (blocks.omega**2)[:, None] * force
+                springs, _, rank, _ = np.linalg.lstsq(pushes, shown, rcond=None)
+                if rank == 2:
+                    (xx, xy), (yx, yy) = springs.real.tolist()
+                    self.start = (xx, yy, (xy + yx) / 2, 0.0, 0.0)
         elif rig.mount == "unknown":
             self.parameters = (_Found("inertia not measured", "1", _UNKNOWN),)
         elif rig.has_acceleration:
