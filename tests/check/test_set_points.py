@@ -228,6 +228,13 @@ def test_run_out_that_grows_from_run_to_run_is_a_gain_that_drifts(drift, off):
     np.testing.assert_allclose(shown, 0.76 * off, atol=0.004)
 
 
+def test_half_of_the_runs_that_move_a_little_more_at_running_speed_show_no_gain():
+    """At the other of two frequencies, say: the film answers what is out of balance otherwise."""
+    runs = [turning_run(5000.0, 25.0, 1.0 if k < 4 else 1.14, motion=0.6) for k in range(8)]
+    check_shaft_lines(runs)
+    assert not any(run.report.off for run in runs)
+
+
 def test_a_probe_that_was_put_elsewhere_is_another_one():
     runs = [turning_run(load, 25.0, 1.0, size, 0.0) for load, size in ((2000.0, 1.0), (6000.0, 0.6)) for _ in range(4)]
     for run in runs[4:]:

@@ -103,9 +103,10 @@ def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object
     # the middle of two groups as large would halve what they differ by
     alone, change = sizes - usual, sizes - np.quantile(sizes, 0.5, method="lower")
     spread, step = np.median(np.abs(alone)), np.median(np.abs(np.diff(alone)))
-    scatter = _MANY_LINES * min(spread, step) * math.sqrt(len(sizes) / spare)
-    differs = np.abs(change) > max(_SAME_RUNOUT, scatter) + _SOFTER * (motion + np.median(motion))
+    many = _MANY_LINES * math.sqrt(len(sizes) / spare)
+    # a drift is no scatter: from run to run it is little
+    differs = np.abs(change) > max(_SAME_RUNOUT, many * min(spread, step)) + _SOFTER * (motion + np.median(motion))
     if differs.mean() >= 0.5 or (2 * step < spread and differs.any()):
         above, below = sizes - usual.min(), sizes - usual.max()
         return np.where(above > -below, above, below)
-    return np.where(differs, change, np.where(np.abs(alone) > max(_SAME_LINE, scatter), alone, 0.0))
+    return np.where(differs, change, np.where(np.abs(alone) > max(_SAME_LINE, many * spread), alone, 0.0))
