@@ -437,6 +437,18 @@ def test_a_shaft_under_a_floating_stator_has_mass(gives, mass, seed):
     assert not solution.fitted["calibration"].estimated.any()
 
 
+@pytest.mark.parametrize("gives", [1.5e-9, 8e-9])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_one_frequency_tells_no_mass_of_a_shaft(seed, gives):
+    """A spring and a resonance explain it alike: steps begin at the spring."""
+    solution, truth = answered(Case(mount="floating", hertz=(45.0,), noise=2e-4, shaft_gives=gives), seed)
+    (housing,) = (term for term in solution.terms if term.name == "housing")
+    assert housing.start == ()
+    assert solution.fitted["housing"].value[6] == 0.0
+    assert not solution.conditions()
+    assert held(solution, truth)
+
+
 @pytest.mark.parametrize(
     ("loss", "mass", "named"), [(0.01, 1.0, ""), (0.2, 10.0, _LATE), (0.2, 1.0, "accelerometers-doubtful")]
 )

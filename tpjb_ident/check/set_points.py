@@ -210,8 +210,8 @@ def _turn(run: Observation, vector: ComplexArray) -> float:
 def _shaker_force(run: Observation) -> ComplexArray:
     """The film's force and the inertia of a shaft that is shaken, of a mass that brings them along, X and Y [N]."""
     across = directions((run.run.excitation_direction or 0.0) + np.pi / 2)
-    motion, housing = (np.nan_to_num(run.line(quantity)) for quantity in ("displacement", "acceleration"))
-    shaft = housing - run.run.point.excitation**2 * motion
+    moved = run.run.point.excitation**2 * np.nan_to_num(run.line("displacement"))
+    shaft = np.nan_to_num(run.line("acceleration")) - moved
     mass = -(complex(across @ run.film_force) / (complex(across @ shaft) or 1.0)).real
     return run.film_force + np.clip(mass, 0.0, _HEAVY * run.run.housing_mass) * shaft
 

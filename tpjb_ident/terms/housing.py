@@ -287,19 +287,24 @@ def _compliance(value: FloatArray) -> ComplexArray:
 def _shaft(rig: Rig, blocks: Blocks) -> tuple[float, tuple[float, ...]]:
     """Compliance [nm/N] that is plausible of a shaft, and where steps to kappa, compliances, mass and losses begin.
 
-    Its usual share of the motion, more where it moves by more: x = C F + omega^2 C m x by least squares. A shaft goes
-    where the film pushes it: no sensor that is inverted or exchanged looks like one that gives way. No start where much
-    is left: of wrong sensors, or of a shaft that gives way by no more than sensors differ.
+    Its usual share of the motion, more where it moves by more. A shaft goes where the film pushes it: no sensor that is
+    inverted or exchanged looks like one that gives way. The start is x = C F + omega^2 C m x by least squares; none
+    where much is left: of wrong sensors, or of a shaft that gives way by no more than sensors differ.
     """
     square, d = (blocks.omega**2)[:, None], vector(rig, blocks, "displacement")
     force, moved = film_force(rig, blocks), vector(rig, blocks, "acceleration") / square - d
     usable = np.isfinite(force + moved)
     pushes, x = np.stack([force, square * moved], axis=2)[usable], moved[usable]
-    spring, heavy = numbers = np.linalg.lstsq(pushes, x, rcond=None)[0].real / _NANOMETRE
-    compliance = max(_SHAFT * _usual_ratio(d, force) / _NANOMETRE, float(spring)) or 1.0
-    is_explained = np.linalg.norm(x - pushes @ numbers * _NANOMETRE) < _LEFT * np.linalg.norm(x)
-    start = (*[0.0] * 4, spring, spring, heavy / spring, *[0.0] * 3) if spring > 0 and is_explained else ()
-    return compliance, start
+    # one frequency tells no mass
+    is_told = np.max(blocks.omega, initial=0.0) > (1 + _SHAFT) * np.min(blocks.omega, initial=np.inf)
+    pushes = pushes[:, : 1 + is_told]
+    numbers = np.linalg.lstsq(pushes, x, rcond=None)[0].real
+    spring = float(numbers[0])
+    compliance = max(_SHAFT * _usual_ratio(d, force), spring) / _NANOMETRE or 1.0
+    is_explained = np.linalg.norm(x - pushes @ numbers) < _LEFT * np.linalg.norm(x)
+    if not (is_told and spring > 0 and is_explained):
+        return compliance, ()
+    return compliance, (*[0.0] * 4, *[spring / _NANOMETRE] * 2, float(numbers[1]) / spring, *[0.0] * 3)
 
 
 def _usual_ratio(first: ComplexArray, second: ComplexArray) -> float:
