@@ -29,7 +29,9 @@ def observation(load, size, stated=0.0, force=0.0, displacement=45.0, frequency=
     """A run driven along `stated`, whose force and displacement act along other angles [deg]."""
     point = OperatingPoint(load, -np.pi / 2, 138.0, 2 * np.pi * frequency)
     run = SimpleNamespace(id="r", file="r.csv", point=point, excitation_direction=np.radians(stated))
+    run.housing_mass = 30.0
     lines = {"displacement": 1e-6 * directions(np.radians(displacement)), "force": size * directions(np.radians(force))}
+    lines["acceleration"] = np.zeros(2)
     return SimpleNamespace(
         run=run, report=Reporter(run), conditions=(), shows=lambda quantity: True,
         film_force=lines["force"], line=lines.get, names=lambda quantity: ["L1H", "L1V"],
@@ -56,6 +58,31 @@ def test_strength_is_that_of_the_operating_point():
 )
 def test_force_or_displacement_acts_along_the_stated_direction(force, displacement, named):
     assert findings([observation(5000.0, 1000.0, 0.0, force, displacement)]) == [named]
+
+
+@pytest.mark.parametrize(
+    ("cells", "shaft", "turned", "named"),
+    [
+        (0.0, 0.0, 0.0, False),  # a floating stator: the cells show the shaker's force
+        (25.0, 90.0, 0.0, False),  # the shaft is shaken: its inertia turns the film's
+        (25.0, 90.0, 60.0, True),
+        (25.0, 0.0, 0.0, True),
+    ],
+)
+def test_an_excitation_acts_as_the_shaker_does_whatever_the_film_makes_of_it(cells, shaft, turned, named):
+    omega, film = 2 * np.pi * 60.0, np.diag([3e7, 9e7])
+    runs = []
+    for stated in (20.0, 65.0, 110.0):
+        run = observation(5000.0, 1000.0, stated, stated + cells, frequency=60.0)
+        lines = {"force": run.film_force}
+        lines["displacement"] = np.linalg.solve(
+            film - shaft * omega**2 * np.eye(2), 1000.0 * directions(np.radians(stated + turned))
+        )
+        run.film_force, run.line = film @ lines["displacement"], (lines | {"acceleration": np.zeros(2)}).get
+        if not shaft:
+            run.film_force = 1000.0 * directions(np.radians(stated + 25.0))
+        runs.append(run)
+    assert any(findings(runs)) == named
 
 
 @pytest.mark.parametrize(("keyphasors", "named"), [([], ["on shaft line"]), (["KEY"], [])])
@@ -113,13 +140,14 @@ def test_a_shaft_that_stands_as_under_another_load_is_named(seed, wrong):
     assert not any(run.report.keys for run in runs)
 
 
-def turning_run(load, frequency, size, twice=np.nan, motion=0.02):
-    """A run whose probes show `size` and `twice` as much as they do at the shaft's lines, some of it motion."""
+def turning_run(load, frequency, size, twice=np.nan, motion=0.02, thrice=np.nan):
+    """A run whose probes show `size`, `twice`, `thrice` as much as usual at the shaft's lines, some of it motion."""
     run = observation(load, 1000.0, frequency=frequency)
     stiffness = np.linalg.norm(run.film_force) / np.linalg.norm(run.line("displacement"))
     force = stiffness * motion * np.array([4e-6, 1e-6])
-    run.shaft_lines = np.array([[4e-6 * size, 3e-6, force[0], 0.0], [1e-6 * twice, 1e-6, force[1], 0.0]])
-    run.run.housing_mass = 30.0
+    first, second = [4e-6 * size, 3e-6, force[0], 0.0], [1e-6 * twice, 1e-6, force[1], 0.0]
+    run.shaft_lines = np.array([first, second, [2e-7 * thrice, 2e-7, 0.0, 0.0]])
+    run.lines = SimpleNamespace(floor=np.full(4, 1e-9))
     run.channels = [SimpleNamespace(name=name, axis=0.0) for name in ("X1A", "X1B", "L1H", "L1V")]
     run.pick, run.spread = {"displacement": [0, 1], "force": [2, 3], "acceleration": []}.get, np.zeros((3, 4))
     return run
@@ -167,6 +195,44 @@ def test_run_out_that_changes_with_the_load_makes_a_gain_uncertain(sizes, motion
     shown = np.reshape([run.report.off.get("X1A", 0.0) for run in runs], (len(sizes), 8)).mean(axis=1)
     np.testing.assert_allclose(shown, 0.8 * np.array(off), atol=0.003)
     assert not any("X1B" in run.report.off for run in runs)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "noise", "off"),
+    [
+        ((1.0, 0.85), 1e-9, (0.16, 0.16)),  # what 1X and 2X hide as motion
+        ((1.0, 0.85), 1e-7, (0.0, 0.0)),  # of a line that noise may have made
+    ],
+)
+def test_run_out_is_looked_at_where_there_is_no_motion(sizes, noise, off):
+    rng, runs = np.random.default_rng(5), []
+    for load, size in zip((2000.0, 6000.0), sizes):
+        for _ in range(6):
+            size = size * (1 + 0.001 * rng.standard_normal())
+            runs.append(turning_run(load, 25.0, size, size, 1.0, size))
+            runs[-1].lines.floor[:] = noise
+    check_shaft_lines(runs)
+    shown = np.reshape([run.report.off.get("X1A", 0.0) for run in runs], (2, 6)).mean(axis=1)
+    np.testing.assert_allclose(shown, 0.8 * np.array(off), atol=0.004)
+
+
+@pytest.mark.parametrize(("drift", "off"), [(0.12, 0.12), (0.01, 0.0)])
+def test_run_out_that_grows_from_run_to_run_is_a_gain_that_drifts(drift, off):
+    """Nothing tells when it was right: runs may be off by as much as they are from the middle of the farther load's."""
+    rng, runs = np.random.default_rng(5), []
+    for k in range(24):
+        size = math.exp(drift * k / 23 + 0.001 * rng.standard_normal())
+        runs.append(turning_run(2000.0 if k < 12 else 6000.0, 25.0, np.nan, np.nan, 0.0, size))
+    check_shaft_lines(runs)
+    shown = np.reshape([run.report.off.get("X1A", 0.0) / 0.8 for run in runs], (2, 12)).max(axis=1)
+    np.testing.assert_allclose(shown, 0.76 * off, atol=0.004)
+
+
+def test_half_of_the_runs_that_move_a_little_more_at_running_speed_show_no_gain():
+    """At the other of two frequencies, say: the film answers what is out of balance otherwise."""
+    runs = [turning_run(5000.0, 25.0, 1.0 if k < 4 else 1.14, motion=0.6) for k in range(8)]
+    check_shaft_lines(runs)
+    assert not any(run.report.off for run in runs)
 
 
 def test_a_probe_that_was_put_elsewhere_is_another_one():

@@ -75,6 +75,7 @@ class Case:
     input_corner: float = 0.0  #: Hz: of the accelerometers
     crosstalk: float = 0.0  #: share of the second cell in the first
     shaft_gives: float = 0.0  #: compliance of a floating stator's shaft [m/N]
+    shaft_mass: float = 0.0  #: kg
 
 
 def sensors_of(case: Case) -> tuple[Sensor, ...]:
@@ -186,7 +187,8 @@ def _motion(case, points, point, miss, rng) -> tuple[np.ndarray, np.ndarray]:
     force = np.einsum("nij,nj->ni", at_run, d)
     force = force + case.scatter * np.linalg.norm(force, axis=1)[:, None] * complex_normal(rng, n, 2)
     omega = np.array([points[p].excitation for p in point])
-    a = omega[:, None] ** 2 * (d + case.shaft_gives * force)
+    square = omega[:, None] ** 2
+    a = square * (d + case.shaft_gives / (1 - square * case.shaft_gives * case.shaft_mass) * force)
     if case.mount == "cells":
         for k in range(n):
             rows = np.eye(2) - omega[k] ** 2 * MASS * (1 + case.mass_error) * COMPLIANCE

@@ -16,7 +16,7 @@ from tests.structure.sources import docstrings, parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (119.69, 14_239),
+    "measurement": (120.27, 14_280),
     "model": (75.11, 10_168),
     "rigdata": (59.67, 8_073),
     "diagnosis": (38.36, 4_755),

@@ -415,6 +415,40 @@ def test_a_floating_stator_tells_wrong_probes_from_a_shaft_that_gives(changes, s
         assert solution.fitted["housing"].value[4:6] == pytest.approx(1e9 * gives, abs=0.2)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("gives", "mass"), [(1.5e-9, 60.0), (4e-9, 150.0), (2e-8, 75.0)])
+def test_a_shaft_under_a_floating_stator_has_mass(gives, mass, seed):
+    """It resonates at 530, 205 and 130 Hz, the last in the midst of the excitation, and bends no H."""
+    gains = {"uncertainty": 0.01}
+    case = Case(
+        (5000.0,), (25.0, 60.0, 100.0, 150.0, 180.0), mount="floating", noise=2e-4, shaft_gives=gives, shaft_mass=mass
+    )
+    rig, blocks, truth = made(replace(case, stated={"force": gains, "acceleration": gains}), seed)
+    learnt = learnt_rig(rig, solved(rig, blocks, truth))
+    solution = solved(learnt, blocks, truth)
+    assert not solution.conditions()
+    assert held(solution, truth)
+    np.testing.assert_allclose(solution.h, truth, rtol=0, atol=0.006 * np.abs(truth).max())
+    *_, compliance, heavy, _, _, _ = solution.fitted["housing"].value
+    assert compliance == pytest.approx(1e9 * gives, rel=0.05)
+    assert heavy == pytest.approx(mass, rel=0.25)
+    # the housing's equations are no evidence on gains
+    assert not solution.fitted["calibration"].estimated.any()
+
+
+@pytest.mark.parametrize("gives", [1.5e-9, 8e-9])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_one_frequency_tells_no_mass_of_a_shaft(seed, gives):
+    """A spring and a resonance explain it alike: steps begin at the spring."""
+    solution, truth = answered(Case(mount="floating", hertz=(45.0,), noise=2e-4, shaft_gives=gives), seed)
+    (housing,) = (term for term in solution.terms if term.name == "housing")
+    assert housing.start == ()
+    assert solution.fitted["housing"].value[6] == 0.0
+    assert not solution.conditions()
+    assert held(solution, truth)
+
+
 @pytest.mark.parametrize(
     ("loss", "mass", "named"), [(0.01, 1.0, ""), (0.2, 10.0, _LATE), (0.2, 1.0, "accelerometers-doubtful")]
 )

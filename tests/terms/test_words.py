@@ -141,8 +141,9 @@ def test_a_floating_stator_of_less_than_its_mass_is_told_and_allowed_for(seed):
         {"mass_uncertainty": 0.5},
         {"mount": "floating"},
         {"mass_error": 0.0, "gains": {"D1": 0.05, "F2": 0.03}},
+        {"stated": {"acceleration": {"uncertainty": 0.2}}},
     ],
-    ids=["two frequencies", "as stated", "half of it stated", "floating", "gains"],
+    ids=["two frequencies", "as stated", "half of it stated", "floating", "gains", "accelerometers as uncertain"],
 )
 def test_the_mass_is_not_doubted(soft, changes):
     case = Case(**{"hertz": HERTZ, **HEAVIER, **changes})

@@ -34,6 +34,8 @@ _BAND_LINES = 8
 _CLEAR_OF = 5
 #: Noise is looked at from this many times the band's top on.
 _ABOVE = 1.3
+#: What turns with the shaft, of which probes show run-out, the higher the order the less of it motion.
+SHAFT_LINES = ("1X", "2X", "3X")
 #: A part of the 1X force counts from this many standard errors of its windows.
 _CLEAR = 8.0
 
@@ -69,15 +71,17 @@ def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel])
 
 
 def shaft_lines(phasors: RunPhasors, channels: Sequence[Channel]) -> tuple[FloatArray, float]:
-    """Sizes of 1X and 2X in every channel (2, m), and the sense of the force at 1X, see `_sense`.
+    """Sizes of 1X to 3X in every channel (3, m), and the sense of the force at 1X, see `_sense`.
 
-    NaN where they are not told from the excitation.
+    NaN where they are not told from the excitation. The faint third is that of the whole record.
     """
-    sizes = np.full((2, len(channels)), np.nan)
-    for k, place in enumerate(map(phasors.lines.place, ("1X", "2X"))):
-        if place is not None:
-            sizes[k] = by_channel(window_median(np.abs(phasors.z[:, place])), phasors.channels, channels)
+    sizes = np.full((3, len(channels)), np.nan)
     first = phasors.lines.place("1X")
+    values = [*phasors.z.swapaxes(0, 1), *phasors.record[phasors.z.shape[1] :, None]]
+    for line, rows in zip(phasors.lines.whole, values):
+        if line.name in SHAFT_LINES:
+            size = window_median(np.abs(rows))
+            sizes[SHAFT_LINES.index(line.name)] = by_channel(size, phasors.channels, channels)
     return sizes, math.nan if first is None else _sense(phasors.plane("force", phasors.z[:, first]))
 
 
@@ -165,7 +169,7 @@ class Observation(Directed):
     digest: str = ""
     speed: float = math.nan
     seconds: float = math.nan  #: how long the record is
-    #: (2, m): sizes of 1X and 2X, SI; empty where nothing tells them
+    #: (3, m): sizes of 1X to 3X, SI; empty where nothing tells them
     shaft_lines: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     shaft_force: float = math.nan  #: sense of the 1X force, see `_sense`
     conditions: Conditions = ()  #: of its phasors

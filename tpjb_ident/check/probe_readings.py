@@ -18,6 +18,8 @@ from tpjb_ident.check.observation import NO_NOISE, Observation
 #: Logarithm by which what turns with the shaft differs in one run, and run-out between loads (they move the shaft along
 #: by little), over the median scatter of runs, and runs beyond one a load that tell it.
 _SAME_LINE, _SAME_RUNOUT, _MANY_LINES, _MIN_SPARE = 0.06, 0.02, 6.0, 4
+#: Sizes below this many times what noise makes of a line tell nothing.
+_CLEAR = 8.0
 #: Logarithm between loads that is no gain: the shaft's speed is wrong at one, and its line stands elsewhere.
 _LOST = math.log(10.0)
 #: How much softer a film may be than along its excitation; deviation of a gain over its change: a 95 % interval holds
@@ -64,11 +66,13 @@ def check_shaft_lines(runs: Sequence[Observation]) -> None:
 
     Whole operating points are told so in which a channel has another gain: their runs have no fellow without it.
     """
-    for order, speed in enumerate(("", "twice ")):
+    for order, speed in enumerate(("", "twice ", "three times ")):
         # what computed records without noise show beside their lines is rounding
         shown = [run for run in runs if NO_NOISE not in run.report.keys and _motion(run, order) >= 0]
-        for name, members in _by_probe(shown, "run.point.spin"):
-            sizes, motion = np.transpose([(run.shaft_lines[order, k], _motion(run, order)) for run, k in members])
+        for name, alike in _by_probe(shown, "run.point.spin"):
+            members = [(run, k) for run, k in alike if run.shaft_lines[order, k] > _CLEAR * run.lines.floor[k]]
+            rows = [(run.shaft_lines[order, k], _motion(run, order)) for run, k in members]
+            sizes, motion = np.reshape(rows, (-1, 2)).T
             static = [run.run.point.static_key for run, _ in members]
             for (run, _), change in zip(members, _size_changes(np.log(sizes), motion / sizes, static).tolist()):
                 if change:
@@ -88,19 +92,21 @@ def _motion(run: Observation, order: int) -> float:
 def _size_changes(sizes: FloatArray, motion: FloatArray, static: Sequence[object]) -> FloatArray:
     """By how much a line's sizes (n,), logarithms, differ from most others; zero where scatter or motion explains it.
 
-    Where no half of them agree, any may be the right one: from the farthest point. `motion` (n,): share of it that may
-    be motion, which another film answers otherwise; `static`: point of every run.
+    Where no half of them agree, as where a gain drifts, any may be the right one: from the farthest point. `motion`
+    (n,): share of it that may be motion, which another film answers otherwise; `static`: point of every run.
     """
     codes = np.array([static.index(key) for key in static])
     usual = np.array([np.median(sizes[codes == code]) for code in codes])
     spare = len(sizes) - len(set(static))
     if spare < _MIN_SPARE or np.ptp(usual) > _LOST:
         return np.zeros(len(sizes))
-    scatter = _MANY_LINES * np.median(np.abs(sizes - usual)) * math.sqrt(len(sizes) / spare)
     # the middle of two groups as large would halve what they differ by
     alone, change = sizes - usual, sizes - np.quantile(sizes, 0.5, method="lower")
-    differs = np.abs(change) > max(_SAME_RUNOUT, scatter) + _SOFTER * (motion + np.median(motion))
-    if differs.mean() >= 0.5:
+    spread, step = np.median(np.abs(alone)), np.median(np.abs(np.diff(alone)))
+    many = _MANY_LINES * math.sqrt(len(sizes) / spare)
+    # a drift is no scatter: from run to run it is little
+    differs = np.abs(change) > max(_SAME_RUNOUT, many * min(spread, step)) + _SOFTER * (motion + np.median(motion))
+    if differs.mean() >= 0.5 or (2 * step < spread and differs.any()):
         above, below = sizes - usual.min(), sizes - usual.max()
         return np.where(above > -below, above, below)
-    return np.where(differs, change, np.where(np.abs(alone) > max(_SAME_LINE, scatter), alone, 0.0))
+    return np.where(differs, change, np.where(np.abs(alone) > max(_SAME_LINE, many * spread), alone, 0.0))

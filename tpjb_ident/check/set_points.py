@@ -8,6 +8,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import ROTATIONS, OperatingPoint
+from rigdata.vector import directions
 from tpjb_ident.check.findings import explanation, far, pointing, repairs
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.estimate.statistics import huber_weight, reweighted
@@ -23,6 +24,8 @@ _NO_STATIC = (0.002, 0.02)
 _LOAD_OFF, _MANY = 0.04, 9.0
 #: Angle [deg] within which an excitation acts as stated, runs that must not, and share that one fault must explain.
 _ALONG, _SEVERAL, _NEARLY_ALL = 10.0, 3, 0.8
+#: Mass of a shaft over that of the stator, at most.
+_HEAVY = 12.0
 #: Angle [deg] within which the shaft moves as stated, whatever the force does.
 _MOVED_ALONG = 3.0
 #: Ratio of the parts that go round one way and the other from which a run tells the sense: a film far stiffer in one
@@ -205,10 +208,20 @@ def _turn(run: Observation, vector: ComplexArray) -> float:
     return math.remainder(shown - math.degrees(run.run.excitation_direction or 0.0), 180.0)
 
 
+def _shaker_force(run: Observation) -> ComplexArray:
+    """The film's force and the inertia of a shaft that is shaken, of a mass that brings them along, X and Y [N]."""
+    across = directions((run.run.excitation_direction or 0.0) + np.pi / 2)
+    moved = run.run.point.excitation**2 * np.nan_to_num(run.line("displacement"))
+    shaft = np.nan_to_num(run.line("acceleration")) - moved
+    mass = -(complex(across @ run.film_force) / (complex(across @ shaft) or 1.0)).real
+    return run.film_force + np.clip(mass, 0.0, _HEAVY * run.run.housing_mass) * shaft
+
+
 def _check_directions(runs: Sequence[Observation]) -> None:
     turned = []
     for run in runs:
-        turn = _turn(run, run.film_force)
+        # of a floating stator the cells show the shaker's force itself
+        turn = min(_turn(run, _shaker_force(run)), _turn(run, run.line("force")), key=abs)
         # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
         if abs(turn) > _ALONG and not abs(_turn(run, run.line("displacement"))) <= _MOVED_ALONG:
             turned.append((run, turn))

@@ -63,7 +63,7 @@ class Table:
             begin[place] = np.reshape(term.start or mean, (-1, term.width)) if known is None else self.mean[place]
             deviation[place] = np.maximum(np.reshape(spread, (-1, term.width)), _LEAST)
             self.always[place] = term.always_estimated and known is None
-            self.never[place] = term.never_estimated or known is not None
+            self.never[place] = True if known is not None else term.never_estimated
         self.precision = 1 / deviation**2
         self.value = begin
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition, Conditions
 from tpjb_ident.estimate.equation import HOUSING_ROWS, Blocks, Rig, State, film_change_rows
 
@@ -81,8 +81,9 @@ class Term:
     always_estimated : bool
         Whether its parameters are estimated however little the records tell; else only where they tell clearly more
         than the prior.
-    never_estimated : bool
-        Whether no record can tell them: their priors pass into the covariance, whatever the equations seem to say.
+    never_estimated : bool or array
+        Whether no record can tell them, or which of them: their priors pass into the covariance, whatever the equations
+        seem to say.
     contradiction, gross : str, float
         Condition of a parameter whose prior the records contradict, as stated or usual of sound instruments: they are
         held against it. How far off it is, in its unit, that no calibration has.
@@ -100,7 +101,7 @@ class Term:
 
     name = ""
     always_estimated = False
-    never_estimated = False
+    never_estimated: bool | BoolArray = False
     parameters: tuple[Parameter, ...] = ()
     points: tuple[int, ...] = ()
     start: tuple[float, ...] = ()

@@ -54,8 +54,8 @@ class Corner(Factor):
 
     def conditions(self, fitted: Fitted) -> Conditions:
         """Accelerometers whose corner would have to be negative: something else turns them, no filter does."""
+        text = "the accelerometers lag the more the lower the frequency, as no filter lets them: other sensors are late"
         for parameter, value, error in zip(self.parameters, fitted.value, fitted.deviation):
             if parameter.name == "accelerometers" and value < -_CLEAR * error:
-                text = "the accelerometers lag the more the lower the frequency, as if their corner were"
-                return (Condition(OUT_OF_STEP, f"{text} {value:.2g} Hz"),)
+                return (Condition(OUT_OF_STEP, text),)
         return ()

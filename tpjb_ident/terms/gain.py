@@ -24,7 +24,7 @@ class Gain(Factor):
         #: (runs, m): deviation of a gain that is another one in a run
         self._off = np.reshape(table, (len(blocks.runs), len(rig)))
         self._places: list[tuple[int, int, int]] = []
-        parameters = []
+        parameters, never = [], []
         for j, sensor in enumerate(rig.channels):
             calibrations = np.unique(blocks.calibration[:, j]).tolist() or [0]
             points, off = self._point(blocks, j), self._off[blocks.run, j]
@@ -38,7 +38,8 @@ class Gain(Factor):
                         size = float(np.hypot(sensor.uncertainty or 0.0, deviation))
                         # what the housing's equations leave out is no evidence: gains are held against gains
                         parameters.append(Parameter(words, "1", size, harmless=0.0 if rig.spare[j] else np.inf))
-        self.parameters = tuple(parameters)
+                        never.append(not rig.spare[j] and name == words == sensor.name)
+        self.parameters, self.never_estimated = tuple(parameters), np.array(never, dtype=bool)
 
     def _point(self, blocks: Blocks, j: int) -> IntArray:
         """Of every block the point, if a sensor's gain is another one in its run; -1: it is not, (n,)."""

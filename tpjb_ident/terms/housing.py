@@ -6,7 +6,7 @@ accelerometers have another gain, axis or delay than is stated. A shaft's lag gr
 """
 
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 
@@ -29,6 +29,8 @@ _UNKNOWN = 1.0
 #: Motion of a floating stator's shaft over that of the stator, before anything is known of it, one deviation; what its
 #: accelerometers may differ from the probes by gains and pitch: more is a contradiction, and no lag hides behind it.
 _SHAFT, _PITCH = 0.1, 0.02
+#: Mass of what moves with a floating stator's shaft over the stator's, one deviation.
+_HEAVY = 2.0
 #: The difference from which one of them is wrong; from which it is no work of a delay or a corner.
 _OTHERWISE, _GROSS = 0.05, 0.2
 #: A sign is beyond doubt from so many standard errors on.
@@ -87,10 +89,11 @@ class Housing(Term):
         elif rig.mount == "unknown":
             self.parameters = (_Found("inertia not measured", "1", _UNKNOWN),)
         elif rig.has_acceleration:
-            compliance = _shaft(rig, blocks) / _NANOMETRE or 1.0
+            compliance, self.start = _shaft(rig, blocks)
             self.parameters = (
                 *[Parameter(f"kappa_{axes}", "1", _PITCH) for axes in ("xx", "xy", "yx", "yy")],
                 *[_Found(f"c_{axes}", "nm/N", compliance) for axes in ("xx", "yy")],
+                _Found("shaft", "kg", _HEAVY * rig.mass),
                 _Found("loss", "1", _LOSS),
                 _Found("damping", "1", _LOSS),
                 _Found("lag", "rad", _LOSS / 2 if self._is_timed else _SHAFT),
@@ -105,16 +108,13 @@ class Housing(Term):
         else:
             state.floating, state.compliance = self._hung(blocks, value)
 
-    @cached_property
-    def _foundation(self) -> bool:
-        return _is_on_foundation(self.rig, self._blocks)
-
     def _is_unexplained(self, fitted: Fitted) -> bool:
         return fitted.unexplained > _UNEXPLAINED[self.rig.mount]
 
     def is_on_foundation(self, fitted: Fitted) -> bool:
         """Whether no one spring, but a support all the same carries the housing."""
-        return self.rig.mount == "cells" and self._is_unexplained(fitted) and self._foundation
+        is_doubtful = self.rig.mount == "cells" and self._is_unexplained(fitted)
+        return is_doubtful and _is_on_foundation(self.rig, self._blocks)
 
     def acceleration(self, blocks: Blocks, fitted: Fitted) -> ComplexArray:
         """What every block's cells, or probes where the housing floats, let the accelerometers show, (n, 2) [m/s^2]."""
@@ -127,10 +127,11 @@ class Housing(Term):
 
     def _hung(self, blocks: Blocks, value: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Kappa and the shaft's compliance [m/N], (n, 2, 2): steel and bolts lose alike, oil with frequency."""
-        *_, loss, damping, lag = value.tolist()
-        share = blocks.omega / self._omega
+        *_, mass, loss, damping, lag = value.tolist()
+        share, springs = blocks.omega / self._omega, _NANOMETRE * value[4:6]
         kappa = np.multiply.outer(np.exp(-1j * lag * share), np.eye(2)) + value[:4].reshape(2, 2)
-        return kappa, np.multiply.outer(1 - 1j * (loss + damping * share), _NANOMETRE * np.diag(value[4:6]))
+        held = 1 + 1j * (loss + damping * share)[:, None] - mass * np.multiply.outer(blocks.omega**2, springs)
+        return kappa, (springs / held)[:, :, None] * np.eye(2)
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """In the housing's own rows, by small steps of every parameter."""
@@ -151,7 +152,7 @@ class Housing(Term):
         conditions = self._shown(fitted)
         if self.rig.out_of_step:  # the delay tells whether it stays that they lead
             return tuple(condition for condition in conditions if condition != OUT_OF_STEP)
-        return self.rig.contradicted.get(self.name) or conditions
+        return conditions or self.rig.contradicted.get(self.name, ())
 
     def _shown(self, fitted: Fitted) -> Conditions:
         """What these numbers say of the accelerometers."""
@@ -283,14 +284,27 @@ def _compliance(value: FloatArray) -> ComplexArray:
     return np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * lag), complex)
 
 
-def _shaft(rig: Rig, blocks: Blocks) -> float:
-    """What is plausible of a shaft's compliance [m/N]: its usual share of the motion, more where it moves by more.
+def _shaft(rig: Rig, blocks: Blocks) -> tuple[float, tuple[float, ...]]:
+    """Compliance [nm/N] that is plausible of a shaft, and where steps to kappa, compliances, mass and losses begin.
 
-    A shaft goes where the film pushes it: no sensor that is inverted or exchanged looks like one that gives way.
+    Its usual share of the motion, more where it moves by more. A shaft goes where the film pushes it: no sensor that is
+    inverted or exchanged looks like one that gives way. The start is x = C F + omega^2 C m x by least squares; none
+    where much is left: of wrong sensors, or of a shaft that gives way by no more than sensors differ.
     """
-    force, d, a = film_force(rig, blocks), *(vector(rig, blocks, q) for q in ("displacement", "acceleration"))
-    work = np.nan_to_num(force.conj() * (a / (blocks.omega**2)[:, None] - d)).real.sum()
-    return max(_SHAFT * _usual_ratio(d, force), float(work / max(np.nansum(np.abs(force) ** 2), 1e-300)))
+    square, d = (blocks.omega**2)[:, None], vector(rig, blocks, "displacement")
+    force, moved = film_force(rig, blocks), vector(rig, blocks, "acceleration") / square - d
+    usable = np.isfinite(force + moved)
+    pushes, x = np.stack([force, square * moved], axis=2)[usable], moved[usable]
+    # one frequency tells no mass
+    is_told = np.max(blocks.omega, initial=0.0) > (1 + _SHAFT) * np.min(blocks.omega, initial=np.inf)
+    pushes = pushes[:, : 1 + is_told]
+    numbers = np.linalg.lstsq(pushes, x, rcond=None)[0].real
+    spring = float(numbers[0])
+    compliance = max(_SHAFT * _usual_ratio(d, force), spring) / _NANOMETRE or 1.0
+    is_explained = np.linalg.norm(x - pushes @ numbers) < _LEFT * np.linalg.norm(x)
+    if not (is_told and spring > 0 and is_explained):
+        return compliance, ()
+    return compliance, (*[0.0] * 4, *[spring / _NANOMETRE] * 2, float(numbers[1]) / spring, *[0.0] * 3)
 
 
 def _usual_ratio(first: ComplexArray, second: ComplexArray) -> float:
