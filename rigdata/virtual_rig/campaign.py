@@ -120,12 +120,15 @@ def _stored(record: SimulatedRun, rig: VirtualRig, time_name: str = "") -> _Colu
     """Columns of a record as its file holds them, times first, with the faults of the file."""
     readings, run = record.readings, record.run.id
     columns = [] if not time_name else [(time_name, readings.time)]
+    doubled = []
     for name, values in readings.columns.items():
         kinds = rig.fault_kinds(run, name)
         if "missing_channel" in kinds:
             continue
-        stored = values[: len(values) * 3 // 4] if "short_channel" in kinds else values
-        columns += [(name, stored)] * (1 + ("duplicate_column" in kinds))
+        columns.append((name, values[: len(values) * 3 // 4] if "short_channel" in kinds else values))
+        if "duplicate_column" in kinds:
+            doubled.append((name, values))
+    columns += doubled
     return [(name, values[:0]) for name, values in columns] if "empty_file" in rig.fault_kinds(run) else columns
 
 

@@ -221,13 +221,13 @@ def test_marks_at_or_below_zero_are_whole(least):
     assert low < least / 1e6 - 0.05 * (high - low)
 
 
-@pytest.mark.parametrize(("factor", "arrow"), [(2.0, "↑"), (0.5, "↓")])
+@pytest.mark.parametrize(("factor", "arrow"), [(2.0, r"$\uparrow$"), (0.5, r"$\downarrow$")])
 def test_an_arrow_shows_where_a_prediction_out_of_reach_lies(factor, arrow):
     far = LOADED["kyy_N_per_m_predicted"].where(LOADED["pivots"] != "rigid", factor * LOADED["kyy_N_per_m"])
     table = LOADED.assign(kyy_N_per_m_predicted=far)
     _, deviations = coefficient_panels(table)["kyy-over-load"].figure.axes
-    arrows = [text for text in deviations.texts if text.get_text() == arrow]
-    rigid = [text.get_position()[0] for text in arrows if text.get_color() == MODEL_STYLES["rigid"]["color"]]
+    arrows = [line for line in deviations.lines if line.get_marker() == arrow]
+    rigid = [line.get_xdata()[0] for line in arrows if line.get_color() == MODEL_STYLES["rigid"]["color"]]
     assert sorted(rigid) == pytest.approx(sorted(LOADED["static_load_N"].unique() / 1e3))
 
 

@@ -99,8 +99,8 @@ def coefficient(comparison: Comparison | pd.DataFrame, name: str, over: str = "l
         colours = model_styles(list(reach.index))
         for row in series[deviation.abs() > limit].to_dict("records"):  # on which side what is out of reach lies
             colour, is_above = colours[row["pivots"]]["color"], row["off"] > 0.0
-            side, edge, arrow = (limit, "top", "↑") if is_above else (-limit, "bottom", "↓")
-            axes.text(row["at"], side, arrow, color=colour, ha="center", va=edge)
+            side, arrow = (0.85 * limit, r"$\uparrow$") if is_above else (-0.85 * limit, r"$\downarrow$")
+            axes.plot(row["at"], side, marker=arrow, color=colour)  # a mark, not text, which colours leave too pale
     return figure
 
 
