@@ -14,7 +14,8 @@ from tests.command_line import ended
 from tests.structure.test_examples import computed_once  # noqa: F401 (for its module)
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+WALK = ROOT / "tpjb_ident" / "identification" / "README.md"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", WALK, *sorted((ROOT / "docs").rglob("*.md"))]
 #: Blocks that describe files of a user, so they are checked for being Python and are not run.
 NEEDS_FILES_OF_YOUR_OWN = ("rocker-A",)
 LANGUAGES = {"python", "toml", "sh", "text", "json", "math"}
