@@ -308,6 +308,6 @@ def pad_rooms(bearing: Bearing) -> list[tuple[int, int, float]]:
         edges.append(((pad.pivot_angle - share * pad.arc) % math.tau, number))
     edges.sort()
     rooms = []
-    for (start, number), (following, neighbour) in zip(edges, edges[1:] + edges[:1]):
+    for (start, number), (following, neighbour) in zip(edges, edges[1:] + edges[:1], strict=True):
         rooms.append((number, neighbour, (following - start) % math.tau if neighbour != number else math.tau))
     return rooms

@@ -147,7 +147,7 @@ def predict_setup(
         omega = np.asarray(excitation, float)
     except TypeError as error:
         raise _OperatingPointError(f"excitation must be numbers [rad/s], got {excitation!r}") from error
-    _check_point(load, load_direction, omega)
+    _check_point(load, load_direction, speed, omega)
     # A load near the smallest float is none: its quotients would not be numbers.
     pushing = load if load > _NO_LOAD else 0.0
     force = pushing * np.array([math.cos(load_direction), math.sin(load_direction)])
@@ -216,13 +216,15 @@ def in_rig(setup: Setup, vector: FloatArray) -> FloatArray:
     return np.asarray(MIRROR @ vector) if setup.mirrored else vector
 
 
-def _check_point(load: float, direction: float, omega: FloatArray) -> None:
+def _check_point(load: float, direction: float, speed: float, omega: FloatArray) -> None:
     if not (math.isfinite(load) and load >= 0):
         raise _OperatingPointError(
             f"load must be zero or positive [N], got {load!r}; give its direction as load_direction"
         )
     if not math.isfinite(direction):
         raise _OperatingPointError(f"load_direction must be finite [rad], got {direction!r}")
+    if not (math.isfinite(speed) and speed != 0.0):
+        raise _OperatingPointError(f"speed must be a number of rad/s other than zero, got {speed!r}")
     if omega.ndim > 1 or omega.size == 0 or not np.all((omega > 0) & (omega < _FASTEST)):
         raise _OperatingPointError(
             f"excitation must be a positive number below {_FASTEST:g} rad/s or a 1-D array of them, "

@@ -135,7 +135,7 @@ class Prediction:
             "excitation_Hz": self._frequencies,
         }
         for values, kind, unit in ((self.k, "k", "N_per_m"), (self.c, "c", "Ns_per_m")):
-            for at, column in zip(("xx", "xy", "yx", "yy"), values.reshape(-1, 4).T):
+            for at, column in zip(("xx", "xy", "yx", "yy"), values.reshape(-1, 4).T, strict=True):
                 table[f"{kind}{at}_{unit}"] = column
         x, y = self.position
         return pd.DataFrame(table | {"x_m": x, "y_m": y, "status": "; ".join(self.status)})

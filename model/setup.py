@@ -128,6 +128,8 @@ class Setup:
             )
         if not self.bearing.pads:
             raise BearingError("a bearing needs at least one pad")
+        if len(self.pivots) != len(self.bearing.pads):
+            raise BearingError(f"need one pivot law per pad ({len(self.bearing.pads)}), got {len(self.pivots)}")
 
     def change(self, **changes: Any) -> Setup:
         """Return a copy with other values."""

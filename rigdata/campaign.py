@@ -83,7 +83,7 @@ class Campaign(Description):
         rows: list[tuple[str, ...]] = [("kind", "runs", "load, kN", "shaft, Hz", "excitation, Hz")]
         for kind in dict.fromkeys(run.kind for run in self.runs):
             points = [run.point for run in self.of_kind(kind)]
-            columns = zip(*((p.static_load / 1e3, p.shaft_speed_hz, p.excitation_hz) for p in points))
+            columns = zip(*((p.static_load / 1e3, p.shaft_speed_hz, p.excitation_hz) for p in points), strict=True)
             spans = [(f"{min(values):.4g}", f"{max(values):.4g}") for values in columns]
             rows.append((kind, str(len(points)), *(" to ".join(dict.fromkeys(span)) for span in spans)))
         body = "".join(f"<tr><td>{'</td><td>'.join(row)}</td></tr>" for row in rows)

@@ -14,11 +14,6 @@ from model.setup import Setup
 _SPRING = Parameter("stiffness", "N/m", "stiffness", math.inf, 5e7, math.inf, 2e9, "inverse")
 
 
-def _entries(names: str, unit: str, dimension: str, most: float, typical: float) -> tuple[Parameter, ...]:
-    """Entries of a matrix, in their order."""
-    return tuple(Parameter(name, unit, dimension, 0.0, -most, most, typical) for name in names.split())
-
-
 def _add_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
     """Put a compliance [m/N] in series with the whole bearing.
 
@@ -26,7 +21,7 @@ def _add_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
     it gives way towards that pad.
     """
     pivots = []
-    for law, pad in zip(setup.pivots, setup.bearing.pads):
+    for law, pad in zip(setup.pivots, setup.bearing.pads, strict=True):
         x, y = pad.normal
         pivots.append(_alone(law, xx * x * x + 2.0 * xy * x * y + yy * y * y))
     return _added(setup.change(pivots=tuple(pivots)), "series_compliance", xx, xy, yy)
@@ -82,21 +77,21 @@ def structure_compliance(setup: Setup, stiffness: float, direction: float) -> Se
 
 @effect_on(
     "structure",
-    *_entries("xx xy yy", "m/N", "compliance", 2e-8, 5e-10),
+    *tuple(Parameter(entry, "m/N", "compliance", 0.0, -2e-8, 2e-8, 5e-10) for entry in ("xx", "xy", "yy")),
     source="Generic: springs between bearing and probes of 1e9 to 5e9 N/m, as in rig housings",
     finding=("something between film and probes gives way, differently in every direction: xx {xx}, xy {xy}, yy {yy}"),
     physics="A generic term: a spring in series with the whole bearing, for what no named effect describes.",
     on_the_rig="Stiffness is short, most where it is high; dry tests and shaft positions show it too.",
     check="the joints, caps and brackets between the pivots and the probes",
 )
-def series_compliance(setup: Setup, **entries: float) -> Setup:
+def series_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
     """inv(H_meas) = inv(H) + [[xx, xy], [xy, yy]]; static positions move too, in all kinds of run."""
-    return _add_compliance(setup, *entries.values())
+    return _add_compliance(setup, xx, xy, yy)
 
 
 @effect_on(
     "structure",
-    *_entries("xx xy yx yy", "N/m", "stiffness", 1e10, 2e07),
+    *tuple(Parameter(entry, "N/m", "stiffness", 0.0, -1e10, 1e10, 2e07) for entry in ("xx", "xy", "yx", "yy")),
     source="Generic: whatever adds a constant stiffness to the records; a tenth of a bearing's own",
     finding="something beside the film adds a stiffness: xx {xx}, xy {xy}, yx {yx}, yy {yy}",
     physics=(
@@ -106,14 +101,14 @@ def series_compliance(setup: Setup, **entries: float) -> Setup:
     on_the_rig="The same amount is off at every load and frequency; shaft positions do not show it.",
     check="hoses, seals and leaf springs across the film; shake the rig dry",
 )
-def parallel_stiffness(setup: Setup, **entries: float) -> Setup:
+def parallel_stiffness(setup: Setup, xx: float, xy: float, yx: float, yy: float) -> Setup:
     """A constant stiffness that adds to what the records show, in dynamic tests only."""
-    return _added(setup, "parallel_stiffness", *entries.values())
+    return _added(setup, "parallel_stiffness", xx, xy, yx, yy)
 
 
 @effect_on(
     "structure",
-    *_entries("xx xy yx yy", "N s/m", "damping", 1e09, 1e05),
+    *tuple(Parameter(entry, "N s/m", "damping", 0.0, -1e09, 1e09, 1e05) for entry in ("xx", "xy", "yx", "yy")),
     source="Generic: whatever adds a constant damping to the records; a tenth of a bearing's own",
     finding="something beside the film adds a damping: xx {xx}, xy {xy}, yx {yx}, yy {yy}",
     physics=(
@@ -123,6 +118,6 @@ def parallel_stiffness(setup: Setup, **entries: float) -> Setup:
     on_the_rig="The same damping is off at every load; stiffness agrees.",
     check="hoses, seals and dampers across the film; shake the rig dry",
 )
-def parallel_damping(setup: Setup, **entries: float) -> Setup:
+def parallel_damping(setup: Setup, xx: float, xy: float, yx: float, yy: float) -> Setup:
     """A constant damping that adds to what the records show, in dynamic tests only."""
-    return _added(setup, "parallel_damping", *entries.values())
+    return _added(setup, "parallel_damping", xx, xy, yx, yy)

@@ -84,7 +84,7 @@ class ElasticSector:
         sections = np.zeros((2, 2, 3, size, 3, size))
         lame, shear = self._lame()
         strains = (_VOLUME, *_NORMAL, *_SHEAR)
-        for strain, modulus in zip(strains, (lame, *[2.0 * shear] * 3, *[shear] * 3)):
+        for strain, modulus in zip(strains, (lame, *[2.0 * shear] * 3, *[shear] * 3), strict=True):
             for a, b in product(strain, strain):
                 weight = a.sign * b.sign * modulus * radius ** (1 - a.inverse_r - b.inverse_r)
                 across = np.kron(mesh.r.matrix(a.r, b.r, weight), mesh.z.matrix(a.z, b.z))
@@ -114,7 +114,7 @@ class ElasticSector:
         for slabs in elements:
             near = slice(max(0, slabs.start - 1), slabs.stop + mesh.theta.degree)
             out = np.zeros((*self.fixed[slabs].shape, temperature.shape[-1]))
-            for term, (along, across, end) in zip(_VOLUME, axes):
+            for term, (along, across, end) in zip(_VOLUME, axes, strict=True):
                 load = np.tensordot(along[slabs, near], temperature[near], 1)
                 out[:, term.component] += np.einsum("ar,bz,trzc->tabc", across, end, load, optimize=True)
             out[self.fixed[slabs]] = 0.0
@@ -145,7 +145,7 @@ class ElasticSector:
     def _surface_loads(self, thermal: Iterable[FloatArray], elements: Iterable[slice]) -> Iterator[FloatArray]:
         """Thermal loads, then unit forces on the film nodes of this element and of those before it."""
         n_z = self.mesh.z.n_nodes
-        for slabs, load in zip(elements, thermal):
+        for slabs, load in zip(elements, thermal, strict=True):
             loads = np.zeros((len(load), load.shape[1] + slabs.stop * n_z), order="F")
             loads[:, : load.shape[1]] = load
             nodes = np.arange(len(load)).reshape(self.fixed[slabs].shape)[:, _U, 0].ravel()

@@ -77,7 +77,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FilmGrid, CrossFil
     grids, stack = _grids(spans, bearing.journal_radius, bearing.length, shape, symmetric)
     works, parts = film_works(grids, setup.inlet_temperature)
     crosses = cross_film(works, setup.inlet_temperature) if across else None
-    for k, (pad, grid, work) in enumerate(zip(bearing.pads, grids, parts)):
+    for k, (pad, grid, work) in enumerate(zip(bearing.pads, grids, parts, strict=True)):
         work.pressure[0, grid.first : -1], (x, y) = pad.leading_edge_pressure, pad.normal
         if not symmetric:
             # the axis leans by `angle` towards `toward`: at z the journal stands z * angle further that way

@@ -210,9 +210,9 @@ class Search:
         # where a pad has no curve, here or there, nothing is moved; pads that friction holds stay where they are held
         has_curves = not np.isnan(self.begun.position - start.begun.position).any()
         moved = self.begun if has_curves and not self.setup.friction else start.begun
-        pairs = zip(moved, start.begun)
+        pairs = zip(moved, start.begun, strict=True)
         shift = Begun(*(np.where(np.isnan(new - old), 0.0, new - old) for new, old in pairs))
-        for m, (film, neighbour) in enumerate(zip(self.films, start.films)):
+        for m, (film, neighbour) in enumerate(zip(self.films, start.films, strict=True)):
             if self.case.mixing and math.isfinite(self.case.fresh):
                 pads["passed"][m] = through_flow(neighbour)[1]
             as_curves_say = neighbour.idle == math.isnan(start.begun.tilt[m])
@@ -270,7 +270,7 @@ class Search:
         flatter too; what these carry tells them, without the heat that follows.
         """
         moved = False
-        for pad, film, curve in zip(self.pads.view(np.recarray), self.films, self.stack.curves):
+        for pad, film, curve in zip(self.pads.view(np.recarray), self.films, self.stack.curves, strict=True):
             if not pad.solved or not is_doubtful(self.case, pad, curve):
                 continue
             stiffness = pad.stiffness
@@ -289,7 +289,7 @@ class Search:
         """Leave the films where the arrays stand."""
         pads = self.pads
         for name in ("tilt", "deflection", "axial", "idle", "inlet", "supplied"):
-            for film, value in zip(self.films, pads[name].tolist()):
+            for film, value in zip(self.films, pads[name].tolist(), strict=True):
                 setattr(film, name, value)
         names = ("solved", "resting", "clearance", "wedge", "least", "steps")
         solved, resting, clearances, wedges, least, steps = (pads[name].tolist() for name in names)

@@ -151,5 +151,5 @@ def _alike(time: FloatArray, reference: FloatArray) -> bool:
     """Whether two channels are sampled at the same times."""
     if time is reference or len(time) != len(reference):
         return time is reference
-    step = (reference[-1] - reference[0]) / len(reference) if len(reference) else 0.0
+    step = (reference[-1] - reference[0]) / max(len(reference) - 1, 1) if len(reference) else 0.0
     return bool(np.all(np.abs(time - reference) <= SAME_STEP * step))

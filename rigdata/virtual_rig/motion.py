@@ -55,7 +55,7 @@ class Motion:
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
         """X and Y of "displacement" [m], "force" [N] or "acceleration" [m/s^2] at `time` (n,) [s] -> (n, 2)."""
         mean = {"displacement": self.position, "force": self.load}.get(quantity, np.zeros(2))
-        if mean.ndim == 2:
+        if mean.ndim == 2 and not np.array_equal(time, self.time):
             mean = np.stack([np.interp(time, self.time, column) for column in mean.T], axis=1)
         out = np.broadcast_to(mean, (len(time), 2)).copy()
         for line in self.lines:
@@ -205,6 +205,8 @@ def held_back(load: FloatArray, friction: float) -> FloatArray:
     The play operator: going up the pivot feels (1 - friction) of the load, going down (1 + friction), and on
     reversal it waits until the load has crossed that gap.
     """
+    if friction == 0.0:
+        return load
     felt = np.empty_like(load)
     low, high = (load * (1 - friction)).tolist(), (load * (1 + friction)).tolist()
     # a falling test begins at the top of a load that came from above
@@ -240,19 +242,19 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     pads = _sides(truth)
     angles = np.array(truth.pivot_angles)[pads]
     shares, places = [], []
-    for pad, after in zip(pads, [*pads[1:], pads[0]]):
+    for pad, after in zip(pads, [*pads[1:], pads[0]], strict=True):
         angle, next_angle = truth.pivot_angles[pad], truth.pivot_angles[after]
         gap = (next_angle - angle) % (2 * np.pi)
         passed, remaining = wrapped(direction - angle - lag), wrapped(next_angle + lag - direction)
         share = 0.25 * (1 + np.tanh(passed / _SLIDE_WIDTH)) * (1 + np.tanh(remaining / _SLIDE_WIDTH))
         turned = np.clip(wrapped(direction - angle), 0.0, gap)
         forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
-        reach = np.stack([_reach(truth, k, force) for k, force in zip((pad, after), forces)])
+        reach = np.stack([_reach(truth, k, force) for k, force in zip((pad, after), forces, strict=True)])
         shares.append(share)
         places.append(np.linalg.solve(directions([angle, next_angle]), reach).T)
     weight = np.array(shares) / np.sum(shares, axis=0)
     position = np.einsum("kn,knj->nj", weight, np.array(places))
-    for i, (pad, normal) in enumerate(zip(pads, directions(angles))):
+    for i, (pad, normal) in enumerate(zip(pads, directions(angles), strict=True)):
         # between two corners a blend of both would share the load among three pads
         alone = 4.0 * weight[i - 1] * weight[i]
         side = _reach(truth, pad, push * np.cos(direction - angles[i]))

@@ -3,9 +3,9 @@
 From motion to readings: axes, gains, delays, runout, noise, glitches, zero, the converter, faults of the record.
 """
 
-import fnmatch
 from collections.abc import Iterable
 from dataclasses import asdict, astuple, dataclass, field, replace
+from fnmatch import fnmatchcase
 from functools import cache, cached_property
 from math import inf
 from typing import Any
@@ -62,11 +62,11 @@ class Fault:
 
     def affects(self, run: str) -> bool:
         """Whether it concerns a run."""
-        return fnmatch.fnmatchcase(run, self.run)
+        return fnmatchcase(run, self.run)
 
     def is_in(self, channel: str) -> bool:
         """Whether it concerns a channel of its runs."""
-        return self.channel is None or fnmatch.fnmatchcase(channel, self.channel)
+        return self.channel is None or fnmatchcase(channel, self.channel)
 
 
 @dataclass(frozen=True)
@@ -143,8 +143,8 @@ def converted(reading: FloatArray, sensor: Sensor, bits: int | None) -> FloatArr
     """Reading after the converter: limited to its span and rounded to its steps."""
     if bits is None:
         return reading
-    step, half = converter_step(sensor, bits), 2 ** (bits - 1)
-    return np.clip(np.rint(reading / step), -half, half - 1) * step
+    step = converter_step(sensor, bits)
+    return np.clip(np.rint(reading / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1) * step
 
 
 def converter_step(sensor: Sensor, bits: int) -> float:
@@ -278,7 +278,7 @@ class VirtualRig:
         for fault in self.faults:
             runs = [run.id for run in self.runs]
             for name, pattern, names in (("run", fault.run, runs), ("channel", fault.channel or "*", channels)):
-                if not fnmatch.filter(names, pattern):
+                if not any(fnmatchcase(candidate, pattern) for candidate in names):
                     listed = ", ".join(names[:20])
                     raise VirtualRigError(f"fault {fault.kind!r}: no {name} matches {pattern!r}; there are {listed}")
             candidates = channels if fault.kind == "swapped" else runs
@@ -299,6 +299,8 @@ class VirtualRig:
 
     def faults_of(self, record: str) -> tuple[Fault, ...]:
         """Faults that strike one of the runs of a record."""
+        if not self.faults:
+            return ()
         members = [run.id for run in self.runs if run.record == record]
         return tuple(fault for fault in self.faults if any(map(fault.affects, members)))
 

@@ -23,6 +23,7 @@ from model.pivots import (
     pivot_laws,
     pressed_beyond,
 )
+from model.setup import Setup
 
 E, NU = 206e9, 0.3
 ROCKER = Pivot("rocker", E, NU, contact_length=39.6e-3, housing_diameter=132.0e-3, pivot_diameter=119.6e-3)
@@ -231,3 +232,8 @@ def test_a_list_of_numbers_is_no_list_of_laws_and_the_message_says_what_is(rocke
 def test_cubics_are_those_of_scipy(seed, count):
     x, y = np.sort(np.random.default_rng(seed).normal(size=(2, count)), axis=1)
     np.testing.assert_allclose(rising_cubics(x, y), PchipInterpolator(x, y).c, rtol=1e-9, atol=1e-12)
+
+
+def test_a_set_up_has_as_many_pivots_as_pads(rocker):
+    with pytest.raises(BearingError, match=r"one pivot law per pad \(5\), got 4"):
+        Setup(rocker, pivot_laws("rigid", rocker)[:4])

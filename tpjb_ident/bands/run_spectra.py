@@ -44,6 +44,8 @@ from tpjb_ident.runs.point_data import mean_temperatures
 
 #: Periods that a record must hold.
 _MIN_PERIODS = 3
+#: Periods by which one shows: what is held so often and no more is told with its length.
+_REPEATED = 2
 #: Chance that a record without period shows one, and that its noise hides a period behind a multiple of it.
 _CHANCE = 1e-3
 #: Likelihood over that of any other lag that is no multiple, and part of a cycle at the band's top within which two
@@ -88,7 +90,7 @@ def find_period(clean: Samples, band: tuple[float, float], lines: tuple[Line, ..
     finer = math.ceil(_POINTS * band[1] / clean.rate)
     pairs = (rows * window, rows * window), (rows**2, window[None] ** 2)
     alike, power = (_correlation(*pair, finer) for pair in pairs)
-    part = alike[::finer][first : n // 2 + 1]
+    part = alike[::finer][first : n // _REPEATED + 1]
     lags = local_maxima(part, 0.0) + first
     if not len(lags):
         return None
@@ -152,7 +154,7 @@ def _chance_of_noise(clean: Samples, period: float, band: tuple[float, float], l
     periodic = resampled(clean, period, band[1])
     count = periodic.length // round(period)
     step = periodic.rate / max(periodic.length, 1)
-    if count < 2:
+    if count < _REPEATED:
         return 1.0
     power = np.sum(np.abs(np.fft.rfft(periodic.signals(), axis=1)) ** 2, axis=0)
     bins = np.arange(len(power))

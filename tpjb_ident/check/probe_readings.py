@@ -70,8 +70,12 @@ def check_shaft_lines(runs: Sequence[Observation]) -> None:
         # what computed records without noise show beside their lines is rounding
         shown = [run for run in runs if NO_NOISE not in run.report.keys and _motion(run, order) >= 0]
         for name, alike in _by_probe(shown, "run.point.spin"):
-            members = [(run, k) for run, k in alike if run.shaft_lines[order, k] > _CLEAR * run.lines.floor[k]]
-            rows = [(run.shaft_lines[order, k], _motion(run, order)) for run, k in members]
+            members, rows = [], []
+            for run, k in alike:
+                size = run.shaft_lines[order, k]
+                if size > _CLEAR * run.lines.floor[k]:
+                    members.append((run, k))
+                    rows.append((size, _motion(run, order)))
             sizes, motion = np.reshape(rows, (-1, 2)).T
             static = [run.run.point.static_key for run, _ in members]
             for (run, _), change in zip(members, _size_changes(np.log(sizes), motion / sizes, static).tolist()):

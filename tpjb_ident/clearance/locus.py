@@ -170,7 +170,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     noise = _noise(records)
     walk = _walk(records, orders, noise, centre)
     points, on_its_way = [], [walk.jump] if walk.jump else []
-    for record, moved, walked in zip(records, walk.moved, walk.covariance):
+    for record, moved, walked in zip(records, walk.moved, walk.covariance, strict=True):
         if size := _moved(record, noise):
             on_its_way.append(f"halves of {record.run.id} stand {amount(size, 'length', '.2g')} apart")
         position = record.position - moved - centre

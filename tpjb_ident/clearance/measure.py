@@ -325,7 +325,7 @@ def _status(fit: SideFit, polygon: ClearancePolygon, curves: Sequence[PivotCurve
 
 def _offsets(pads: IntArray, offsets: FloatArray) -> str:
     """How far pads (k,) from 0 stand off, (k,) [m], in words."""
-    return ", ".join(f"pad #{pad + 1} {1e6 * offset:+.1f} µm" for pad, offset in zip(pads, offsets))
+    return ", ".join(f"pad #{pad + 1} {1e6 * offset:+.1f} µm" for pad, offset in zip(pads, offsets, strict=True))
 
 
 def _inseparable(fit: SideFit, centre: Centre, gains: FloatArray) -> Conditions:

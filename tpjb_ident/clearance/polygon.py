@@ -282,7 +282,7 @@ def _least_squares(
 
 def _mixed(fits: Sequence[tuple[FloatArray, FloatArray, float, float]]) -> tuple[FloatArray, FloatArray, float]:
     """Values, covariance and misfit of the fits of all lags together, each with its posterior share."""
-    betas, covariances, totals, misfits = (np.array(column) for column in zip(*fits))
+    betas, covariances, totals, misfits = (np.array(column) for column in zip(*fits, strict=True))
     misfit = np.min(misfits)
     # what the noise model does not explain widens the intervals; a lucky sweep does not narrow them
     wider = max(misfit, 1.0)

@@ -143,11 +143,11 @@ class Terminal:
             values: Iterable[Any] = frame[name]
             if f"{name}_lo" in frame:
                 column = column._replace(form=with_half)
-                values = zip(values, 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]))
+                values = zip(values, 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]), strict=True)
             columns.append(column)
             cells.append(values)
         if cells:
-            self.show(title, columns, zip(*cells), file)
+            self.show(title, columns, zip(*cells, strict=True), file)
 
     def show_table(self, table: Table, name: str) -> None:
         """Print a table of a page; `name` says what it is of."""
@@ -260,7 +260,7 @@ def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Co
 
     def line(texts: Sequence[str]) -> str:
         padded = []
-        for i, text in zip(row_columns, texts):
+        for i, text in zip(row_columns, texts, strict=True):
             pad = " " * (sizes[i] - cell_len(text))
             padded.append(text + pad if i in words else pad + text)
         return _SPACE.join(padded).rstrip()
@@ -281,7 +281,7 @@ def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Co
 
 def _sizes(rows: Iterable[Sequence[str]]) -> list[int]:
     """Size of the widest cell of each column."""
-    return [max(map(cell_len, cells)) for cells in zip(*rows)]
+    return [max(map(cell_len, cells)) for cells in zip(*rows, strict=True)]
 
 
 def _total(sizes: Sequence[int]) -> int:

@@ -196,7 +196,7 @@ def _judged(
     half = stdtrit(freedom, 0.5 + 0.5 * _LEVEL) * np.sqrt(variance)
     sure = stdtrit(freedom, 1 - 0.5 * (1 - _LEVEL) / max(number, 1)) * np.sqrt(variance)
     columns = {}
-    for side, frame in zip("ab", frames):
+    for side, frame in zip("ab", frames, strict=True):
         for end in _ENDS:
             columns[f"{name}_{side}{end}"] = frame[name + end]
     gap = columns[f"{name}_b"] - columns[f"{name}_a"]
@@ -224,7 +224,7 @@ def _pivots(a: Side, b: Side) -> pd.DataFrame:
         pair = [side[pad] for side in curves]
         low, high = max(curve["force_N"].min() for curve in pair), min(curve["force_N"].max() for curve in pair)
         force = np.linspace(low, high, _PIVOT_LOADS if low < high else 0)
-        for curve, tables in zip(pair, frames):
+        for curve, tables in zip(pair, frames, strict=True):
             scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve else 0.0
             columns = {TANGENT + end: np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS}
             columns["systematic"] = scale * columns[TANGENT]

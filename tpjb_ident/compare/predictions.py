@@ -117,13 +117,13 @@ def _excited(point: OperatingPoint) -> OperatingPoint:
 
 def point_columns(point: OperatingPoint) -> dict[str, float | str]:
     """Key columns of every table over operating points (outputs.md)."""
-    return dict(zip(POINT_KEY, _excited(point).key))
+    return dict(zip(POINT_KEY, _excited(point).key, strict=True))
 
 
 def _row(point: OperatingPoint, p: Prediction, index: int) -> dict[str, Any]:
     """Row of one point, of whose frequencies in a prediction it is the one of this index."""
     row = {**point_columns(point)}
-    row.update(zip(COEFFICIENT_COLUMNS, np.stack([p.k[index], p.c[index]]).ravel()))
+    row.update(zip(COEFFICIENT_COLUMNS, np.stack([p.k[index], p.c[index]]).ravel(), strict=True))
     row.update(x_m=p.position[0], y_m=p.position[1])
     for number in range(1, len(p.pad_load) + 1):
         row.update(_pad_columns(p, number))

@@ -158,12 +158,12 @@ def _coefficients(observations: Observations, vector: FloatArray) -> pd.DataFram
 
     half = HALF_INTERVAL * np.sqrt(np.diag(observations.covariance))
     rows: dict[Where, dict[str, Any]] = {}
-    for element, value, width in zip(observations.elements, vector, half):
+    for element, value, width in zip(observations.elements, vector, half, strict=True):
         if element.family != "h":
             continue
         load, direction, speed, omega = (element.place(k) for k in ("load", "direction", "speed", "excitation"))
         point = OperatingPoint(load, direction, abs(speed), omega, rotation_of(speed))
-        row = rows.setdefault(element.where, dict(zip(POINT_KEY, point.key)))
+        row = rows.setdefault(element.where, dict(zip(POINT_KEY, point.key, strict=True)))
         column, factor = coefficient_column(element.observable), omega if element.observable[0] == "c" else 1.0
         for end, sign in (("", 0.0), ("_lo", -1.0), ("_hi", 1.0)):
             row[column + end] = float(value + sign * width) / factor

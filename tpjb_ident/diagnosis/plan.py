@@ -60,7 +60,7 @@ class CampaignPlan:
     @property
     def below_floor(self) -> tuple[str, ...]:
         """Effects that this campaign would not see at their typical size."""
-        return tuple(c.label for c, d in zip(self.candidates, self.detectable) if d < Deciding.visible)
+        return tuple(c.label for c, d in zip(self.candidates, self.detectable, strict=True) if d < Deciding.visible)
 
     def matrix(self) -> pd.DataFrame:
         """Isolability matrix: row A at d' = 6 against everything that column B can imitate, in standard deviations."""
@@ -87,7 +87,7 @@ class CampaignPlan:
 
         rows = []
         for i, c in enumerate(self.candidates):
-            distances = zip(self.candidates, self.separation[i])
+            distances = zip(self.candidates, self.separation[i], strict=True)
             like = [candidate.label for candidate, distance in distances if distance < Deciding.visible]
             end, (low,), (high,) = c.neutral + self.floor[i], *c.limits
             rows.append(

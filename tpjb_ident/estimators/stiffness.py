@@ -151,7 +151,7 @@ class DynamicStiffness:
     def cells(self) -> list[str]:
         """Write kxx .. cyy with half their 95 % intervals, in the units of tables that people read."""
         cells = []
-        for i, (value, half) in enumerate(zip(self.vector, self.half_width())):
+        for i, (value, half) in enumerate(zip(self.vector, self.half_width(), strict=True)):
             scale = STIFFNESS.display_scale if i < 4 else DAMPING.display_scale * self.omega
             cells.append(with_interval(value, value - half, value + half, scale))
         return cells

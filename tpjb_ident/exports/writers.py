@@ -100,7 +100,7 @@ def write_excel(folder: Path, points: pd.DataFrame, source: str) -> None:
         sheet = writer.sheets["coefficients"]
         for column in sheet.columns:
             sheet.column_dimensions[column[0].column_letter].width = max(12, len(str(column[0].value)) + 2)
-        for row, trusted in zip(sheet.iter_rows(min_row=2), frame["trusted"]):
+        for row, trusted in zip(sheet.iter_rows(min_row=2), frame["trusted"], strict=True):
             for cell in row if not trusted else ():
                 cell.font = openpyxl.styles.Font(color="C00000")
         for row in (*sheet.rows, *writer.sheets["about"].rows):

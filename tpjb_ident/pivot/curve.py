@@ -275,7 +275,7 @@ class PivotCurve(Presented):
         """Values (n,) of the leading law, and their covariance (n, n) by all laws about it."""
         leading, _ = quantity(self.law)
         covariance = np.zeros((len(leading), len(leading)))
-        for fit, weight in zip(self.fits, self.weights):
+        for fit, weight in zip(self.fits, self.weights, strict=True):
             value, gradient = quantity(fit)
             difference = value - leading
             covariance += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))
@@ -335,7 +335,7 @@ class PivotCurve(Presented):
 
     def __str__(self) -> str:
         parameters = []
-        for name, value, variance in zip(self.law.names, self.law.theta, np.diag(self.law.covariance)):
+        for name, value, variance in zip(self.law.names, self.law.theta, np.diag(self.law.covariance), strict=True):
             parameters.append(f"{name} = {value:.4g} (se {math.sqrt(variance):.2g})")
         middle = 0.5 * self.valid_to
         low, high = map(float, self.stiffness_band(middle))

@@ -133,7 +133,7 @@ def _fit_pads(pads: Sequence[Sequence[DryRecord]], structure: str) -> list[Pivot
         fits.append([fit_law(law, contact, pad_data) for law, contact in variants])
     fits = with_shared_shape(fits, posterior_weights(fits), data)
     curves = []
-    for records, candidates, weights in zip(pads, fits, posterior_weights(fits)):
+    for records, candidates, weights in zip(pads, fits, posterior_weights(fits), strict=True):
         curve = assemble_curve(records, keep_likely(candidates, weights), noise, structure)
         text = f"tests of one pad differ by {100 * scatter:.0f} % in deflection over load"
         differing = holding((scatter > _TOO_MUCH and len(records) > 1, "runs-disagree", text))
@@ -215,7 +215,7 @@ def _steps(records: Sequence[DryRecord], law: LawFit, noise: NoiseModel) -> Pivo
         aside = share @ blocks.across - blocks.across[0]
         weight = 1.0 - (members & ~record.good).any(axis=1)
         parts.append((load, deflection, error, share @ blocks.across_load, aside, branch, weight))
-    return PivotSteps(*(np.concatenate(column) for column in zip(*parts)))
+    return PivotSteps(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
@@ -233,7 +233,7 @@ def _status(curve: PivotCurve, records: Sequence[DryRecord], structure: str) -> 
     law, onset, bad = curve.law, curve.onset_load, np.sum(curve.steps.weight == 0.0)
     aside = abs(curve.displacement_direction.angle) > 0.5 * DISPLACEMENT_LIMIT
     shares: dict[str, float] = defaultdict(float)
-    for fit, weight in zip(curve.fits, curve.weights):
+    for fit, weight in zip(curve.fits, curve.weights, strict=True):
         shares[fit.name] += weight
     listed = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
     slipped = _slips(records, law)

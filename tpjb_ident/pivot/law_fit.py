@@ -135,7 +135,7 @@ def fit_law(law: Law, contact: bool, data: FitData, start: FloatArray | None = N
     largest, flat = np.max(data.load), (0.0, np.inf, -np.inf, np.inf)
     # mean, standard deviation, lowest and highest of each parameter
     rows = [flat, (*data.friction, -0.2, 0.2), flat]
-    rows += zip(law.prior_mean, np.ones(len(law.parameters)), *law.bounds)
+    rows += zip(law.prior_mean, np.ones(len(law.parameters)), *law.bounds, strict=True)
     if contact:
         ends = np.log(0.01 * largest), np.log(largest)
         rows += [(0.0, CONTACT_GAP, 0.0, np.inf), (np.log(0.1 * largest), CONTACT_LOAD_SPREAD, *ends)]
@@ -248,7 +248,7 @@ def with_shared_shape(
     with the shape that the other pads show, give or take what pads of one make may differ by, and both fits count
     alike: a pad of its own kind loses nothing but a factor of two in evidence.
     """
-    told = [list(zip(candidates, shares)) for candidates, shares in zip(fits, weights)]
+    told = [list(zip(candidates, shares, strict=True)) for candidates, shares in zip(fits, weights, strict=True)]
     shared = []
     for pad, candidates in enumerate(fits):
         others = list(itertools.chain(*told[:pad], *told[pad + 1 :]))

@@ -102,7 +102,7 @@ def with_shared_errors(pads: Sequence[Sequence[DryRecord]], data: Sequence[FitDa
     changes = [fit.reading_gradient(pad.load, pad.branch)[0] - fit.theta[OFFSET] for fit, pad in zip(fits, data)]
     scatter = _scatter(fits, data, runs, changes)
     wider = []
-    for records, pad, fit, run, change in zip(pads, data, fits, runs, changes):
+    for records, pad, fit, run, change in zip(pads, data, fits, runs, changes, strict=True):
         root, error = np.linalg.inv(pad.whitener), max(record.load_error for record in records)
         more, less = (fit.reading_gradient(pad.load + shift, pad.branch)[0] for shift in (error, -error))
         zero, creep = 0.5 * (more - less), _CREPT * max(record.creep for record in records)
@@ -118,7 +118,7 @@ def _scatter(
 ) -> float:
     """Scatter of the compliance from test to test of a pad; zero where it may be chance."""
     sizes, squares = [np.zeros(0)], [np.zeros(0)]
-    for fit, pad, run, change in zip(fits, data, runs, changes):
+    for fit, pad, run, change in zip(fits, data, runs, changes, strict=True):
         columns = (run[:, None] == np.unique(run)) * change[:, None]
         # what all tests have in common is the curve's
         shift, remainder, score = score_of(fit, pad, columns @ linalg.null_space(np.ones((1, columns.shape[1]))))

@@ -179,7 +179,7 @@ def _misplaced(records: Sequence[DryRecord]) -> list[Problem]:
         return []
     limit = max(_ASIDE * distance, _ASIDE_SPREAD * robust_deviation(beside))
     problems = []
-    for record, ahead, aside in zip(records, toward, beside):
+    for record, ahead, aside in zip(records, toward, beside, strict=True):
         near = abs(ahead - distance) <= _ALONG * distance
         if abs(aside) > limit or not near:
             what = (

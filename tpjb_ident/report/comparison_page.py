@@ -184,7 +184,7 @@ def _flag_table(flagged: Sequence[tuple[str, Condition]]) -> Table:
         places[flag].append((place, flag.detail))
     rows = []
     for flag, occurrences in places.items():
-        points, details = zip(*occurrences)
+        points, details = zip(*occurrences, strict=True)
         rows.append([flag, flag.meaning, "; ".join(points), "; ".join(filter(None, dict.fromkeys(details)))])
     return Table("Flags", columns, rows)
 
@@ -193,7 +193,7 @@ def _flagged(comparison: Comparison) -> list[tuple[str, Condition]]:
     """Every flag of points, pivot curves, polygon and locus, and where it stands."""
     identified = comparison.identification
     labels = point_labels(points_table(identified.points))
-    parts = [(place, p.quality) for place, p in zip(labels, identified.points)]
+    parts = [(place, p.quality) for place, p in zip(labels, identified.points, strict=True)]
     parts.append(("campaign", identified.conditions))
     parts += [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
     tests = {"clearance": comparison.clearance, "locus": comparison.locus}
@@ -212,7 +212,7 @@ def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None)
     for load in (0.5 * full, full):
         columns.append(f"at {amount(load, 'load', '.4g')}, {symbol('stiffness')}")
         columns += [] if formula is None else ["of Kirk's tangent"]
-        for curve, row in zip(curves, rows):
+        for curve, row in zip(curves, rows, strict=True):
             value = float(curve.stiffness(load))
             low, high = (float(end) for end in curve.stiffness_band(load))
             remark = " (extrapolated)" if curve.is_extrapolated(load) else ""
@@ -228,7 +228,7 @@ def clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
     digits = 2 if unit < 1e-5 else 4
     halves = 1.96 * polygon.clearance_error
     rows = []
-    for k, (drawing, value, half) in enumerate(zip(drawn, polygon.clearance, halves)):
+    for k, (drawing, value, half) in enumerate(zip(drawn, polygon.clearance, halves, strict=True)):
         measured = with_interval(value, value - half, value + half, unit)
         difference = signed((value - drawing) / unit, digits)
         pushed = fixed(polygon.clearance_pushed[k] / unit, digits)

@@ -120,7 +120,7 @@ def _drawn(points: pd.DataFrame) -> Figure:
     """Draw differences of K and C with their intervals, point by point; logarithmic beyond the widest interval."""
     figure, grid = new_pictures(2, 1, height=2.7)
     place = np.arange(len(points), dtype=float)
-    for axes, kind in zip(grid[:, 0], (STIFFNESS, DAMPING)):
+    for axes, kind in zip(grid[:, 0], (STIFFNESS, DAMPING), strict=True):
         label(axes, _POINTS.format(symbol("load")), f"difference of {kind.symbol.upper()}, {kind.display_unit}")
         axes.axhline(0.0, color=INK, linewidth=1.0)
         half = 0.0

@@ -100,7 +100,7 @@ def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
     with local_workers(1 if alone else min(cores(), _MOST_HANDS), start="fork") as opened:
         texts = list(opened.map(_save_panel, [(index, folder) for index in range(len(panels))]))
     _drawn.clear()
-    return {panel.name: text for panel, text in zip(panels, texts)}
+    return {panel.name: text for panel, text in zip(panels, texts, strict=True)}
 
 
 def _save_panel(index: int, folder: Path) -> str:
@@ -136,7 +136,7 @@ def _hover_points(figure: Figure) -> tuple[np.ndarray, list[str]]:
             if bars is not None and bars[2] and bars.has_yerr and not bars.has_xerr:
                 for k, ends in enumerate(bars[2][0].get_segments()):
                     halves[k] = 0.5 * abs(ends[-1][1] - ends[0][1]) if len(ends) else np.nan
-            for (x, y), half in zip(points, halves):
+            for (x, y), half in zip(points, halves, strict=True):
                 spread = f" ± {significant(half, '.2g')}" if np.isfinite(half) else ""
                 texts.append(f"{name}{_with_unit(yl, y, spread)} at {_with_unit(xl, x)}")
     return np.concatenate(places), texts

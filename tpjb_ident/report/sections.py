@@ -98,7 +98,7 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
         return None
     p = solved[len(solved) // 2]
     cells, point = p.stiffness.cells(), p.point
-    rows = list(zip(ENTRIES, cells[:4], cells[4:]))
+    rows = list(zip(ENTRIES, cells[:4], cells[4:], strict=True))
     columns = ["", f"K, {STIFFNESS.display_unit}", f"C, {DAMPING.display_unit}"]
     shaft = spinning(point.shaft_speed_hz, point.rotation)
     return Table(f"Measured at {p.place}, shaft at {shaft}; 95 % intervals", columns, rows)
@@ -234,9 +234,9 @@ def budget_table(result: Identification) -> Table:
     for p in result.points:
         sources.update(p.budget)
     rows = []
-    for place, p in zip(point_labels(points_table(result.points)), result.points):
+    for place, p in zip(point_labels(points_table(result.points)), result.points, strict=True):
         deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}
-        for i, (value, half) in enumerate(zip(p.stiffness.cells(), p.stiffness.half_width())):
+        for i, (value, half) in enumerate(zip(p.stiffness.cells(), p.stiffness.half_width(), strict=True)):
             kind, factor = (STIFFNESS, 1.0) if i < 4 else (DAMPING, p.stiffness.omega)
             scale = kind.display_scale * factor
             digits = 2 - math.floor(math.log10(half / scale)) if 0.0 < half < math.inf else 3
@@ -302,7 +302,7 @@ def quick_look(series: Sequence[Series], spectra: Mapping[str, Spectrum]) -> Fig
     """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
     series = series[:_MOST]
     figure, grid = new_pictures(len(series), 2, width=_WIDTH, height=_ROW)
-    for (over_time, spectrum), channel in zip(grid, series):
+    for (over_time, spectrum), channel in zip(grid, series, strict=True):
         label(over_time, "time, s", printable(", ".join(filter(None, (channel.name, channel.unit)))))
         label(spectrum, "frequency, Hz", "")
         time = np.arange(len(channel), dtype=float) if channel.time is None else channel.time

@@ -189,7 +189,7 @@ def all_runs(
         former_results.append(former)
     finished: list[Any] = []
     results = (workers or Workers()).map(process_run, jobs)
-    for run, former, (mark, result) in zip(runs, former_results, results):
+    for run, former, (mark, result) in zip(runs, former_results, results, strict=True):
         if store is not None and mark and isinstance(result, RunDigest):
             store.keep(mark, result)
         finished.append(result or former)

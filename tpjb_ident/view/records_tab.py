@@ -104,7 +104,7 @@ def _show_channels(records: Sequence[Record], plots: dict[str, Any], data: dict[
     foot = slice(4, None)  # of the window, about zero
     curves = {"time": paths, "spectrum": [(f[foot], np.maximum(a[foot], 1e-12)) for f, a in spectra]}
     for name, pairs in curves.items():
-        x, y = map(list, zip(*pairs))
+        x, y = map(list, zip(*pairs, strict=True))
         data[name].data = {"x": x, "y": y, "colour": _COLOURS[: len(drawn)], "name": [r.name for r in drawn]}
     lines = ", ".join(f"{x.frequency:.4g} Hz ({x.amplitude:.3g} {unit})" for x in strongest(*spectra[0], 3))
     missing = int(np.isnan(first.values).sum())

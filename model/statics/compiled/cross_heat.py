@@ -63,7 +63,7 @@ def across_of(
     return Across(
         films,
         CrossOperator.place(rows, lines, cells),
-        np.array([_settled(body, power) for body, power in zip(bodies, powers)]),
+        np.array([_settled(body, power) for body, power in zip(bodies, powers, strict=True)]),
         fields,
         np.empty((n, 3, rows, lines)),
         np.full(n, math.nan),

@@ -101,7 +101,7 @@ JOURNAL, GROWN, GROWING, BACKFLOW = range(4)
 
 def stacked_grids(grids: Sequence[FilmGrid]) -> FilmGrid:
     """The meshes of several pads as one: arrays as of one, the pad first; `first` is the same for all."""
-    parts: Any = [np.array(values) for values in zip(*grids)]
+    parts: Any = [np.array(values) for values in zip(*grids, strict=True)]
     return FilmGrid(*parts)._replace(first=grids[0].first)
 
 

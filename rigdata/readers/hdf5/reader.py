@@ -199,7 +199,7 @@ class Hdf5Reader(RunReader):
                     grid = replace(grid, rate=rate)
                 timed[clock] = grid
             timings = {name: Grid(length) for name, length in lengths.items() if name not in timed}
-            for name, i in zip(names, serving(names, clocks, self.channels)):
+            for name, i in zip(names, serving(names, clocks, self.channels), strict=True):
                 if i is not None and name in timings:
                     matches = [clock for clock in (names[i], *timed) if lengths[clock] == lengths[name]]
                     timings[name] = timed[matches[0]] if matches else Grid(lengths[name], times=lengths[names[i]])

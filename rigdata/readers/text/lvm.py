@@ -141,7 +141,7 @@ def _joined(parts: Sequence[Series]) -> Series:
         return replace(first, values=values, time=None)
     began, bad = stamp_seconds([part.group or None for part in parts])
     times: list[FloatArray] = []
-    for part, start in zip(parts, began):
+    for part, start in zip(parts, began, strict=True):
         time = np.asarray(part.time)
         if times:
             last = times[-1]

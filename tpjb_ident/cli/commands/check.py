@@ -67,7 +67,7 @@ def check(c: Command, campaign: Path) -> None:
                 with suppress(RigDataError):  # a record that cannot be read is among the problems already
                     rate = run.sample_rate
                 figures.append((rate, *run.point.static_key[:3], run.point.excitation_hz or math.nan))
-            rows.append([kind, len(runs), len(places), *zip(*figures)])
+            rows.append([kind, len(runs), len(places), *zip(*figures, strict=True)])
         columns = [*words("kind"), "runs", "points, pads", *(Column(title, span) for title in RANGES)]
         c.show(f"{source.id}: what it covers", columns, rows)
     if any("open (??)" in p.what for p in problems):

@@ -89,7 +89,7 @@ def _show(c: Command, result: CampaignPlan) -> None:
     from tpjb_ident.compare.effect_words import label_in_words
 
     rows = []
-    for row, candidate in zip(result.to_frame().to_dict("records"), result.candidates):
+    for row, candidate in zip(result.to_frame().to_dict("records"), result.candidates, strict=True):
         size = _detected_from(row["seen_from"], candidate.parameter)
         like = label_in_words(row["mistaken_for"]) or "-"
         rows.append([label_in_words(row["effect"]), row["typical_size_sigma"], size, like])

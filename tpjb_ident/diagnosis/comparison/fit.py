@@ -88,7 +88,7 @@ class Fit:
     def errors(self) -> tuple[FloatArray, ...]:
         """Standard errors of every fault's amplitudes; those on a tolerance's number hold its own scatter besides."""
         deviation = np.sqrt(np.maximum(np.diag(self.posterior.covariance), 0.0))
-        pairs = zip(self.faults, self.unknowns.slices)
+        pairs = zip(self.faults, self.unknowns.slices, strict=True)
         return tuple(np.hypot(deviation[at], 1.0 if fault.own >= 0 else 0.0) for fault, at in pairs)
 
     @property
@@ -109,7 +109,7 @@ class Fit:
     @functools.cached_property
     def unsized(self) -> tuple[str, ...]:
         """Labels of faults whose size is not told from none: its 95 % interval holds where nothing happens."""
-        rows = zip(self.faults, self.amplitudes, self.unknowns.slices, self.errors)
+        rows = zip(self.faults, self.amplitudes, self.unknowns.slices, self.errors, strict=True)
         labels = []
         for fault, size, at, error in rows:
             if not np.any(np.abs(size - self.unknowns.origin[at]) > HALF_INTERVAL * error):
@@ -132,7 +132,7 @@ class Fit:
         """Every tolerance that kept its stated prior, and the means of scatters, the farthest out first."""
         mean, strain = self.posterior.mean, self.strain
         columns = (strain.rows @ mean, strain.heard, strain.significance(mean))
-        listed = zip(_combinations(self.unknowns)[0], *(column.tolist() for column in columns))
+        listed = zip(_combinations(self.unknowns)[0], *(column.tolist() for column in columns), strict=True)
         return tuple(sorted(itertools.starmap(Deviation, listed), key=lambda d: -abs(d.significance)))
 
     @functools.cached_property
@@ -284,8 +284,8 @@ def _renewed(run: Map, unknowns: Unknowns, linear: Linear, asked: Sequence[int])
     parts = [asked[k :: run.opened.count] for k in range(run.opened.count)]
     jacobian = linear.jacobian.copy()
     jobs = [(unknowns.faults, linear.theta, part) for part in parts]
-    for part, columns in zip(parts, run(derivatives, jobs)):
-        for index, column in zip(part, columns):
+    for part, columns in zip(parts, run(derivatives, jobs), strict=True):
+        for index, column in zip(part, columns, strict=True):
             if column is not None:
                 jacobian[:, index] = column
     return replace(linear, jacobian=jacobian)

@@ -93,7 +93,7 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
         sizes.append(side * _NEAR * float(fault.width[0]))
     paths = [path for path in lengthened(run, ((), baseline), begun, sizes, 1) if path.columns.size]
     jobs = [((f,), np.append(np.zeros(len(f.width)), baseline), tuple(range(len(f.width)))) for f in straight]
-    for fault, derived in zip(straight, run(derivatives, jobs)):
+    for fault, derived in zip(straight, run(derivatives, jobs), strict=True):
         valid = [column for column in derived if column is not None]
         if len(valid) == len(fault.width):
             paths.append(Path(fault, np.column_stack(valid)))
@@ -120,7 +120,7 @@ def lengthened(
     What is known of a path counts from the baseline, and not from another place.
     """
     out, asked = list(paths), []
-    for i, (path, size) in enumerate(zip(paths, sizes)):
+    for i, (path, size) in enumerate(zip(paths, sizes, strict=True)):
         if size and path.nodes is not None:
             changes = {} if place[0] else {node: path.columns[:, k] for k, node in enumerate(path.nodes) if node}
             nodes = [node for node in _wanted(path.fault, size) if node not in changes]
@@ -129,8 +129,8 @@ def lengthened(
     jobs = []
     for part in parts:
         jobs.append((place, [job for _, _, job in part], most))
-    for part, rows in zip(parts, run(path_changes, jobs)):
-        for (i, changes, (fault, _)), row in zip(part, rows):
+    for part, rows in zip(parts, run(path_changes, jobs), strict=True):
+        for (i, changes, (fault, _)), row in zip(part, rows, strict=True):
             if changes or row:
                 out[i] = path_through(fault, [*changes.items(), *row])
     return tuple(out)

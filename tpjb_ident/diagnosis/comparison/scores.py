@@ -75,7 +75,7 @@ def _score(path: Path, at: slice, levels: Levels, strain: Strain) -> Score:
     errors, width = levels.errors, path.fault.width
     product = levels.product(at)
     pull, square = product[:, 0, 1:], product[:, 1:, 1:]
-    grids = [path.tried(*pair) for pair in zip(pull[::_EVERY], square[::_EVERY])]
+    grids = [path.tried(*pair) for pair in zip(pull[::_EVERY], square[::_EVERY], strict=True)]
     tried = np.unique(np.vstack(grids), axis=0)
     weights, slopes = path.weights(tried), path.slopes(tried) * width
     prior = np.sum((tried / width) ** 2, axis=1)

@@ -56,13 +56,13 @@ class Unknowns:
     def effects(self, theta: FloatArray) -> tuple[Effect, ...]:
         """The faults as effects."""
         amplitudes = theta + self.origin
-        pairs = zip(self.faults, self.slices)
+        pairs = zip(self.faults, self.slices, strict=True)
         return tuple(Effect(fault.name, **fault.values(amplitudes[at])) for fault, at in pairs)
 
     def predict(self, forward: Forward, theta: FloatArray) -> FloatArray | None:
         """Prediction in units of sigma, (n,); None where the model has no equilibrium."""
         amplitudes = theta + self.origin
-        pairs = zip(self.faults, self.slices)
+        pairs = zip(self.faults, self.slices, strict=True)
         effects = [fault.candidate.effect(amplitudes[at]) for fault, at in pairs if fault.own < 0]
         problem = self.problem
         try:

@@ -74,7 +74,7 @@ class Candidate:
         inside = np.clip(np.atleast_1d(np.asarray(amplitudes, float)), *self.limits)
         sizes = np.transpose(self.basis) @ inside if self.basis else inside
         # inverse forms may round past their own bound
-        pairs = zip(self.free, map(float, sizes))
+        pairs = zip(self.free, map(float, sizes), strict=True)
         return {**{p.name: min(max(p.from_linear(v), p.low), p.high) for p, v in pairs}, **self.fixed}
 
     def effect(self, amplitudes: FloatArray | float) -> Effect:
@@ -107,7 +107,7 @@ def candidates(setup: Setup, skip: frozenset[str] = frozenset()) -> tuple[Candid
         pads = range(1, len(bearing.pads) + 1)
         places = {p.name: pads if p.discrete else p.options for p in parameters if math.isnan(p.neutral)}
         for chosen in itertools.product(*places.values()):
-            out.append(Candidate(kind.name, free, dict(zip(places, chosen))))
+            out.append(Candidate(kind.name, free, dict(zip(places, chosen, strict=True))))
     return tuple(out)
 
 

@@ -101,7 +101,7 @@ class ModelCache:
         h = bearing_impedance(running, equilibrium, np.array(lines)) if lines else np.zeros((0, 2, 2), complex)
         if runs_backward(setup.bearing, speed):
             sensors = tuple(1.0 - place for place in sensors)
-        warm = np.array([film.temperature_at(place) for film, place in zip(equilibrium.films, sensors)])
+        warm = np.array([film.temperature_at(place) for film, place in zip(equilibrium.films, sensors, strict=True)])
         loads = np.array([film.forces.force[0] if film.forces is not None else 0.0 for film in equilibrium.films])
         return SolvedPoint(h, in_rig(running, equilibrium.position), force, warm, loads)
 

@@ -86,13 +86,13 @@ class Nuisance:
     def change(self, setup: Setup, size: float) -> Setup:
         """Apply the effect of the size that this being off is."""
         effect, *place = self.effect.split()
-        kind, fixed = kind_of(effect), dict(zip(place[::2], map(int, place[1::2])))
+        kind, fixed = kind_of(effect), dict(zip(place[::2], map(int, place[1::2]), strict=True))
         return kind.apply(setup, **fixed, **{kind.parameters[-1].name: OWN_NUMBERS[effect].parameter(size)})
 
 
 def shifted(setup: Setup, known: Sequence[Nuisance], size: Sequence[float]) -> Setup:
     """Change a set-up by nuisances of given sizes (in standard deviations), one after the other."""
-    for nuisance, s in zip(known, size):
+    for nuisance, s in zip(known, size, strict=True):
         if nuisance.column is None and s:
             setup = nuisance.change(setup, s * nuisance.sigma)
     return setup
@@ -134,5 +134,5 @@ def predict(forward: Forward, effects: Sequence[Effect], known: Sequence[Nuisanc
     """Predict with effects and with nuisances of given sizes (in standard deviations), (n,); `size` (m,)."""
     sizes = size.tolist()
     change = functools.partial(shifted, known=known, size=sizes) if any(sizes) else None
-    readings = [nuisance.column * s for nuisance, s in zip(known, sizes) if nuisance.column is not None]
+    readings = [nuisance.column * s for nuisance, s in zip(known, sizes, strict=True) if nuisance.column is not None]
     return forward(effects, change) + np.sum(readings, axis=0)

@@ -27,7 +27,7 @@ def held_out(observations: Observations) -> BoolArray:
     usual = moving & (speed == (speeds.most_common(1)[0][0] if speeds else 0.0))
     out = (moving & ~usual) | (still & np.isin(direction % (2 * np.pi), _sector(direction[still])))
     swept = usual & (family == "h")
-    points = set(zip(load[swept].tolist(), direction[swept].tolist()))
+    points = set(zip(load[swept].tolist(), direction[swept].tolist(), strict=True))
     for weight, way in points:
         at_point = (load == weight) & (direction == way)
         lines = np.unique(line[swept & at_point])

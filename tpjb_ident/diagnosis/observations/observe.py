@@ -243,7 +243,7 @@ def _add_locus(parts: list[Part], locus: Locus, identification: Identification) 
     points = [p.point for p in locus.points]
     tests = [LocusTest(point.static_load, point.static_load_direction, point.spin) for point in points]
     chosen, moved = _spread(tests), moved_by_miss(locus, identification)
-    for test, p, moved_by in zip(tests, locus.points, moved):
+    for test, p, moved_by in zip(tests, locus.points, moved, strict=True):
         if test not in chosen:
             continue
         turn = math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)

@@ -47,7 +47,7 @@ class Behaviour:
 def behaviours(fit: Fit) -> tuple[Behaviour, ...]:
     """Describe the generic terms of a fit, and the pads that are further off than stated."""
     out = []
-    for fault, amplitudes, errors in zip(fit.faults, fit.amplitudes, fit.errors):
+    for fault, amplitudes, errors in zip(fit.faults, fit.amplitudes, fit.errors, strict=True):
         if not fault.is_term:
             continue
         values = fault.values(amplitudes)
@@ -119,7 +119,7 @@ class Drift:
 def drifts(fit: Fit) -> tuple[Drift, ...]:
     """Look for drifts of the first amplitude of every effect of a fit, the most telling per effect."""
     out = []
-    for fault, at in zip(fit.faults, fit.unknowns.slices):
+    for fault, at in zip(fit.faults, fit.unknowns.slices, strict=True):
         if fault.is_term:
             continue
         rows = [_over(fit, fault, at, row) for row in Deciding.over]

@@ -108,7 +108,7 @@ def _effects(run: Map, comparison: Comparison, judgement: Judgement) -> tuple[Fo
     """The effects of the model, the largest change of the prediction first."""
     fit, shares = judgement.held.fit, comparison.shares
     rows, errors = [], errors_each_way(run, fit)
-    for index, (fault, at) in enumerate(zip(fit.faults, fit.unknowns.slices)):
+    for index, (fault, at) in enumerate(zip(fit.faults, fit.unknowns.slices, strict=True)):
         if fault.is_term:
             continue
         parameters = parameters_of(fit, index, errors[index])
@@ -129,11 +129,11 @@ def parameters_of(fit: Fit, index: int, each_way: FloatArray | None = None) -> d
         values = fault.values(at)
         return np.array([values[parameter.name] for parameter in free])
 
-    value, steps = sizes(amplitudes), zip(np.diag(below), np.diag(above))
+    value, steps = sizes(amplitudes), zip(np.diag(below), np.diag(above), strict=True)
     with np.errstate(invalid="ignore"):  # what does not give is infinitely stiff
         ends = np.array([[sizes(amplitudes - low), sizes(amplitudes + high)] for low, high in steps]) - value
     below, above = (np.linalg.norm(end, axis=0) for end in (ends.min(axis=1), ends.max(axis=1)))
-    rows = zip(free, value.tolist(), (value - below).tolist(), (value + above).tolist())
+    rows = zip(free, value.tolist(), (value - below).tolist(), (value + above).tolist(), strict=True)
     out = {parameter.name: Estimate(size, low, high, parameter.unit) for parameter, size, low, high in rows}
     for name, fixed in fault.candidate.fixed.items():
         units = {parameter.name: parameter.unit for parameter in kind_of(fault.name).parameters}
@@ -151,7 +151,7 @@ def _below_floor(problem: Problem, comparison: Comparison) -> tuple[str, ...]:
     names, best = {path.fault.name for path in paths}, comparison.best
     exceeding = {d.name for d in best.tolerances if abs(d.significance) > Deciding.visible}
     listed = {n.effect.split()[0] for n in problem.nuisances if n.label in exceeding and n.effect} | best.names
-    visible = {path.fault.name for path, is_hidden in zip(paths, hidden) if not is_hidden}
+    visible = {path.fault.name for path, is_hidden in zip(paths, hidden, strict=True) if not is_hidden}
     return tuple(sorted(names - visible - listed))
 
 

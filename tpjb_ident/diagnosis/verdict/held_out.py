@@ -110,7 +110,7 @@ def held_out_gap(run: Map, fit: Fit) -> HeldOut:
         _, changes = _acting(run, fit, _neutral(place, fit.unknowns.tolerances), parts)
     if complete is None or not changes:
         return HeldOut(fit, exact)
-    pairs = zip(parts, changes)
+    pairs = zip(parts, changes, strict=True)
     touched = [_touched(fit, place, fault, (complete, change)) for (fault, _), change in pairs]
     return HeldOut(fit, exact, tuple(sorted(touched, key=lambda row: -row.remaining)))
 
@@ -136,7 +136,7 @@ def as_stated(run: Map, fit: Fit, theta: FloatArray) -> FloatArray | None:
 
 def _without_terms(fit: Fit, theta: FloatArray) -> tuple[FloatArray, list[tuple[Fault, slice]]]:
     """Free numbers within their bounds without generic terms, (k,), and where the other faults' are."""
-    parts = list(zip(fit.faults, fit.unknowns.slices))
+    parts = list(zip(fit.faults, fit.unknowns.slices, strict=True))
     inside = np.clip(theta, fit.unknowns.low, fit.unknowns.high)
     terms = [at for fault, at in parts if fault.is_term]
     return _neutral(inside, *terms), [part for part in parts if not part[0].is_term]

@@ -18,7 +18,7 @@ from tpjb_ident.schema import HALF_INTERVAL
 def errors_each_way(run: Map, fit: Fit) -> list[FloatArray]:
     """Standard errors of every fault's numbers below and above, (2, k); a tolerance's own scatter besides."""
     out = []
-    for fault, at, errors in zip(fit.faults, fit.unknowns.slices, fit.errors):
+    for fault, at, errors in zip(fit.faults, fit.unknowns.slices, fit.errors, strict=True):
         asked = [] if fault.is_term else range(at.start, at.stop)
         times = np.array([_stretched(run, fit, i) for i in asked]).T if asked else np.ones((2, 1))
         own = 1.0 if fault.own >= 0 else 0.0
@@ -32,7 +32,7 @@ def _stretched(run: Map, fit: Fit, index: int) -> tuple[float, float]:
     near = [rise(run, fit, index, side) for side in sides]
     if max(abs(found - HALF_INTERVAL**2) for found in near) < Deciding.surprise:
         return 1.0, 1.0
-    below, above = (_end(found, rise(run, fit, index, 2.0 * side)) for found, side in zip(near, sides))
+    below, above = (_end(found, rise(run, fit, index, 2.0 * side)) for found, side in zip(near, sides, strict=True))
     return below, above
 
 

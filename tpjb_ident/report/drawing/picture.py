@@ -57,9 +57,11 @@ _TABLES = _styles("green red purple blue ink", ["-.", "--", ":", "-.", "--"], "*
 #: How each pivot model is drawn everywhere. Line and marker tell them apart without colour.
 _MODELS = ("rigid", "kirk", "kirk-secant", "measured", "model before", "with the effects found")
 _OF_MODELS = _styles("grey orange purple blue orange blue", [":", "--", "-.", "-", "--", "-"], "s^vD^D")
-MODEL_STYLES = dict(zip(_MODELS, _OF_MODELS))
+MODEL_STYLES = dict(zip(_MODELS, _OF_MODELS, strict=True))
 #: How the entries of K, C and h are drawn.
-ENTRY_STYLES = dict(zip(("xx", "yy", "xy", "yx"), _styles("blue red green purple", ["--", "-", ":", "-."], "so<>")))
+ENTRY_STYLES = dict(
+    zip(("xx", "yy", "xy", "yx"), _styles("blue red green purple", ["--", "-", ":", "-."], "so<>"), strict=True)
+)
 #: Names of models in legends, where they are not their own.
 MODEL_LABELS = {
     "rigid": "rigid pivots",
@@ -319,7 +321,7 @@ def _set_points(table: pd.DataFrame) -> list[tuple[float, float, list[str]]]:
     """Load, excitation and, in words, what of these differs between rows: direction of the load, speed and sense."""
     forms = {"static_load_direction_deg": "{:g}°", "shaft_speed_Hz": "shaft {:g} Hz", "rotation": "{}"}
     varied = [name for name in forms if name in table and len(table[name].drop_duplicates()) > 1]
-    short = table.replace({"rotation": dict(zip(ROTATIONS, ("ccw", "cw")))}) if varied else table
+    short = table.replace({"rotation": dict(zip(ROTATIONS, ("ccw", "cw"), strict=True))}) if varied else table
     points = []
     for row in short.to_dict("records"):
         words = [forms[name].format(row[name]) for name in varied]

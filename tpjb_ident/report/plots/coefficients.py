@@ -192,7 +192,7 @@ def frf(source: BandResult | Identification | pd.DataFrame, *, entries: tuple[st
     if over_band and table.filter([*STATIC_KEY, "excitation"]).nunique().max() > 1:
         raise ValueError("the table holds several operating points; give the rows of one")
     figure, grid = new_pictures(3 if over_band else 2, 1, height=2.3)
-    for axes, part in zip(grid[:2, 0], ("real", "imag")):
+    for axes, part in zip(grid[:2, 0], ("real", "imag"), strict=True):
         label(axes, "frequency, Hz", f"{part.capitalize()[:2]} h, {symbol('stiffness')}")
         for entry in entries:
             value, errors = with_errors(table, f"h{entry}_{part}_N_per_m", size("stiffness"))

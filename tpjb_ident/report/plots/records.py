@@ -110,7 +110,7 @@ def spectra(run: Run) -> Figure:
     """
     figure, grid = new_pictures(2, 1, height=2.3)
     top = _TIMES * run.point.excitation_hz or 0.5 * run.sample_rate
-    for axes, (quantity, unit) in zip(grid[:, 0], _ROWS):
+    for axes, (quantity, unit) in zip(grid[:, 0], _ROWS, strict=True):
         label(axes, "frequency, Hz", f"{quantity}, 0-peak, {symbol(unit)}")
         record = run.vector(quantity)
         largest = 0.0
@@ -173,7 +173,7 @@ def coherence_spectrum(run: Run, *, segment: float | None = None) -> Figure:
     pieces = (n - piece) // (piece - piece // 2) + 1
     averages = max(math.floor(11.0 / 18.0 * pieces), 3)
     figure, axes = new_picture("frequency, Hz", "multiple coherence")
-    for number, (axis, row) in enumerate(zip(_AXES, value.T)):
+    for number, (axis, row) in enumerate(zip(_AXES, value.T, strict=True)):
         axes.plot(frequency, row, **style_of(number) | {"marker": ""}, label=f"{axis} force")
     # under no coherence at all, two inputs and m averages: Beta(2, m - 2)
     chance = betaincinv(2, max(averages - 2, 1), _LEVEL)

@@ -74,7 +74,7 @@ def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
     models += [("after", diagnosis.after)] if diagnosis.verdict.effects else []
     for model, prediction in models:
         z = residuals(diagnosis.observations, prediction)
-        for element, value in zip(diagnosis.observations.elements, z):
+        for element, value in zip(diagnosis.observations.elements, z, strict=True):
             if element.family == "h":
                 direction = round(math.degrees(element.place("direction")), 6)
                 speed, excitation = (round(element.place(name) / (2 * np.pi), 6) for name in ("speed", "excitation"))
@@ -123,7 +123,7 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame) -> Figure:
     limit = max(frame["z"].abs().max(), 3.0 * _LINEAR)
     norm = SymLogNorm(linthresh=_LINEAR, linscale=0.6, vmin=-limit, vmax=limit, base=10)
     ticks = [t for t in (-1000, -100, -30, -10, -2, 0, 2, 10, 30, 100, 1000) if abs(t) <= limit]
-    for (axes,), model in zip(grid, models):
+    for (axes,), model in zip(grid, models, strict=True):
         rows = frame[frame["model"] == model]
         cells = rows.pivot_table(index="entry", columns=list(points), values="z", dropna=False)
         table = cells.reindex(index=COEFFICIENTS, columns=pd.MultiIndex.from_frame(points)).to_numpy()
@@ -211,7 +211,7 @@ def gap(source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]]) -> Figu
     before = np.array([gap_at(g, "_before") for g in gaps.values()])
     after = np.array([gap_at(g, "_after") for g in gaps.values()])
     words = []
-    for (name, values), old, new in zip(gaps.items(), before, after):
+    for (name, values), old, new in zip(gaps.items(), before, after, strict=True):
         star = "" if any(key.startswith("heldout") for key in values) else "*"
         worse = " (worse)" if new > max(1.05 * old, 1.0) else ""
         words.append(f"{name.replace('_', ' ')}{star}{worse}")

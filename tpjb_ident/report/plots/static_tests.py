@@ -69,7 +69,7 @@ def load_deflection(curves: PivotCurve | Sequence[PivotCurve], *, up_to: float |
         _draw_steps(axes, curve)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     from_zero(axes)
-    named = dict(zip(*reversed(axes.get_legend_handles_labels())))
+    named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     add_legend(axes, handles=[named[name] for name in sorted(named)])  # pad by pad, what was left out last
     return figure
 
@@ -257,7 +257,7 @@ def clearance_and_locus(
         _draw_closed(axes, polygon.corners, **line, linewidth=1.5, label=f"clearance, {name}")
         _draw_closed(axes, corners(polygon.fitted_angle, polygon.clearance_pushed), **line, linewidth=0.6)
     for polygon in list(named.values())[:1]:  # number of each pad, just inside its side
-        for k, (angle, clearance) in enumerate(zip(polygon.angles, polygon.clearance), 1):
+        for k, (angle, clearance) in enumerate(zip(polygon.angles, polygon.clearance, strict=True), 1):
             if np.isfinite(clearance):
                 toward = directions(angle)
                 axes.annotate(f"#{k}", tuple(clearance / size("length") * toward), tuple(-10.0 * toward),
